@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from d2rpick.api.cards import Cards
+from d2rpick.base.errors import if_written
 from d2rpick.base.files import write_whole
 
 if TYPE_CHECKING:
@@ -80,9 +81,7 @@ class Answer:
 
 
 class Paged(Answer):
-    """An answer that has a page, and mostly a figure; a notebook shows it in short."""
-
-    drawn: ClassVar[bool] = True
+    """An answer that has a page and a figure; a notebook shows it in short."""
 
     def __repr__(self) -> str:
         from d2rpick.report.pages import sentence
@@ -92,7 +91,7 @@ class Paged(Answer):
     def _repr_html_(self) -> str:
         from d2rpick.report.pages import glance
 
-        return glance(self.kind, self, self.plot() if self.drawn else None)
+        return glance(self.kind, self, if_written(self.plot))
 
     def plot(self) -> Figure:
         """Draw the answer as a matplotlib Figure: the energy, and what was chosen or judged."""

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import pandas as pd
+    from matplotlib.figure import Figure
 
     from d2rpick.api.arguments import Choosing, Parts
     from d2rpick.api.cards import Cards
@@ -38,7 +39,6 @@ class PartTable(Paged, sets_of_parts.Parts):
     run: Run
     command: tuple[str, ...]
     kind = "parts"
-    drawn = False
 
     def to_frame(self) -> pd.DataFrame:
         """Give a row per part.
@@ -60,6 +60,12 @@ class PartTable(Paged, sets_of_parts.Parts):
         from d2rpick.report.parts import SET
 
         return frame_of(list(map(SET.plain, self.sets)), SET.keys, source=list(self.run.sources))
+
+    def plot(self) -> Figure:
+        """Draw the energies of the parts that have most, and the flights."""
+        from d2rpick.report.parts import draw
+
+        return draw(self)
 
     def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:  # noqa: ARG002
         """Write the page."""

@@ -162,7 +162,8 @@ def _still(reference: History, switched: History, tr: float, td: float) -> float
     """Give the change up to which an energy stands still: beside what vibrates it is nothing, or digits [energy]."""
     level = float(np.abs(switched.energies_at(np.array((tr + td) / 2))))
     digits = max(SAME * level, switched.energy_precision.quantum(level))
-    return max(digits, min(_STILL * level, _STILL_OF_VIBRATION * _range(reference, tr, td)))
+    vibrates, least = _range(reference, tr, td), round_off(reference)
+    return max(digits, least if level + vibrates <= least else min(_STILL * level, _STILL_OF_VIBRATION * vibrates))
 
 
 def _range(history: History, start: float, end: float) -> float:
@@ -207,6 +208,8 @@ def _not_rigid(
 
 def _not_locked_in(reference: History, tr: float, frozen: float, wanted: float, tolerance: float) -> Iterator[str]:
     """Object when the energy that came back is not one that the reference has about tr, or not that of td."""
+    if max(frozen, wanted) <= round_off(reference):
+        return  # nothing vibrates: what nothing is off by means nothing
     about = reference.energy[np.abs(reference.time - tr) <= 2 * reference.step]
     room = _ABOUT * float(np.abs(about).max(initial=0.0))
     if about.size and not about.min() - room <= frozen <= about.max() + room:
@@ -237,15 +240,21 @@ def times_of(switched: History, reference: History) -> tuple[float, float]:
     Raises
     ------
     RangeError
-        If there is no such time.
+        If there is no such time, as where nothing vibrates in the flight.
     """
     time, energy = switched.time, switched.energy
-    limit = np.maximum(SAME * np.abs(energy), switched.energy_precision.quantum(float(np.abs(energy).max())))
+    limit = np.maximum(SAME * np.abs(energy), switched.energy_precision.quanta(energy))
     still = stretches(np.append(False, np.abs(np.diff(energy)) <= limit[1:]))
     spans = [(max(first - 1, 0), last) for first, last in still]
-    moving = [one for one in spans if _range(reference, *time[[*one]].tolist()) > 2 * limit[one[0] : one[1] + 1].max()]
+    least = round_off(reference)
+    moving = [
+        (first, last)
+        for first, last in spans
+        if _range(reference, float(time[first]), float(time[last])) > max(least, 2 * limit[first : last + 1].max())
+    ]
     if not moving:
-        raise RangeError(f"{', '.join(switched.source)}: its energy stands still nowhere; give `tr` and `td`")
+        found = "its energy stands still nowhere, or that of the reference does so too"
+        raise RangeError(f"{', '.join(switched.source)}: {found}; give `tr` and `td`")
     first, last = max(moving, key=lambda one: time[one[1]] - time[one[0]])
     before = np.linspace(time[max(first - 1, 0)], time[first], _BETWEEN)
     tr = before[np.abs(reference.energies_at(before) - energy[first]).argmin()]

@@ -19,7 +19,7 @@ from d2rpick.api.request import (
 from d2rpick.base.errors import ArgumentError
 from d2rpick.cli import options
 from d2rpick.cli.options import ANSWER, DECK, DECK_OF_PARTS, FILES, HISTORY, ONE_RUN, RESULT, WINDOW
-from d2rpick.cli.output import IN_WORDS, Output, in_words, opened
+from d2rpick.cli.output import IN_WORDS, Output, check_switched, in_words, opened
 from d2rpick.cli.progress import reading
 from d2rpick.report.formats import FORMATS, write
 
@@ -111,8 +111,8 @@ def suggest(td: float | None, td_window: WINDOW, limit: int, request: Request, c
     from d2rpick.api.choices import suggested
 
     wanted, card = time_or_window(td, td_window), output.output_format == "card"
-    if card and not (request.part or cards.node):
-        raise ArgumentError("-f card needs --part, the parts to switch (Radioss: --node, their main nodes)")
+    if card:
+        check_switched("-f card", request, cards)
     output.check(cards)
     with opened(request, output) as (run, output):
         asked = ask(run, request, merge=cards.merge)

@@ -305,6 +305,14 @@ def in_words(text: str, form: str, width: int = 0) -> str:
     return wrapped(text, width)
 
 
+def check_switched(what: str, request: Request, cards: Cards) -> None:
+    """Refuse a card that switches nobody, before a file is opened."""
+    if not (request.part or cards.node):
+        found = f"{what} needs --part, the parts to switch (Radioss: --node, their main nodes)"
+        way = "d2rpick card --tr T --td T --part IDS --history FILE"
+        raise ArgumentError(f"{found}; where the history has no parts: {way}")
+
+
 @contextmanager
 def opened(request: Request, output: Output, *inputs: str | None) -> Iterator[tuple[Run, Output]]:
     """Open the run that is asked about and give it with what writes beside it and further ``inputs``.

@@ -11,7 +11,7 @@ from d2rpick.api.request import CHOOSING, NOT_NEGATIVE, READING, Request
 from d2rpick.base.errors import ArgumentError, DeckError, printable
 from d2rpick.cli import options
 from d2rpick.cli.options import DECK_OF_PARTS, HISTORY, RESULT
-from d2rpick.cli.output import Output, opened
+from d2rpick.cli.output import Output, check_switched, opened
 from d2rpick.cli.values import CARDS, click_type
 from d2rpick.report.formats import FORMATS
 
@@ -105,9 +105,8 @@ def _check_deck(request: Request, cards: Cards, form: str, folder: str | None) -
     """Refuse to copy no deck, and a card that switches nobody, before a file is opened."""
     if folder is not None and request.deck is None:
         raise ArgumentError("--write-deck needs `deck`, the deck that is copied with the cards")
-    if (form == "card" or folder) and not (request.part or cards.node):
-        what = "-f card" if form == "card" else "--write-deck"
-        raise ArgumentError(f"{what} needs --part, the parts that are switched (Radioss: --node, their main nodes)")
+    if form == "card" or folder:
+        check_switched("-f card" if form == "card" else "--write-deck", request, cards)
 
 
 def _check_model(asked: Asked) -> None:

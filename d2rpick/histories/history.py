@@ -338,6 +338,7 @@ class History:
         *asked, first, last = told_apart((*times, low, high))
         what = f"{f'`{argument}`' if argument else 'time'} {' '.join(asked)}"
         found = "reaches" if any(low <= time <= high for time in times) else "lies"
+        more = (", where the file is cut" if max(times) > high and not self.complete else "") + more
         raise RangeError(f"{', '.join(self.source)}: {what} {found} outside the record, {first} to {last}{more}")
 
     def check_unit(self, *times: float, argument: str) -> None:

@@ -81,6 +81,8 @@ _LINE: Final = row(
     Field("profile", maybe(_CURVE), "Times and errors of acceptable tr, straight lines between them."),
     name="line", later=("common_error", "curve", "record_end"), **_JUDGED,
 )  # fmt: skip
+# Left out, in this order, where a terminal has no room for them.
+_SPARE: Final = ("E(td)", "+-", "basis", "error")
 LAST: Final = Document("d2rpick/study/1", _MEANING, _SHARED)
 DOCUMENT: Final = Document(
     LAST.name,
@@ -91,8 +93,10 @@ DOCUMENT: Final = Document(
 
 
 def as_table(answer: Study, shown: Shown) -> str:
-    """One line per run, and below what they have in common."""
-    return "\n".join([tables.as_text(*table(answer), shown.width), "", *tables.in_line(outcome(answer))])
+    """One line per run, by what tells its name from the others, and below what they have in common."""
+    head, rows = tables.known(*table(answer))
+    rows = [[name, *row[1:]] for name, row in zip(short_names([row.source for row in answer.rows]), rows, strict=True)]
+    return "\n".join([tables.as_text(head, rows, shown.width, _SPARE), "", *tables.in_line(outcome(answer))])
 
 
 def as_markdown(answer: Study, _: Shown) -> str:
@@ -126,10 +130,13 @@ def table(answer: Study) -> tuple[list[str], list[list[tables.Cell]]]:
         "td": lambda one: one[0].td,
         "E(td)": lambda one: one[0].energy_td,
         "R": lambda one: tables.measure(one[0].residual),
-        "at common": lambda one: tables.measure(one[1]),
+        "error": lambda one: tables.measure(one[1]),
         "basis": lambda one: one[0].basis,
         "status": lambda one: one[0].status,
-        "message": lambda one: cut.get(one[0].source, "") + (one[0].message or ", ".join(one[0].warnings)),
+        "message": lambda one: (
+            cut.get(one[0].source, "")
+            + (one[0].message or ", ".join(one[0].warnings)).removeprefix(f"{one[0].source.rstrip('/')}: ")
+        ),
     }
     return tables.filled(columns, with_errors(answer))
 

@@ -152,7 +152,7 @@ def better_about(answer: Suggestion, better: Pair) -> str:
     if better.residual is not None and own.residual is not None:
         return f"residual {tables.measure(better.residual)} instead of {tables.measure(own.residual)}"
     level, here = answer.situation.vibration.whole.energy(better.td), answer.situation.energy_td
-    return f"at that td {level / here - 1:.0%} more of the energy is there to be locked in"
+    return f"the energy there is {level / here:.3g} times as high, so that more of the vibration can be kept"
 
 
 def outlook(answer: Suggestion) -> list[tuple[str, str]]:

@@ -16,8 +16,12 @@ if TYPE_CHECKING:
 
 Cell = str | float | int | bool | None
 Rows = "Iterable[Sequence[Cell]]"
-# A longer word, as a title without blanks or a list of parts, is broken where a table would be too wide.
+# A longer word, as a path or a list of parts, is broken where a table would be too wide, and one of more than the least
+# where that is not enough: no number is as long.
 _WORD: Final = 32
+_LEAST: Final = 12
+# A cell of more letters is text, which may go on in a further line before a column is left out.
+_TEXT: Final = 20
 
 
 def short(value: Cell) -> str:
@@ -119,7 +123,7 @@ def as_text(head: Sequence[str], rows: Iterable[Sequence[Cell]], width: int = WI
     texts = {name: [short(name), *map(short, cells)] for name, cells in columns.items()}
     widths = {name: max(map(len, column)) for name, column in texts.items()}
     for name in spare:
-        if name in widths and sum(min(_WORD, w) + 2 for w in widths.values()) - 2 > width:
+        if name in widths and sum(min(_TEXT, w) + 2 for w in widths.values()) - 2 > width:
             del widths[name], texts[name]
     right = [all(cell is None or isinstance(cell, (int, float)) for cell in columns[name]) for name in texts]
     narrow = _narrowed([*zip(*texts.values(), strict=True)], [*widths.values()], width)
@@ -154,13 +158,13 @@ def _below(line: str, width: int) -> str:
 
 
 def _narrowed(texts: Sequence[Sequence[str]], widths: Sequence[int], width: int) -> list[int]:
-    """Take from the widest columns what is too much: names break before cells, and both only between words."""
+    """Take from the widest columns what is too much: names break before cells, and words at last."""
     found = list(widths)
     names, *cells = ([min(_WORD, max(map(len, text.split()), default=1)) for text in row] for row in texts)
     whole = [max(name, *(len(row[i]) for row in texts[1:])) for i, name in enumerate(names)]
     words = [max(column) for column in zip(names, *cells, strict=True)]
     excess = sum(widths) + 2 * (len(widths) - 1) - width
-    for least in (whole, words):
+    for least in (whole, words, [min(_LEAST, word) for word in words]):
         while excess > 0 and any(map(gt, found, least)):
             widest = max((i for i in range(len(found)) if found[i] > least[i]), key=lambda i: found[i])
             found[widest] -= 1
@@ -171,13 +175,19 @@ def _narrowed(texts: Sequence[Sequence[str]], widths: Sequence[int], width: int)
 def _broken(row: Sequence[str], widths: Sequence[int]) -> Iterator[list[str]]:
     """Give the lines of a row whose cells are no wider than their columns."""
     from itertools import zip_longest
-    from textwrap import wrap
 
-    cells = (
-        wrap(text, width, break_on_hyphens=False) if len(text) > width else [text]
-        for text, width in zip(row, widths, strict=True)
-    )
+    cells = (_lines(text, width) if len(text) > width else [text] for text, width in zip(row, widths, strict=True))
     yield from (list(line) for line in zip_longest(*cells, fillvalue=""))
+
+
+def _lines(text: str, width: int) -> list[str]:
+    """Break a text between words, or behind what joins names, folders and numbers of parts where one is too long."""
+    from textwrap import TextWrapper
+
+    wrapper = TextWrapper(width, break_on_hyphens=False)
+    if max(map(len, text.split())) > width:
+        wrapper.wordsep_simple_re = re.compile(r"(\s+)|(?<=[,/_])(?=\w)")
+    return wrapper.wrap(text)
 
 
 def as_markdown(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:

@@ -87,8 +87,19 @@ def test_the_times_are_read_off_the_switched_run() -> None:
     assert (at["tr"], at["td"]) == (found["tr"], 0.37)
     never = run("verify", "--part", "box", "--switched", BOX, BOX)
     assert never.exit_code == 2
-    assert "its energy stands still nowhere; give --tr and --td" in never.stderr
+    assert "its energy stands still nowhere, or that of the reference does so too; give --tr and --td" in never.stderr
     assert "give the time of the switch as --td" in run("verify", "--tr", "0.1", "--part", "box", BOX).stderr
+
+
+def test_of_a_fall_the_times_are_not_guessed_and_given_ones_verify(tmp_path: Path) -> None:
+    """Nothing vibrates before the ground: the energies of both runs are round-off until then."""
+    box = ("rollover", "--drop", "0.1", "--mesh", "4", "--t-end", "0.18")
+    names = [str(tmp_path / f"{name}.matsum") for name in ("reference", "switched")]
+    for name, switches in zip(names, ((), ("--tr", "0", "--td", "0.13")), strict=True):
+        assert run(*box, *switches, "-o", name).exit_code == 0
+    asked = ("verify", "--part", "box", names[0], "--switched", names[1])
+    assert "or that of the reference does so too" in run(*asked).stderr
+    assert answer(*asked, "--tr", "0", "--td", "0.13")["verified"] is True
 
 
 def test_the_table_sets_the_switched_run_beside_the_reference() -> None:

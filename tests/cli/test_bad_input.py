@@ -3,6 +3,7 @@
 import gzip
 import json
 import math
+import re
 import shlex
 from collections.abc import Callable
 from pathlib import Path
@@ -270,6 +271,14 @@ def test_a_td_behind_the_next_contact_is_an_objection(tmp_path: Path) -> None:
     assert "td-after-contact" in codes(found)
     assert answer("verify", "--tr", "0.0135867", "--td", "0.09", "--margin", "0.02", str(file))["td_ok"] is False
     assert answer("suggest", "--td", "0.0687534", "--margin", "0.005", str(file))["recommended"] is not None
+
+
+def test_of_a_time_behind_a_cut_the_cut_is_said_before_a_unit(tmp_path: Path) -> None:
+    file = tmp_path / "glstat"
+    file.write_bytes(Path(GLSTAT).read_bytes()[:100_000])
+    said = run("suggest", "--td", "64", str(file)).stderr
+    assert re.search(r"outside the record, 0 to [\d.]+, where the file is cut", said)
+    assert "meant" not in said or said.index("cut") < said.index("meant")
 
 
 @pytest.mark.parametrize("source", [ENERGY, GLSTAT])

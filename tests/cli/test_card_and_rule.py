@@ -256,6 +256,7 @@ def test_suggest_needs_the_parts_for_a_card() -> None:
     result = run("suggest", "--td", "0.064", "-f", "card", ENERGY)
     assert (result.exit_code, result.stdout) == (2, "")
     assert "-f card needs --part" in result.stderr
+    assert "where the history has no parts: d2rpick card --tr T --td T --part IDS --history FILE" in result.stderr
 
 
 # rule.

@@ -22,6 +22,21 @@ def test_a_narrow_table_keeps_every_word_below_its_name(rows: list[list[str]]) -
         assert shown == " ".join(column).split()
 
 
+@given(st.integers(40, 100), st.lists(st.text("ab1/,_", min_size=13, max_size=60), min_size=1, max_size=3))
+def test_words_that_are_too_long_are_broken_and_numbers_are_not(width: int, names: list[str]) -> None:
+    number = -1.23456e-05
+    shown = as_text([f"name {at}" for at in range(len(names))] + ["td"], [[*names, number]], width)
+    assert max(map(len, shown.split("\n"))) <= max(width, 12 * len(names) + 2 * len(names) + 12)
+    assert f"{number:.6g}" in shown
+    if len(names) == 1:
+        assert "".join(line.split()[0] for line in shown.split("\n")[1:]) == names[0]
+
+
+def test_a_long_word_breaks_behind_what_joins_its_parts() -> None:
+    lines = as_text(["shares"], [["1,7,11,13,15,16"]], 12).split("\n")
+    assert lines == ["shares", "1,7,11,13,", "15,16"]
+
+
 @given(st.integers(20, 60), st.lists(WORDS, min_size=1, max_size=4).map("  ".join))
 def test_wrapped_text_loses_no_word_and_no_line_is_longer_than_it_may_be(width: int, text: str) -> None:
     lines = wrapped(text, width).split("\n")
