@@ -216,9 +216,8 @@ class Cluster:
         try:
             from distributed import Client
         except ImportError:
-            raise D2RPickError(
-                "a Dask cluster needs the extra 'dask' of d2rpick; install it with: pip install distributed"
-            ) from None
+            found = "a Dask cluster needs the extra 'dask' of d2rpick"
+            raise D2RPickError(f"{found}; install it with: pip install distributed") from None
         try:
             self._client = Client(address, timeout=patience, set_as_default=False)
         except (OSError, ValueError) as error:

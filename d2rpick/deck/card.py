@@ -275,8 +275,7 @@ def _expressions(rows: Sequence[Row]) -> Iterator[tuple[Row, str, str]]:
         yield pending
 
 
-@dataclass(frozen=True)
-class Transform:
+class Transform(NamedTuple):
     """What ``*INCLUDE_TRANSFORM`` does to a file: offsets of its ids, factor of its times.
 
     ``scaled``: any unit of the file is another one; ``moved``: its nodes are moved.
@@ -293,16 +292,9 @@ class Transform:
 
     def inside(self, outer: Transform) -> Transform:
         """Return this transform of a file that is itself included by a transformed one."""
-        return Transform(
-            self.node + outer.node,
-            self.part + outer.part,
-            self.material + outer.material,
-            self.set_ + outer.set_,
-            self.rest + outer.rest,
-            self.time * outer.time,
-            self.scaled or outer.scaled,
-            self.moved or outer.moved,
-        )
+        node, part, material, set_, rest = (own + further for own, further in zip(self[:5], outer[:5], strict=True))
+        scaled, moved = self.scaled or outer.scaled, self.moved or outer.moved
+        return Transform(node, part, material, set_, rest, self.time * outer.time, scaled, moved)
 
 
 @dataclass(frozen=True, eq=False)

@@ -180,9 +180,8 @@ def _sets(first: tuple[int, int], count: int) -> Iterator[tuple[int, int]]:
 def _check_printed(texts: Sequence[str]) -> None:
     for one, other in pairwise(texts):
         if float(one) >= float(other):
-            raise DeckError(
-                f"two switching times are both {one} in {LONGEST} characters, different times were expected"
-            )
+            found = f"two switching times are both {one} in {LONGEST} characters"
+            raise DeckError(f"{found}, different times were expected")
 
 
 def _roundings(asked: Times, texts: tuple[str, str]) -> Iterator[str]:

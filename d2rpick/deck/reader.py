@@ -237,9 +237,8 @@ class _Reader:
     def read(self, source: SourceFile, context: _Context) -> None:
         self.deck.sources.append(source)
         if len(self.deck.sources) > _MOST_FILES:
-            raise DeckError(
-                f"{source.name}: more than {_MOST_FILES} includes were read; do the files include each other?"
-            )
+            what = f"{source.name}: more than {_MOST_FILES} includes were read"
+            raise DeckError(f"{what}; do the files include each other?")
         width = context.width
         for block in source.blocks():
             if block.end is None:

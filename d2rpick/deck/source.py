@@ -104,9 +104,8 @@ class OnDisk:
         return done
 
     def _changed(self) -> DeckError:
-        return DeckError(
-            f"{self._name}: the file was rewritten or replaced while it was read; read it again when it is complete"
-        )
+        found = f"{self._name}: the file was rewritten or replaced while it was read"
+        return DeckError(f"{found}; read it again when it is complete")
 
 
 def stored(name: str) -> Held | OnDisk:

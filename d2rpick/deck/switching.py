@@ -12,7 +12,7 @@ import re
 from collections import defaultdict
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 from d2rpick.deck.card import Card, Field, Row, Value
 from d2rpick.deck.reader import SWITCHING, Deck
@@ -34,6 +34,9 @@ _KINDS: Final[dict[str, Kind]] = {
     "RIGID_DEFORMABLE_R2D": "restart",
 }
 _HEADER_ROWS = 2
+_INT, _REAL = Card.integer, Card.real
+_FIRST_LINE = (_INT, _INT, _REAL, _REAL, _REAL, _INT, _INT, _INT)  # how the fields of a header are read
+_SECOND_LINE = (_INT, _INT, _REAL, _REAL, _INT, _INT, _REAL)
 _COUNTS_FIELD = 4  # of the second line: D2R
 _PTYPES: Final = {"PART", "PSET"}
 _INERTIA_ROWS: Final = ("the first line (PID)", "the second line (XC to TM)", "the third line (IXX to IZZ)")
@@ -51,22 +54,22 @@ class Switched:
 
 
 class Header(NamedTuple):
-    """The two first lines of *DEFORMABLE_TO_RIGID_AUTOMATIC; counts are D2R and R2D."""
+    """The two first lines of *DEFORMABLE_TO_RIGID_AUTOMATIC, field by field; counts are D2R and R2D."""
 
     swset: Value[int]
     code: Value[int]
     time1: Value[float]
+    time2: Value[float]
+    time3: Value[float]
     entno: Value[int]
     relsw: Value[int]
     paired: Value[int]
-    to_rigid: Value[int]
-    to_deformable: Value[int]
-    time2: Value[float]
-    time3: Value[float]
     nrbf: Value[int]
     ncsf: Value[int]
     rwf: Value[float]
     dtmax: Value[float]
+    to_rigid: Value[int]
+    to_deformable: Value[int]
     offset: Value[float]
 
 
@@ -199,33 +202,19 @@ def _lines(count: int) -> str:
 
 
 def _header(card: Card, first: Row, second: Row) -> Header:
-    code = card.integer(first, 1)
+    rows = ((first, _FIRST_LINE), (second, _SECOND_LINE))
+    values: list[Any] = [read(card, row, at) for row, kinds in rows for at, read in enumerate(kinds)]
+    found = Header(*values)
+    code, swset, time1 = found.code, found.swset, found.time1
     if not code.problem and not BY_TIME <= code.value <= BY_SENSOR:
         code = Value(code.value, code.field, f"CODE is {code.value}, {BY_TIME} to {BY_SENSOR} was expected")
-    swset = card.integer(first, 0)
     if not swset.problem and swset.value <= 0:
         swset = Value(swset.value, swset.field, f"SWSET is {swset.value}, a positive number was expected")
-    time1 = card.real(first, 2)
     if code.value == BY_TIME and not time1.problem and _runs_over(first):
         problem = f"TIME1 runs over its columns into TIME2 ({time1.field.text} and {first.field(3).text})"
         time1 = Value(time1.value, time1.field, problem)
-    return Header(
-        swset=_moved(swset, card.transform.rest),
-        code=code,
-        time1=time1,
-        entno=card.integer(first, 5),
-        relsw=_moved(card.integer(first, 6), card.transform.rest),
-        paired=card.integer(first, 7),
-        to_rigid=card.integer(second, 4),
-        to_deformable=card.integer(second, 5),
-        time2=card.real(first, 3),
-        time3=card.real(first, 4),
-        nrbf=card.integer(second, 0),
-        ncsf=card.integer(second, 1),
-        rwf=card.real(second, 2),
-        dtmax=card.real(second, 3),
-        offset=card.real(second, 6),
-    )
+    swset, relsw = (_moved(one, card.transform.rest) for one in (swset, found.relsw))
+    return found._replace(swset=swset, code=code, time1=time1, relsw=relsw)
 
 
 def _runs_over(row: Row) -> bool:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.errors import FormatError
+from d2rpick.base.errors import FormatError, if_written
 from d2rpick.histories.history import Balance, Momenta, Samples
 from d2rpick.histories.names import Part, is_internal_energy, normalised
 
@@ -74,12 +74,9 @@ def momentum_of(database: Legs) -> Momenta | None:
     known = {normalised(name) for name in (*database.channels, *database.quantities)}
     if not any(known & {*axes} for axes in _VELOCITIES):
         return None
-    try:
-        columns = _Columns(database, database.time.size)
-    except FormatError:
-        return None
-    values = columns.velocity()
-    if values is None:
+    columns = if_written(lambda: _Columns(database, database.time.size))
+    values = columns.velocity() if columns else None
+    if columns is None or values is None:
         return None
     values = values[:, np.newaxis]
     precision = database.precisions(columns.used)[1]
@@ -99,9 +96,8 @@ def _whole(databases: Sequence[Legs]) -> Legs | None:
 
 
 def _terms(whole: Legs, until: float) -> Balance | None:
-    try:
-        columns = _Columns(whole, int(np.searchsorted(whole.time, until, side="right")))
-    except FormatError:
+    columns = if_written(lambda: _Columns(whole, int(np.searchsorted(whole.time, until, side="right"))))
+    if columns is None:
         return None
     found = {name: columns.first(*names) for name, names in _NAMES.items()}
     rotation = found.pop("rotation")
@@ -165,11 +161,8 @@ class _Columns:
         return self._values(plain[0]) if plain else None
 
     def _values(self, name: str) -> Samples | None:
-        try:
-            values = self._database.channel(name)[: self.states]
-        except FormatError:
-            return None
-        if not np.isfinite(values).all():
+        values = if_written(lambda: self._database.channel(name)[: self.states])
+        if values is None or not np.isfinite(values).all():
             return None
         self.used.append(name)
         return values
@@ -213,12 +206,10 @@ def spring_energy(database: Legs) -> tuple[str, Samples] | None:
     name = next((name for name in database.channels if normalised(name) in _SPRINGS), None)
     if name is None:
         return None
-    try:
-        found, whole = database.channel(name), database.channel(total)
-    except FormatError:
+    energies = if_written(lambda: (database.channel(name), database.channel(total)))
+    if energies is None or not energies[0].size or not np.isfinite(energies[0]).all():
         return None
-    if not found.size or not np.isfinite(found).all():
-        return None
+    found, whole = energies
     least = max(_NONE * float(np.abs(whole).max()), _FLOOR)
     rest = whole - found
     told_apart = found.max() > least and rest.max() > least and rest.min() >= -least  # it is part of the whole

@@ -53,10 +53,8 @@ def check_legs(legs: Sequence[Database]) -> None:
     for one, other in combinations(legs, 2):
         here, there = _held(one), _held(other)
         if here and there and not here & there:
-            raise FormatError(
-                f"{one.source} and {other.source} have neither a column nor a part in common, legs of one run were "
-                "expected; give the files of one run"
-            )
+            found = f"{one.source} and {other.source} have neither a column nor a part in common"
+            raise FormatError(f"{found}, legs of one run were expected; give the files of one run")
         for times, columns in ((_own_times, _energies), (_part_times, _part_energies)):
             try:
                 shared = _shared(times(one), times(other))
@@ -64,10 +62,8 @@ def check_legs(legs: Sequence[Database]) -> None:
             except FormatError:  # said when it is read
                 continue
             if values and not _alike(*values):
-                raise FormatError(
-                    f"{one.source} and {other.source} have different energies at the same times, legs of one run were "
-                    "expected; give the files of one run"
-                )
+                found = f"{one.source} and {other.source} have different energies at the same times"
+                raise FormatError(f"{found}, legs of one run were expected; give the files of one run")
 
 
 def check_sum(whole: Legs, holder: Legs, energies: Samples) -> None:
@@ -91,10 +87,8 @@ def check_sum(whole: Legs, holder: Legs, energies: Samples) -> None:
         found = (
             f"at {holder.part_time[here][most]:.6g} the parts of {holder.source} have an energy of {parts[most]:.6g}"
         )
-        raise FormatError(
-            f"{found}, the whole model of {whole.source} has {model[most]:.6g}: files of one run were expected; "
-            "give those of one run"
-        )
+        what = f"{found}, the whole model of {whole.source} has {model[most]:.6g}: files of one run were expected"
+        raise FormatError(f"{what}; give those of one run")
 
 
 def doubts(databases: Sequence[Legs]) -> Iterator[str]:
@@ -104,17 +98,13 @@ def doubts(databases: Sequence[Legs]) -> Iterator[str]:
             continue
         times = [_times(database) for database in (one, other)]
         if abs(times[0][-1] - times[1][-1]) > _ENDS_APART * max(np.diff(t).max(initial=0.0) for t in times):
-            yield (
-                f"{one.source} ends at {times[0][-1]:.6g} and {other.source} at {times[1][-1]:.6g}; "
-                "are they from the same run, or is one cut?"
-            )
+            found = f"{one.source} ends at {times[0][-1]:.6g} and {other.source} at {times[1][-1]:.6g}"
+            yield f"{found}; are they from the same run, or is one cut?"
         coarse, fine = sorted(_common(*times), key=np.size)
         shared = coinciding(coarse, fine, _room((one, other), times))
         if shared < _FEWEST * coarse.size:
-            yield (
-                f"{one.source} and {other.source} have only {shared} of {coarse.size} states at the same times; "
-                "are they from the same run?"
-            )
+            found = f"{one.source} and {other.source} have only {shared} of {coarse.size} states at the same times"
+            yield f"{found}; are they from the same run?"
 
 
 def coinciding(times: Samples, others: Samples, room: float) -> int:

@@ -208,10 +208,8 @@ class OnDisk(Content):
                 done += more
 
     def _shortened(self) -> ChangedError:
-        return ChangedError(
-            f"{self._name}: the file was {self._size} bytes long and became shorter while it was read; "
-            "is a solver writing it anew? Read it again when it has"
-        )
+        found = f"{self._name}: the file was {self._size} bytes long and became shorter while it was read"
+        return ChangedError(f"{found}; is a solver writing it anew? Read it again when it has")
 
     def check(self) -> None:
         """Make sure that what was read so far is all of one state of the file; ChangedError where it is not."""
@@ -222,9 +220,8 @@ class OnDisk(Content):
             raise self._shortened()
         untouched = now.size > self._size or now.modified == self._state.modified  # it has grown, or got another name
         if not untouched or self._read_ends() != self._ends:
-            raise ChangedError(
-                f"{self._name}: the file was rewritten while it was read; read it again when it is complete"
-            )
+            found = f"{self._name}: the file was rewritten while it was read"
+            raise ChangedError(f"{found}; read it again when it is complete")
 
     def _read_ends(self) -> tuple[bytes, bytes]:
         """First and last bytes of what counts."""

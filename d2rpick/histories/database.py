@@ -275,10 +275,8 @@ class Legs:
         for leg, time in zip(self._legs, times, strict=True):
             back, steps = int(np.count_nonzero(time[1:] < time[:-1])), time.size - 1
             if back > 1 and back > _MOST_BACK * steps:
-                raise FormatError(
-                    f"{leg.source}: time steps back at {back} of {steps} states, increasing times were expected; "
-                    "check that this is the time (`time`) and the file is not damaged"
-                )
+                found = f"{leg.source}: time steps back at {back} of {steps} states, increasing times were expected"
+                raise FormatError(f"{found}; check that this is the time (`time`) and the file is not damaged")
         every = _together(times)
         keep, notes = newest_states(every)
         behind = np.cumsum([time.size for time in times])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -203,24 +203,14 @@ class Balance:
         return None if self.external_work is None or not np.ptp(self.external_work) else self.external_work
 
 
-class FlightEvidence(Protocol):
-    """What tells when the parts fly, beside their energy."""
+@dataclass(frozen=True, eq=False)
+class Given:
+    """What tells when the parts fly, beside their energy.
 
-    @property
-    def momenta(self) -> tuple[Momenta, ...]:
-        """Momenta of the parts, then of the whole model, as far as they are written."""
-
-    @property
-    def masses(self) -> Samples | None:
-        """Masses of the parts whose momenta are known, in their order, NaN where unknown; None where none are."""
-
-    @property
-    def balance(self) -> Balance | None:
-        """Energies of the whole model; None where none are written beside the internal energy."""
-
-
-class Given(NamedTuple):
-    """Evidence of the flight at hand."""
+    ``momenta`` of the parts, then of the whole model, as far as they are written.  ``balance``: energies of the whole
+    model; None where none are written beside the internal energy.  ``masses`` of the parts whose momenta are known, in
+    their order, NaN where unknown; None where none are.
+    """
 
     momenta: tuple[Momenta, ...] = ()
     balance: Balance | None = None
@@ -256,7 +246,7 @@ class History:
     time_unit: str = ""
     part_names: tuple[str, ...] = ()
     part_energies: Samples | None = None
-    evidence: FlightEvidence = NO_EVIDENCE
+    evidence: Given = NO_EVIDENCE
     surroundings: Surroundings = UNKNOWN
     complete: bool = True
     notes: tuple[str, ...] = ()
@@ -267,25 +257,21 @@ class History:
         time, energy = frozen(self.time), frozen(self.energy)
         where = ", ".join(self.source)
         if time.ndim != 1 or time.shape != energy.shape:
-            raise HistoryError(
-                f"{where}: time has shape {time.shape}, energy {energy.shape}; one of each per state expected"
-            )
+            found = f"{where}: time has shape {time.shape}, energy {energy.shape}"
+            raise HistoryError(f"{found}; one of each per state expected")
         for name, values in (("time", time), ("energy", energy)):
             bad = np.flatnonzero(~np.isfinite(values))
             if bad.size:
-                raise HistoryError(
-                    f"{where}: {name} of state {bad[0] + 1} is {values[bad[0]]}, a finite number was expected"
-                )
+                found = f"{where}: {name} of state {bad[0] + 1} is {values[bad[0]]}"
+                raise HistoryError(f"{found}, a finite number was expected")
         if np.any(time[1:] <= time[:-1]):
             state = int(np.argmax(np.diff(time) <= 0)) + 1
             raise HistoryError(f"{where}: time falls from {time[state - 1]:g} to {time[state]:g} at state {state + 1}")
         if self.part_energies is not None:
             terms = frozen(self.part_energies)
             if terms.shape != (time.size, len(self.part_names)):
-                raise HistoryError(
-                    f"{where}: the energies of {len(self.part_names)} parts have shape {terms.shape}, "
-                    f"({time.size}, {len(self.part_names)}) was expected"
-                )
+                found = f"{where}: the energies of {len(self.part_names)} parts have shape {terms.shape}, ({time.size}"
+                raise HistoryError(f"{found}, {len(self.part_names)}) was expected")
             object.__setattr__(self, "part_energies", terms)
         object.__setattr__(self, "time", time)
         object.__setattr__(self, "energy", energy)

@@ -159,10 +159,8 @@ def refuse_other_quantity(channel: str, where: str) -> None:
     """FormatError if the only column or curve of a file is called something else than an internal energy."""
     word = re.search(_OTHER, channel)
     if word:
-        raise FormatError(
-            f"{where}: the only values are {channel!r}, by its name not an internal energy ({word[0]}); "
-            "choose with `energy` what to take for it"
-        )
+        found = f"{where}: the only values are {channel!r}, by its name not an internal energy ({word[0]})"
+        raise FormatError(f"{found}; choose with `energy` what to take for it")
 
 
 def meant(wanted: str, known: Sequence[str]) -> list[int]:
@@ -322,10 +320,8 @@ def _piece(piece: str, known: Sequence[Part], where: str) -> Sequence[Part]:
     low, high = int(numbers[1]), int(numbers[2] or numbers[1])
     inside = [part for part in known if low <= part.id <= high]
     if titled and titled != inside:
-        raise FormatError(
-            f"{where}: {piece!r} is the title of part {titled[0].id}, as a number it means {menu(inside) or 'none'}; "
-            "choose by a number or title that is one part's only"
-        )
+        found = f"{where}: {piece!r} is the title of part {titled[0].id}, as a number it means {menu(inside) or 'none'}"
+        raise FormatError(f"{found}; choose by a number or title that is one part's only")
     if not inside:
         raise FormatError(f"{where}: no part {piece}; there are: {menu(known)}")
     return inside

@@ -140,10 +140,8 @@ def _is_deck(head: bytes) -> bool:
 def _format(source: Source) -> str:
     head = source.data[:_HEAD]
     if _is_deck(head):
-        raise FormatError(
-            f"{source.name}: this is a deck, an energy history was expected; name the glstat, matsum, binout or T01 of "
-            "its run"
-        )
+        found = f"{source.name}: this is a deck, an energy history was expected"
+        raise FormatError(f"{found}; name the glstat, matsum, binout or T01 of its run")
     for begins, what, way_out in _OTHERS:
         if re.match(begins, head, re.DOTALL):
             raise FormatError(f"{source.name}: this is {what}, an energy history was expected; {way_out}")
@@ -153,10 +151,8 @@ def _format(source: Source) -> str:
     if re.search(r"(^|[/\\])d3(plot|part|dump|thdt)[^/\\]*$", source.name):
         what = "this is a file of LS-DYNA's d3 family, which holds no energies that are read"
         raise FormatError(f"{source.name}: {what}; name the glstat, matsum or binout of the run")
-    raise FormatError(
-        f"{source.name}: binary data of no known format, one of {', '.join(READERS)} was expected; "
-        "export the energy history as text"
-    )
+    found = f"{source.name}: binary data of no known format, one of {', '.join(READERS)} was expected"
+    raise FormatError(f"{found}; export the energy history as text")
 
 
 Table = dict[str, "Samples"]

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.base.errors import FormatError, listing
+from d2rpick.base.errors import FormatError, if_written, listing
 from d2rpick.histories.companions import check_sum, doubts
-from d2rpick.histories.history import Balance, History, Momenta, Samples, Track
+from d2rpick.histories.history import Balance, Given, History, Momenta, Samples, Track
 from d2rpick.histories.names import QUANTITIES, Part, Selection, menu, quantity_note, select_parts
 from d2rpick.histories.surroundings import UNKNOWN, Surroundings
 
@@ -94,9 +94,8 @@ class Run:
         holder = self._with_parts()
         if holder is None:
             return None
-        try:
-            values = np.stack([holder.part_channel(axis, [part.id for part in holder.parts]) for axis in _AXES], axis=2)
-        except FormatError:
+        values = if_written(lambda: np.stack([self._of_holder(axis, holder.parts) for axis in _AXES], axis=2))
+        if values is None:
             return None  # it cannot say what flies together
         precision = holder.precisions(())[1]
         masses = self._least_masses(values, holder)
@@ -117,9 +116,8 @@ class Run:
         with suppress(FormatError):
             return _median_of_some(self._of_holder("mass", holder.parts))
         axis = int(np.abs(momenta).sum(axis=(0, 1)).argmax())
-        try:
-            velocity, momentum = self._of_holder(_VELOCITIES[axis], holder.parts), momenta[:, :, axis]
-        except FormatError:
+        velocity, momentum = if_written(lambda: self._of_holder(_VELOCITIES[axis], holder.parts)), momenta[:, :, axis]
+        if velocity is None:
             return None
         square, product = (velocity**2).sum(axis=0), (velocity * momentum).sum(axis=0)
         massless = ~momentum.any(axis=0) & ~velocity.any(axis=0)
@@ -130,14 +128,10 @@ class Run:
         from d2rpick.histories.balance import least_masses
 
         masses = self._masses(momenta, holder)
-        ids = [part.id for part in holder.parts]
         if masses is None or not np.isnan(masses).any():
             return masses
-        try:
-            least = least_masses(momenta, holder.part_channel("kinetic_energy", ids))
-        except FormatError:
-            return masses
-        return np.where(np.isnan(masses), least, masses)
+        kinetic = if_written(lambda: self.part_kinetic_energies(holder.parts))
+        return masses if kinetic is None else np.where(np.isnan(masses), least_masses(momenta, kinetic), masses)
 
     @cached_property
     def _whole_momentum(self) -> Momenta | None:
@@ -164,13 +158,9 @@ class Run:
         """Parts of springs and dampers, as far as their energies tell."""
         from d2rpick.histories.balance import springs_among
 
-        holder = self._with_parts()
-        if holder is None:
-            return ()
-        try:
-            return springs_among(self.databases, self.parts, self.part_energies(self.parts), holder.part_time)
-        except FormatError:  # not in every state
-            return ()
+        parts = self.parts
+        energies = if_written(lambda: self.part_energies(parts)) if parts else None  # not in every state
+        return () if energies is None else springs_among(self.databases, parts, energies, self.part_time)
 
     def part_energies(self, parts: Sequence[Part]) -> Samples:
         """Internal energies of some parts, shape (n, parts), at the times of their history [energy]."""
@@ -194,12 +184,8 @@ class Run:
 
     def centre(self, parts: Sequence[Part]) -> Track | None:
         """Give the mean of the centres of some parts [length]; None where they are not written."""
-        try:
-            places = [self._of_holder(axis, parts).mean(axis=1) for axis in _CENTRES]
-        except FormatError:
-            return None
-        holder = self._with_parts()
-        return Track(holder.part_time, np.stack(places, axis=1)) if holder else None
+        places = if_written(lambda: [self._of_holder(axis, parts).mean(axis=1) for axis in _CENTRES])
+        return None if places is None else Track(self.part_time, np.stack(places, axis=1))
 
     def _of_holder(self, quantity: str, parts: Sequence[Part]) -> Samples:
         return self._holder().part_channel(quantity, [part.id for part in parts])
@@ -266,9 +252,8 @@ class Run:
     def _of_all_parts(self) -> History:
         if not self.parts:
             there = listing([name for database in self.databases for name in database.channels])
-            raise FormatError(
-                f"{self.name}: no internal energy; choose with `energy`: {there or 'there are no channels'}"
-            )
+            found = f"{self.name}: no internal energy"
+            raise FormatError(f"{found}; choose with `energy`: {there or 'there are no channels'}")
         every = self._of_parts(self.parts)
         note = "the energies of all parts were added, those that stay deformable among them; choose with `parts`"
         return replace(every, channel="internal energy of all parts", parts=None, notes=(*every.notes, note))
@@ -317,8 +302,8 @@ class Run:
         )
 
 
-class _Written:
-    """Evidence that the files of a run hold for some parts, read when it is asked for."""
+class _Written(Given):
+    """What the files of a run hold for some parts, read when it is asked for."""
 
     def __init__(self, run: Run, chosen: Sequence[Part] | None, flying: Sequence[Part] | None) -> None:
         self._run, self._chosen, self._flying = run, chosen, flying

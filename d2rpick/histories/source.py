@@ -80,10 +80,8 @@ def open_files(names: Sequence[str]) -> list[Source]:
     for name, state in before.items():
         now = _state(name)
         if len(files) > 1 and not (now.continues(state) if now and state else now is state):
-            raise FormatError(
-                f"{name}: this file was replaced or written anew while the others of its run were opened; read them "
-                "again when they are complete"
-            )
+            found = f"{name}: this file was replaced or written anew while the others of its run were opened"
+            raise FormatError(f"{found}; read them again when they are complete")
     return sources
 
 
@@ -141,10 +139,8 @@ def _databases(folder: Path) -> list[str]:
         raise FormatError(f"{folder}: no glstat, matsum, binout or T01 in this folder; {cure}")
     runs = sorted({"one of LS-DYNA" if root is None else f"{root}T01" for root in found.values()})
     if len(runs) > 1:
-        raise FormatError(
-            f"{folder}: this folder holds several runs ({listing(runs, most=5)}), one was expected; "
-            "name the files of one"
-        )
+        what = f"{folder}: this folder holds several runs ({listing(runs, most=5)}), one was expected"
+        raise FormatError(f"{what}; name the files of one")
     return [str(file) for file in found]
 
 

@@ -93,14 +93,12 @@ def read_configuration(table: Mapping[str, object], source: str = "", others: Co
     refuse_unknown(single, (*RULE_KEYS, *others), source)
     severity = table.get("severity", {})
     if not isinstance(severity, Mapping):
-        raise ConfigurationError(
-            f"{source}: severity is {severity!r}, a table like {{D2R104 = 'warning'}} was expected"
-        )
+        found = f"{source}: severity is {severity!r}"
+        raise ConfigurationError(f"{found}, a table like {{D2R104 = 'warning'}} was expected")
     for rule, value in severity.items():
         if value not in _SEVERITIES:
-            raise ConfigurationError(
-                f"{source}: severity of {rule} is {value!r}, one of {', '.join(_SEVERITIES)} expected"
-            )
+            found = f"{source}: severity of {rule} is {value!r}"
+            raise ConfigurationError(f"{found}, one of {', '.join(_SEVERITIES)} expected")
     return Configuration(_names(table, "select", source), _names(table, "ignore", source), dict(severity), source)
 
 

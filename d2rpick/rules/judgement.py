@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import DeckError, FormatError, name_units
+from d2rpick.base.errors import DeckError, if_written, name_units
 from d2rpick.choice.answers import Verdict, find_better_pair, suggest_at
 from d2rpick.choice.deck_of_run import in_deck
 from d2rpick.choice.of_run import Reference, verify_of
@@ -120,9 +120,8 @@ class HistoryJudge:
         chosen = [part for part in self.run.parts if part.id in parts]
         if len(chosen) < len(parts):
             return None
-        try:
-            energies = self.run.part_energies(chosen)
-        except FormatError:  # it is not written
+        energies = if_written(lambda: self.run.part_energies(chosen))
+        if energies is None:
             return None
         return tuple(part.id for part, energy in zip(chosen, energies.T, strict=True) if energy.any())
 

@@ -314,15 +314,11 @@ def _loose(name: str, misfit: float, structure: float, local_structure: float) -
     if misfit > MAX_MISFIT:
         return f"{name} misses the energy by {misfit:.0%} of its standard deviation, more than {MAX_MISFIT:.0%}"
     if structure > fitting.MAX_STRUCTURE:
-        return (
-            f"{name} deviates systematically by {structure:.2g} of the standard deviation of the energy, "
-            f"more than {fitting.MAX_STRUCTURE}"
-        )
+        found = f"{name} deviates systematically by {structure:.2g} of the standard deviation of the energy"
+        return f"{found}, more than {fitting.MAX_STRUCTURE}"
     if local_structure > MAX_LOCAL_STRUCTURE:
-        return (
-            f"{name} deviates systematically by {local_structure:.2g} of the vibration energy "
-            f"at the time, more than {MAX_LOCAL_STRUCTURE}"
-        )
+        found = f"{name} deviates systematically by {local_structure:.2g} of the vibration energy at the time"
+        return f"{found}, more than {MAX_LOCAL_STRUCTURE}"
     return None
 
 
@@ -339,27 +335,21 @@ def _implausible(
     """Say why a scaled fit that follows the samples is still no evidence of one free vibration."""
     periods = mode.omega / (2 * np.pi)
     if periods < least_periods:
-        return (
-            f"the record shows {periods:.3g} vibration periods, fewer than the {least_periods} needed to tell a "
-            "vibration from a drift"
-        )
+        found = f"the record shows {periods:.3g} vibration periods"
+        return f"{found}, fewer than the {least_periods} needed to tell a vibration from a drift"
     if mode.apart < _APART:
         return "two of the modes have almost the same rate: the record is too short to separate them"
     if mode.alpha < -MAX_GROWTH:
-        return (
-            f"the vibration grows, alpha times the record's length is {mode.alpha:.2g}, below {-MAX_GROWTH}: "
-            "something drives it"
-        )
+        found = f"the vibration grows, alpha times the record's length is {mode.alpha:.2g}, below {-MAX_GROWTH}"
+        return f"{found}: something drives it"
     if mode.energy_plastic < MIN_PLASTIC:
         share = mode.energy_plastic
         return f"the plastic energy would be {share:.2g} of the energy's range, below {MIN_PLASTIC}"
     if density < least_density:
         # a tenth finer than the limit, so that rounding to two digits stays on its safe side
         finer = np.pi * span / mode.fastest / (1.1 * least_density)
-        return (
-            f"the energy has {density:.2f} samples per period, fewer than {least_density}, and "
-            f"this mode may be aliased: write the output at intervals of {finer:.2g} or less"
-        )
+        found = f"the energy has {density:.2f} samples per period, fewer than {least_density}"
+        return f"{found}, and this mode may be aliased: write the output at intervals of {finer:.2g} or less"
     return None
 
 

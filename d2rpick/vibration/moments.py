@@ -113,10 +113,8 @@ class ModalEnergy(SampledEnergy):
         vibration = float(self.mode.vibration_energy(self.td))
         if vibration > 0 and scatter <= _DROWNED * vibration:  # both may be too small for a number
             return None
-        return (
-            f"at td the vibration energy {vibration:.3g} is below the noise of the record, {scatter:.3g}: "
-            "the sign of the deformation is unknown"
-        )
+        found = f"at td the vibration energy {vibration:.3g} is below the noise of the record, {scatter:.3g}"
+        return f"{found}: the sign of the deformation is unknown"
 
     def energies(self, times: Samples) -> Samples:
         """E at many times, of their shape [energy]."""

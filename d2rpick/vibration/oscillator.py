@@ -239,10 +239,8 @@ def to_mode(oscillator: Oscillator, v0: float) -> Mode:
     """
     omega = oscillator.omega_2
     if not omega > 0:
-        raise RangeError(
-            f"alpha {oscillator.alpha:g} overdamps the oscillator, whose rate is {oscillator.omega_0:g}, "
-            f"less than {2 * oscillator.omega_0:g} was expected"
-        )
+        found = f"alpha {oscillator.alpha:g} overdamps the oscillator, whose rate is {oscillator.omega_0:g}"
+        raise RangeError(f"{found}, less than {2 * oscillator.omega_0:g} was expected")
     sine = -v0 / omega * sqrt(oscillator.stiffness / 2)
     if not abs(sine) <= sqrt(LARGEST_ENERGY):
         raise RangeError(f"v0 is {v0:g}: it gives energies above {LARGEST_ENERGY:g}; choose units of moderate numbers")

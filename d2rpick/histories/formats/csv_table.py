@@ -53,9 +53,8 @@ def time_column(source: str, layout: Layout, wanted: str | None, energies: Seque
             return named_column(source, layout, energies[0]) // 2 * 2, []
         return internal_energy(source, layout, times) // 2 * 2, []
     if len(times) > 1:
-        raise FormatError(
-            f"{source}: {len(times)} columns are named like a time; choose with `time`: {_menu(layout, times)}"
-        )
+        found = f"{source}: {len(times)} columns are named like a time"
+        raise FormatError(f"{found}; choose with `time`: {_menu(layout, times)}")
     if layout.names and not times:
         return 0, [f"no column has the name of a time; {layout.name(0)!r}, the first, was taken as the time"]
     return (times[0] if times else 0), []
@@ -73,9 +72,8 @@ def internal_energy(source: str, layout: Layout, times: Sequence[int]) -> int:
     if len(named) == 1:
         return named[0]
     found = f"{len(named)} columns are" if named else "no column is"
-    raise FormatError(
-        f"{source}: {found} named like an internal energy; choose with `energy`: {_menu(layout, named or beside)}"
-    )
+    what = f"{source}: {found} named like an internal energy"
+    raise FormatError(f"{what}; choose with `energy`: {_menu(layout, named or beside)}")
 
 
 def named_column(source: str, layout: Layout, wanted: str) -> int:
@@ -84,15 +82,11 @@ def named_column(source: str, layout: Layout, wanted: str) -> int:
     if wanted.isdecimal() and 0 < int(wanted) <= layout.columns:
         found = [*({*found} | {int(wanted) - 1})]
     if not found:
-        raise FormatError(
-            f"{source}: no column {wanted!r}{near_miss(wanted, layout.names)}; "
-            f"there are: {_menu(layout, range(layout.columns))}"
-        )
+        what = f"{source}: no column {wanted!r}{near_miss(wanted, layout.names)}"
+        raise FormatError(f"{what}; there are: {_menu(layout, range(layout.columns))}")
     if len(found) > 1:
-        raise FormatError(
-            f"{source}: {wanted!r} may be any of these columns: {_menu(layout, found)}; "
-            "choose by another name or number"
-        )
+        what = f"{source}: {wanted!r} may be any of these columns: {_menu(layout, found)}"
+        raise FormatError(f"{what}; choose by another name or number")
     if found[0] >= layout.trusted:
         raise FormatError(
             f"{source}: the header has {len(layout.names)} names for {layout.columns} values (th_to_csv writes "

@@ -99,9 +99,8 @@ class _CurveText:
         """End the last curve; FormatError unless it has the pairs that were announced."""
         found = len(self.curves[-1].times)
         if found != expected:
-            raise FormatError(
-                f"{self.source}:{number}: {found} pairs, {expected} were expected in {self.stops}; export it again"
-            )
+            what = f"{self.source}:{number}: {found} pairs, {expected} were expected in {self.stops}"
+            raise FormatError(f"{what}; export it again")
         self.stops = ""
 
 
@@ -137,9 +136,8 @@ class Curves(Database):
         fitting = range(1) if len(self.channels) == 1 else internal_energies(self.channels)
         if len(fitting) != 1:
             found = f"{len(fitting)} curves are" if fitting else "no curve is"
-            raise FormatError(
-                f"{self.source}: {found} named like an internal energy; choose with `energy`: {self._menu()}"
-            )
+            what = f"{self.source}: {found} named like an internal energy"
+            raise FormatError(f"{what}; choose with `energy`: {self._menu()}")
         if len(self.channels) == 1:
             refuse_other_quantity(self.channels[0], self.source)
         return self.channels[fitting[0]]
@@ -178,10 +176,8 @@ class Curves(Database):
         numbers = np.array([as_number(cell, ".") for cell in cells], dtype=np.float64)  # None becomes nan
         bad = np.flatnonzero(~np.isfinite(numbers))
         if bad.size:
-            raise FormatError(
-                f"{self.source}:{curve.lines[bad[0]]}: {cells[bad[0]][:60]!r} of {name!r}, a number was expected; "
-                "repair or delete the line"
-            )
+            found = f"{self.source}:{curve.lines[bad[0]]}: {cells[bad[0]][:60]!r} of {name!r}, a number was expected"
+            raise FormatError(f"{found}; repair or delete the line")
         return numbers
 
     def _menu(self) -> str:

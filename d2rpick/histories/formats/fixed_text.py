@@ -169,10 +169,8 @@ class Blocks:
                 bad = int(np.argmax(np.isnan(found)))
                 address, name = int(where[bad]), names[(at + bad) % len(names)]
                 text = self.text(address, grammar.width).decode("latin-1").strip()
-                raise FormatError(
-                    f"{self.source}:{self.line(address)}: {_spoken(name)} is {text!r}, a number in its "
-                    "columns was expected; cut the file before this state"
-                )
+                what = f"{self.source}:{self.line(address)}: {_spoken(name)} is {text!r}"
+                raise FormatError(f"{what}, a number in its columns was expected; cut the file before this state")
         self._data.check()
 
     def _moving(self, names: Sequence[Hashable]) -> NDArray[np.bool_]:

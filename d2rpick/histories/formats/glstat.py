@@ -78,10 +78,8 @@ class Glstat(Database):
             names += [self.find(name) for name in needed or self.channels]
             self._blocks.admit_rest(names)
         if not self.version and not self._blocks.states:
-            raise FormatError(
-                f"{source}:1: neither a line with 'ls-dyna' nor a whole state was found, this is not a glstat; "
-                "choose another input format"
-            )
+            told = f"{source}:1: neither a line with 'ls-dyna' nor a whole state was found, this is not a glstat"
+            raise FormatError(f"{told}; choose another input format")
         self.complete, self.notes = self._blocks.complete, self._blocks.notes
         if self.complete and _CONTROL in data[self._blocks.tail :]:
             self.complete = False

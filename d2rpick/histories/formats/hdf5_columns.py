@@ -77,20 +77,16 @@ def check_data(dataset: h5py.Dataset, source: str) -> None:
             expected *= -(-extent // length)
         inside = sum(all(at < extent for at, extent in zip(chunk, dataset.shape, strict=True)) for chunk in chunks)
         if inside < expected:
-            raise FormatError(
-                f"{source}: {dataset.name} has {inside} of {expected} chunks of its data; the file is damaged or was "
-                "not written to its end"
-            )
+            found = f"{source}: {dataset.name} has {inside} of {expected} chunks of its data"
+            raise FormatError(f"{found}; the file is damaged or was not written to its end")
 
 
 def _check_type(dataset: h5py.Dataset, source: str) -> None:
     """FormatError for numbers of a type that HDF5 does not define: a changed byte in it would change them all."""
     for kind in _numbers(dataset.id.get_type()):
         if not any(kind.equal(standard) for standard in _standard_types()):
-            raise FormatError(
-                f"{source}: {dataset.name} has numbers of {kind.get_size()} bytes that are no standard type of HDF5; "
-                "the file is damaged, copy it again, or write it with a standard type"
-            )
+            found = f"{source}: {dataset.name} has numbers of {kind.get_size()} bytes that are no standard type of HDF5"
+            raise FormatError(f"{found}; the file is damaged, copy it again, or write it with a standard type")
 
 
 def _numbers(kind: h5py.h5t.TypeID) -> Iterator[h5py.h5t.TypeID]:
@@ -126,9 +122,8 @@ def _check_size_of_file(file: BinaryIO, source: str) -> None:
         return  # the library says what is wrong with it
     (end,) = struct.unpack_from("<Q", head, place)
     if size not in (end, end + base):
-        raise FormatError(
-            f"{source}: the file has {size} bytes, {end} by its own header; it is damaged or cut, copy it again"
-        )
+        found = f"{source}: the file has {size} bytes, {end} by its own header"
+        raise FormatError(f"{found}; it is damaged or cut, copy it again")
 
 
 def _head_and_size(file: BinaryIO) -> tuple[bytes, int]:
@@ -234,10 +229,8 @@ def finite(values: Any, path: str, source: str) -> Samples:
     numbers = np.asarray(values, dtype=np.float64)
     bad = np.argwhere(~np.isfinite(numbers))
     if bad.size:
-        raise FormatError(
-            f"{source}: {path} is {numbers[tuple(bad[0])]} at state {bad[0][0] + 1}, not a finite number; "
-            "choose another dataset"
-        )
+        found = f"{source}: {path} is {numbers[tuple(bad[0])]} at state {bad[0][0] + 1}, not a finite number"
+        raise FormatError(f"{found}; choose another dataset")
     numbers.flags.writeable = False
     return numbers
 

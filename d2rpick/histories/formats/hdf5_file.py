@@ -174,10 +174,8 @@ class PartGroup:
         known = [part.id for part in self.parts]
         missing = [id_ for id_ in ids if known.count(id_) != 1]
         if missing:
-            raise FormatError(
-                f"{self._source}: {self.name} has not exactly one part {', '.join(map(str, missing))}; "
-                f"choose from {', '.join(map(str, known)) or 'none'}"
-            )
+            found = f"{self._source}: {self.name} has not exactly one part {', '.join(map(str, missing))}"
+            raise FormatError(f"{found}; choose from {', '.join(map(str, known)) or 'none'}")
         with _opened(self._file, self._source) as opened:
             group = opened[self.name]
             if quantity not in group:

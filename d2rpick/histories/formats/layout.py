@@ -122,10 +122,8 @@ def find_layout(text: Text) -> Layout:
     if bare is None:
         number, line = next(((n, line) for n, line in enumerate(every, 1) if not is_skipped(line)), (1, ""))
         below = "below" if text.is_short else f"in the first {HEAD} lines"
-        raise FormatError(
-            f"{text.name}:{number}: {_short(line)} and no rows of at least two numbers {below}; "
-            "expected a table of time and energy; check that this is the right file"
-        )
+        found = f"{text.name}:{number}: {_short(line)} and no rows of at least two numbers {below}"
+        raise FormatError(f"{found}; expected a table of time and energy; check that this is the right file")
     _refuse_odd_rows(text.name, lines, first, bare)
     _refuse_decimal_commas(text.name, lines, bare)
     return _with_header(text.name, lines[first : bare.start], bare)
@@ -174,10 +172,8 @@ def _refuse_odd_rows(source: str, lines: Sequence[str], first: int, table: Layou
     for number, line in enumerate(lines[first : table.start], first + 1):
         cells = [] if is_skipped(line) else split(line, table.separator)
         if cells and as_number(cells[0], table.decimal) is not None:
-            raise FormatError(
-                f"{source}:{number}: {_short(line)} differs from the rows below, "
-                f"{table.columns} values were expected; repair or delete the line"
-            )
+            found = f"{source}:{number}: {_short(line)} differs from the rows below"
+            raise FormatError(f"{found}, {table.columns} values were expected; repair or delete the line")
 
 
 def _refuse_decimal_commas(source: str, lines: Sequence[str], table: Layout) -> None:
@@ -187,10 +183,8 @@ def _refuse_decimal_commas(source: str, lines: Sequence[str], table: Layout) -> 
     for number, line in enumerate(lines[table.start : table.start + _LOOK_AT], table.start + 1):
         cells = split(line, ",")
         if any(map(_DECIMAL_PART.fullmatch, cells)) and not any("." in cell for cell in cells):
-            raise FormatError(
-                f"{source}:{number}: {_short(line)} looks like decimal commas between commas, "
-                "which cannot be told apart; write the file with semicolons or decimal points"
-            )
+            found = f"{source}:{number}: {_short(line)} looks like decimal commas between commas"
+            raise FormatError(f"{found}, which cannot be told apart; write the file with semicolons or decimal points")
 
 
 def _with_header(source: str, lines: Sequence[str], table: Layout) -> Layout:

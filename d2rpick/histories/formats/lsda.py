@@ -346,9 +346,8 @@ def _header(data: Content, source: str) -> tuple[int, str, struct.Struct, struct
     """Where the records begin, the byte order, how a record begins and how a type is written."""
     header = data[:8]
     if not recognises(header):
-        raise FormatError(
-            f"{source}: begins with {header.hex(' ')}, the header of a binout was expected; name another file"
-        )
+        found = f"{source}: begins with {header.hex(' ')}, the header of a binout was expected"
+        raise FormatError(f"{found}; name another file")
     begin, length, _, command, type_id, little = header[:6]
     order = "<" if little else ">"
     return (

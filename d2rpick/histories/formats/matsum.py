@@ -96,10 +96,8 @@ class Matsum(Database):
         )
         self._blocks = Blocks(data, source, begin, grammar, portions=portions)
         if not self.version and not self._blocks.states:
-            raise FormatError(
-                f"{source}:1: neither a line with 'ls-dyna' nor a whole state was found, this is not a matsum; "
-                "choose another input format"
-            )
+            told = f"{source}:1: neither a line with 'ls-dyna' nor a whole state was found, this is not a matsum"
+            raise FormatError(f"{told}; choose another input format")
         self.complete = self._blocks.complete
         self.part_time = self._blocks.numbers([_TIME])[:, 0]
         self._ahead: dict[tuple[str | int, ...], Samples] = {}  # read with what was asked for
@@ -120,10 +118,8 @@ class Matsum(Database):
         known = {part.id for part in self.parts}
         missing = [id_ for id_ in ids if id_ not in known]
         if missing:
-            raise FormatError(
-                f"{self.source}: no part {', '.join(map(str, missing))}; "
-                f"choose from {', '.join(str(part.id) for part in self.parts) or 'none'}"
-            )
+            found = f"{self.source}: no part {', '.join(map(str, missing))}"
+            raise FormatError(f"{found}; choose from {', '.join(str(part.id) for part in self.parts) or 'none'}")
         wanted: tuple[str | int, ...] = (quantity, *ids)
         if wanted not in self._ahead:
             together = _AXES if quantity in _AXES else (quantity,)  # who asks for one component asks for the others

@@ -299,7 +299,5 @@ class _HeadRecords:
         return record
 
     def _broken(self, expected: str) -> FormatError:
-        return FormatError(
-            f"{self._source}: {expected} was expected in the head of the time history near byte {self._records.at}; "
-            "the file is cut or damaged, copy it again"
-        )
+        found = f"{self._source}: {expected} was expected in the head of the time history near byte {self._records.at}"
+        return FormatError(f"{found}; the file is cut or damaged, copy it again")

@@ -173,9 +173,8 @@ class _Curve:
             state = [_value(where, layout, column, cells[column]) for column in used]
             if self.stops_before(state[0]):
                 found = "a curve continues after empty cells" if self._ended else "the time starts again after a gap"
-                raise FormatError(
-                    f"{where}: {found}, one curve was expected; repair it or put each curve into its own file"
-                )
+                what = f"{where}: {found}, one curve was expected"
+                raise FormatError(f"{what}; repair it or put each curve into its own file")
             self.gap, self.before = False, state[0]
             yield number, state
 
@@ -195,7 +194,6 @@ def _cells(where: str, row: str, layout: Layout) -> list[str]:
 def _value(where: str, layout: Layout, column: int, cell: str) -> float:
     value = as_number(cell, layout.decimal)
     if value is None or not np.isfinite(value):
-        raise FormatError(
-            f"{where}: {layout.name(column)!r} is {cell[:60]!r}, a number was expected; repair or delete the line"
-        )
+        found = f"{where}: {layout.name(column)!r} is {cell[:60]!r}, a number was expected"
+        raise FormatError(f"{found}; repair or delete the line")
     return value
