@@ -24,12 +24,7 @@ _ISH3N: Final = {
     30: Formulation("DKT18", QBAT, measured=False), 31: Formulation("DKT_S3", QEPH, measured=False),
 }  # fmt: skip
 # Solids were measured together: 24, 17 and 1 could not be told apart.
-_ISOLID: Final = {
-    **{number: f"SOLID{number}" for number in (1, 2, 12, 17, 18)},
-    5: "HEPH5",
-    14: "HA8",
-    24: "HEPH",
-}
+_ISOLID: Final = {5: "HEPH5", 14: "HA8", 24: "HEPH", **{one: f"SOLID{one}" for one in (1, 2, 12, 17, 18)}}
 _ISOLID_MEASURED: Final = {1, 17, 24}
 
 # LS-DYNA, ELFORM of *SECTION_SHELL: one point, one point with physical stabilisation or warping, four points.

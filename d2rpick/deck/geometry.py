@@ -26,14 +26,8 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory, Material, PartData, Places, Reals
 
 _PIECE: Final = 1 << 14
-_FACES: Final = (
-    (0, 3, 2, 1),
-    (4, 5, 6, 7),
-    (0, 1, 5, 4),
-    (1, 2, 6, 5),
-    (2, 3, 7, 6),
-    (3, 0, 4, 7),
-)  # seen from outside
+# Corners of a brick, seen from outside.
+_FACES: Final = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
 _SURFACES: Final = frozenset({"shell", "triangle"})
 _LINES: Final = frozenset({"beam", "truss"})
 _VOLUMES: Final = frozenset({"solid", "tetrahedron", "thick shell"})

@@ -46,14 +46,8 @@ _OPTIONS: Final = {
     *("SECTION", "ELFORM", "DOF", "PID", "WARPAGE", "ELBOW", "ID", "TITLE", "SHL4", "TO", "SHL8", "TET4TOTET10"),
     *("H8TOH20", "H8TOH27", "H8TOH64", "H20", "H27", "H64", "P21", "P40", "T15", "T20"),
 }
-_NO_ELEMENTS: Final = {
-    "MASS",
-    "INERTIA",
-    "BLANKING",
-    "LANCING",
-    "TRIM",
-    "PLOTEL",
-}  # they make no part heavier or dearer
+# They make no part heavier or dearer.
+_NO_ELEMENTS: Final = {"MASS", "INERTIA", "BLANKING", "LANCING", "TRIM", "PLOTEL"}
 _TEN: Final = 10  # nodes in the second line of a solid
 _SPRING: Final = re.compile(r"MAT_(SPRING|DAMPER|S\d\d)(_|\Z)")
 _DAMPERS: Final = ("MAT_DAMPER", "MAT_S02", "MAT_S05", "MAT_SPRING_GENERAL_NONLINEAR", "MAT_SPRING_MAXWELL")

@@ -67,12 +67,8 @@ def _rows(inventory: Inventory, parts: frozenset[int], *, springs: bool) -> Iter
     """Nodes that hang together, a row each."""
     wanted, own = np.array([*parts], np.int64), inventory.nodes_by_part
     for elements in inventory.elements:
-        spring = elements.kind == SPRING
-        yield (
-            elements.nodes[np.isin(elements.part, wanted) | spring]
-            if springs or not spring
-            else np.empty((0, 0), np.int64)
-        )
+        of_springs = np.full(len(elements.part), springs)
+        yield elements.nodes[of_springs if elements.kind == SPRING else np.isin(elements.part, wanted)]
     for _, nodes, named in inventory.joints:
         yield np.concatenate([nodes, *(own[part] for part in named & own.keys())])[np.newaxis]
 

@@ -334,13 +334,9 @@ def find_windows(sets: Iterable[SwitchSet], parts: Parts) -> Windows:
             found[-1] = replace(found[-1], td=td, closed=closed)
         windows += found
         orphans += [event for _, event in left]
-    return Windows(
-        tuple(windows),
-        tuple(orphans),
-        events,
-        frozenset(event.unit for event in events if event.by.time is None and event.line.to_rigid),
-        frozenset(event.unit for event in events if event.by.time is None and not event.line.to_rigid),
-    )
+    other = [event for event in events if event.by.time is None]
+    rigid, back = (frozenset(one.unit for one in other if one.line.to_rigid == way) for way in (True, False))
+    return Windows(tuple(windows), tuple(orphans), events, rigid, back)
 
 
 def _events(card: SwitchSet, parts: Parts) -> Iterable[Event]:

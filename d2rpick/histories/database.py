@@ -161,12 +161,8 @@ class Legs:
         self._energies: tuple[tuple[int, ...], Samples] | None = None  # of the parts that were asked for last
         self.source = ", ".join(leg.source for leg in self._files)
         first = self._legs[0]
-        self.format, self.version, self.title, self.time_unit = (
-            first.format,
-            first.version,
-            first.title,
-            first.time_unit,
-        )
+        self.format, self.version = first.format, first.version
+        self.title, self.time_unit = first.title, first.time_unit
         self.complete = all(leg.complete for leg in self._files) and not cut
 
     @property

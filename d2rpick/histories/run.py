@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
+from itertools import compress
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -226,17 +227,13 @@ class Run:
         idle = [part for part, energy in zip(chosen, energies.T, strict=True) if not energy.any()]
         notes = (f"without any internal energy: part {menu(idle)}; rigid, or without elements?",) if idle else ()
         every = [part.name for part in chosen]
-        names, apart = ([name for name, out in zip(every, left_out, strict=True) if out == of] for of in (False, True))
+        names, apart = list(compress(every, ~left_out)), list(compress(every, left_out))
         channel = "internal energy of " + ", ".join(names)
         if apart:
             notes = (*notes, _left_out(", ".join(apart)))
         energies = energies[:, ~left_out]
         history = self._history_of(holder, holder.part_time, energies.sum(axis=1), channel, (), notes, chosen)
-        return _with_terms(
-            replace(history, springs=tuple(part for part, out in zip(chosen, left_out, strict=True) if out)),
-            names,
-            energies,
-        )
+        return _with_terms(replace(history, springs=tuple(compress(chosen, left_out))), names, energies)
 
     def _without_springs(self, database: Legs, channel: str) -> History:
         """Take the energy of the whole model, less that of springs and dampers where it has other energy too."""

@@ -124,9 +124,8 @@ def find_crossings(time: Samples, energy: Samples, level: float) -> tuple[Sample
         return np.zeros(0), np.zeros(0, dtype=bool)
     turn = np.flatnonzero(side[off[:-1]] != side[off[1:]])
     before, after = off[turn], off[turn + 1]
-    share = np.where(
-        after == before + 1, (level - energy[before]) / (energy[before + 1] - energy[before]), 1.0
-    )  # with samples on the level in between, the first of them: a share of 1
+    # with samples on the level in between, the first of them: a share of 1
+    share = np.where(after == before + 1, (level - energy[before]) / (energy[before + 1] - energy[before]), 1.0)
     at = time[before] + share * (time[before + 1] - time[before])
     rising = side[after] > 0
     if off[0] > 0:

@@ -139,9 +139,8 @@ def identify(time: Samples, energy: Samples, *, quick: bool = False) -> Identifi
         return _out_of_reach(time)
     worst = HOPELESS if quick else np.inf
     fits = ((fitting.fit(poles, record.s, record.e, size, worst), size, periods) for size, periods in _MODELS)
-    return _first_to_follow(
-        ((_one(found, size, record), most) for found, size, most in fits if found is not None), record
-    )
+    attempts = ((_one(found, size, record), most) for found, size, most in fits if found is not None)
+    return _first_to_follow(attempts, record)
 
 
 def identify_several(time: Samples, energy: Samples, *, quick: bool = False) -> Identification:

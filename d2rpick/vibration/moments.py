@@ -81,9 +81,8 @@ class SampledEnergy:
     def _sampled_before(self) -> tuple[Samples, Samples]:
         """Times and energies of the samples before td, and td itself with its level at the end."""
         before = self.history.time < self.td
-        return np.append(self.history.time[before], self.td), np.append(
-            self.history.energy[before], self.energy(self.td)
-        )
+        time, energy = self.history.time[before], self.history.energy[before]
+        return np.append(time, self.td), np.append(energy, self.energy(self.td))
 
     def edges(self) -> Samples:
         """Times before td between which the energy of modes runs monotone; none but the samples, of these [time]."""

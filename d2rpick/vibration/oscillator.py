@@ -113,12 +113,8 @@ class Oscillator:
         centre, velocity = self._centre(start)
         centre, velocity = centre + velocity * _drift(self.alpha, t), velocity * np.exp(-self.alpha * t)
         frame, suspended = self._share(self.mass), self._share(self.frame_mass)
-        return State(
-            centre - frame * deformation,
-            centre + suspended * deformation,
-            velocity - frame * rate,
-            velocity + suspended * rate,
-        )
+        z, y = centre - frame * deformation, centre + suspended * deformation
+        return State(z, y, velocity - frame * rate, velocity + suspended * rate)
 
     def free_on_grid(self, start: State, step: float, count: int) -> State:
         """States at ``step * arange(count)`` of free motion from ``start``: what ``free`` gives, several times as fast.

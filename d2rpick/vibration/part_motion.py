@@ -79,9 +79,8 @@ def followed(time: Samples, tracked: Samples, zeros: Zeros) -> PartMotion | None
         modelled = waves.deformation(time)
         miss = (np.abs(modelled) - root) ** 2
         missed = _means(miss, width) > _OFF * waves.vibration_energy(time)
-        off = (
-            _means(missed.astype(np.float64), width) * width > 0.5
-        )  # and beside it, where the mean still holds much that is right
+        # and beside it, where the mean still holds much that is right
+        off = _means(missed.astype(np.float64), width) * width > 0.5
         fitted, stretch = stretch, _longest(~off)
         if stretch == fitted:
             break

@@ -89,9 +89,8 @@ class SignedParts:
     def hidden_energy(self, t: Samples | float) -> Samples:
         """Vibration energy that further modes, and the parts that were left out, may have [energy]."""
         beside = self.unsigned_share / (1 - self.unsigned_share)
-        return np.asarray(
-            np.sum([(one.hidden + beside) * one.model.vibration_energy(t) for one in self.motions], axis=0)
-        )
+        hidden = [(one.hidden + beside) * one.model.vibration_energy(t) for one in self.motions]
+        return np.asarray(np.sum(hidden, axis=0))
 
     def sunk(self, t: float) -> bool:
         """Whether the energy of the vibration is below a solver's errors at ``t``."""

@@ -64,9 +64,8 @@ def sampled_reach(history: History, times: Samples, td: float, level: float) -> 
     # Newton's error of linear interpolation: E''/2 times the distances to both neighbours; zero on a sample.
     off_td = float(curvature(time, energy, td)) * (td - time[at_td]) * (time[at_td + 1] - td) / 2
     curved = _BEND_RESERVE * (bend * interval**2 / 8 + off_td)
-    most, square = (
-        a + b for a, b in zip(_rounding(history, times), _rounding(history, np.atleast_1d(td)), strict=True)
-    )
+    of_tr, of_td = _rounding(history, times), _rounding(history, np.atleast_1d(td))
+    most, square = (a + b for a, b in zip(of_tr, of_td, strict=True))
     rounded = np.minimum(most, _ROUNDING_DEVIATIONS * np.sqrt(square))
     slope = np.abs((energy[cell + 1] - energy[cell]) / interval)
     error = np.hypot(curved, rounded) + abs(level - history.energy_at(td))

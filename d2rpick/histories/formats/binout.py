@@ -293,10 +293,8 @@ class Branch:
     @cached_property
     def _id_lists(self) -> list[tuple[int, int, Indices]]:
         """Each list of part ids in the metadata: number of the file, byte, ids."""
-        lists = [
-            (self._files.index(file), at, _integers(file, at, layout, "ids")) for file, at, layout in self._metadata
-        ]
-        return [entry for entry in lists if entry[2].size]
+        lists = ((file, at, _integers(file, at, layout, "ids")) for file, at, layout in self._metadata)
+        return [(self._files.index(file), at, ids) for file, at, ids in lists if ids.size]
 
     def _ids(self, group: Group) -> Indices:
         """Part ids of a group's states, shape (states, parts); (1, parts) if they are the same for all."""

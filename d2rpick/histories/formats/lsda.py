@@ -350,12 +350,8 @@ def _header(data: Content, source: str) -> tuple[int, str, struct.Struct, struct
         raise FormatError(f"{found}; name another file")
     begin, length, _, command, type_id, little = header[:6]
     order = "<" if little else ">"
-    return (
-        begin,
-        order,
-        struct.Struct(order + _FIELDS[length] + _FIELDS[command]),
-        struct.Struct(order + _FIELDS[type_id]),
-    )
+    head = struct.Struct(order + _FIELDS[length] + _FIELDS[command])
+    return begin, order, head, struct.Struct(order + _FIELDS[type_id])
 
 
 def recognises(head: bytes) -> bool:

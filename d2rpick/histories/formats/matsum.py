@@ -86,14 +86,8 @@ class Matsum(Database):
         self.title, self.version, begin = head(data)
         self.source = source
         self._legend = _legend(data)
-        grammar = Grammar(
-            _START,
-            partial(_describe, self._legend),
-            partial(_is_whole, self._legend),
-            width=13,
-            decimals=4,
-            compare_all=False,
-        )
+        describe, whole = partial(_describe, self._legend), partial(_is_whole, self._legend)
+        grammar = Grammar(_START, describe, whole, width=13, decimals=4, compare_all=False)
         self._blocks = Blocks(data, source, begin, grammar, portions=portions)
         if not self.version and not self._blocks.states:
             told = f"{source}:1: neither a line with 'ls-dyna' nor a whole state was found, this is not a matsum"

@@ -83,15 +83,10 @@ def _by_pandas(piece: bytes, layout: Layout, columns: Sequence[int] | None) -> S
 
     import pandas as pd
 
-    options: dict[str, Any] = {
-        "low_memory": False,
-        "quoting": QUOTE_NONE,
-        "skip_blank_lines": False,
-        "na_filter": False,
-    }
+    options: dict[str, Any] = {"header": None, "usecols": columns, "dtype": np.float64, "quoting": QUOTE_NONE}
+    options |= {"low_memory": False, "skip_blank_lines": False, "na_filter": False}
     if [*map(int, pd.__version__.split(".")[:2])] < [3, 1]:  # from there on always exact, as `float` is
         options["float_precision"] = "round_trip"
-    options |= {"header": None, "usecols": columns, "dtype": np.float64}
     table: Samples = pd.read_csv(BytesIO(piece), sep=layout.separator or r"\s+", **options).to_numpy()
     return table
 
