@@ -16,8 +16,11 @@ import numpy as np
 
 from d2rpick.api.drives import Asked, Driving
 from d2rpick.base.errors import RangeError
+from d2rpick.choice.situation import Settings
+from d2rpick.choice.windows import bounds, flights_of
 from d2rpick.histories.formats.radioss_th import TimeHistory
 from d2rpick.histories.listings import read_timing
+from d2rpick.histories.opening import Selection, open_run
 from validation.compare import compare, read
 from validation.models import MODELS
 from validation.run import run
@@ -34,8 +37,9 @@ if TYPE_CHECKING:
 class Goal(NamedTuple):
     """At most: shift of a landing [s], place [m] and angle [degrees] of the body at td, share of the processor time.
 
-    ``energy`` is the least mean energy from td to the landing, of the reference [-]; ``windows``: so many flights.
-    ``nodes``: so many of the nodes that are watched, the first ones, are those of the body.
+    ``energy`` is the least mean energy from td to the landing, of the reference [-].  These hold for the first
+    ``flights`` of the reference: a box that bounces is another run after some, whatever is switched.  ``nodes``: so
+    many of the nodes that are watched, the first ones, are those of the body.
     """
 
     landing: float
@@ -43,14 +47,13 @@ class Goal(NamedTuple):
     angle: float
     energy: float
     cost: float
-    windows: int
+    flights: int
     nodes: int
 
 
-GOALS: Final = {
-    "CAR": Goal(1.5e-3, 8e-3, 0.5, 0.85, 0.80, 1, 12),
-    "DROP2": Goal(2e-3, 8e-3, np.inf, 0.70, 0.60, 3, 8),
-}
+_CAR: Final = Goal(1.5e-3, 8e-3, 0.5, 0.85, 0.80, 1, 12)
+_BOX: Final = Goal(2e-3, 8e-3, np.inf, 0.70, 0.60, 3, 8)
+GOALS: Final = {name: _CAR if name.startswith("CAR") else _BOX for name in MODELS if name.startswith(("CAR", "DROP"))}
 TOO_SHORT: Final = 2e-3  # a wait that is to be refused, where the deck tells the period of its springs [s]
 _AFTER: Final = 2e-4  # behind td the body is looked at [s]
 
@@ -104,10 +107,20 @@ def held(name: str, folder: Path, solver: Path) -> Iterator[tuple[str, float, fl
     """Give what is measured, its value, its limit, and whether it is within that."""
     goal, found, names = GOALS[name], driven(name, folder), reference(name, folder, solver)
     ours = [str(path) for path in sorted((folder / "driven").glob(f"{name}T[0-9][0-9]"))]
-    switched = [one for one in found.windows if not one.reason][: goal.windows]
-    yield "windows", len(switched), goal.windows, len(switched) == goal.windows
-    for window in switched:
-        yield from _window(window, goal, (names, ours), folder / "deck" / f"{name}_0000.rad")
+    switched = [one for one in found.windows if not one.reason]
+    yield "windows", len(switched), np.inf, bool(switched)
+    history = open_run(names).history(Selection())
+    for start, end in [bounds(history, one) for one in flights_of(history, Settings())][: goal.flights]:
+        lands = min(read(names).contacts(), key=lambda time: abs(time - end))
+        shift = min((abs(time - lands) for time in read(ours).contacts()), default=np.inf)
+        yield (
+            f"flight to {1e3 * lands:.1f} ms: landing moved [ms]",
+            1e3 * shift,
+            1e3 * goal.landing,
+            shift <= goal.landing,
+        )
+        for window in (one for one in switched if start < one.td < end):
+            yield from _window(window, goal, (names, ours), folder / "deck" / f"{name}_0000.rad")
     took = read_timing(str(folder / "reference" / f"{name}_0001.out")).total
     cost = 1 - (np.nan if found.saved[1] is None else found.saved[1])
     yield "processor time, by that of its own legs", cost, goal.cost, cost <= goal.cost
@@ -119,11 +132,9 @@ def _window(
     window: Window, goal: Goal, runs: tuple[Sequence[str], Sequence[str]], deck: Path
 ) -> Iterator[tuple[str, float, float, bool]]:
     at, (theirs, ours) = f"td = {1e3 * window.td:.1f} ms: ", (read(names) for names in runs)
-    lands = min(time for time in theirs.contacts() if time > window.free + window.wait)
-    yield f"{at}before the landing [ms]", 1e3 * (lands - window.td), 0.0, lands > window.td
     found = compare(theirs, ours, window.td)
-    shift = abs(found.shifts[0])
-    yield f"{at}landing moved [ms]", 1e3 * shift, 1e3 * goal.landing, shift <= goal.landing
+    early = found.landing - window.td
+    yield f"{at}before the landing [ms]", 1e3 * early, 0.0, early > 0
     if found.mean_ratio is not None:
         yield f"{at}mean energy to the landing", found.mean_ratio, goal.energy, found.mean_ratio >= goal.energy
     there, here = (places(names, deck, goal.nodes, window.td + _AFTER) for names in runs)

@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 JOURNAL: Final = "drive.ndjson"
 # Largest step while rigid over the mean one before: a rigid leg costs a few percent of a deformable one then, and the
 # state of a run is written often enough to show a contact.
-_STEP_RATIO: Final = 5.0
+_STEP_RATIO: Final = 10.0
 # Restarts that a search keeps: it goes back by an eighth of the wait at most.
 _IN_SEARCH: Final = 9
 # Looks at a leg: so many seconds apart, so many times as long as a look takes, and by this share of the leg.
-_SHORTEST, _LOOKS, _SHARE = 0.2, 2.0, 0.005
+_SHORTEST, _LOOKS, _SHARE = 0.1, 2.0, 0.005
 
 
 class Cost(NamedTuple):

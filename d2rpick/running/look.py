@@ -62,14 +62,12 @@ class Looks:
         if not history.time.size or history.time[-1] < order.start:
             return None
         now = float(history.time[-1])
-        if order.rigid:
-            return Seen(now, contact=contact_after(history, order.start))
+        if order.kind != LOAD:
+            contact = contact_after(history, order.start)
+            return Seen(now, peak=None if order.rigid else highest_energy(history, order.start, now), contact=contact)
         motion = InnerMotion(history, None, self._floor(known))
         quiet = quiet_times(history, _Half(self._wait, motion))
         free = quiet[-1].start if quiet and quiet[-1].end is None else None
-        if order.kind != LOAD:
-            lasting = free is not None and free <= order.start
-            return Seen(now, free, peak=highest_energy(history, order.start, now), contact=None if lasting else now)
         asked = None if free is None else motion.wait(free, now)
         at_rest = asked is not None and asked.source == "at-rest"
         wait = asked if self._wait is None else Wait(self._wait, "given", "as given")

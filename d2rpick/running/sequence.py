@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 LOAD, SEARCH, APPROACH, PROBE, RIGID = "load", "search", "approach", "probe", "rigid"
 RIGID_KINDS: Final = (PROBE, RIGID)
-# Without a margin that is given: this share of the flight held in eight windows of two structures.
+# Without a margin that is given: this share of the flight held in eight windows of two structures.  Where nothing
+# vibrates the rigid body flies as the deformable one would, and the least margin is enough.
 _MARGIN_SHARE: Final = 0.03
 # A search ends when nothing higher came for this share of it: the rest would be computed twice.
 _PASSED: Final = 0.25
@@ -42,9 +43,11 @@ class Limits(NamedTuple):
     shortest: float
     margin: float | None = None
 
-    def margin_of(self, flight: float) -> float:
-        """Margin before the contact at the end of a flight of this length [time]."""
-        return max(self.shortest, _MARGIN_SHARE * flight) if self.margin is None else self.margin
+    def margin_of(self, flight: float, *, idle: bool = False) -> float:
+        """Margin before the contact at the end of a flight of this length [time]; ``idle``: nothing vibrates in it."""
+        if self.margin is not None:
+            return self.margin
+        return self.shortest if idle and self.shortest else max(self.shortest, _MARGIN_SHARE * flight)
 
     @property
     def same(self) -> float:
@@ -228,7 +231,7 @@ def window_of(legs: Sequence[Leg], limits: Limits) -> Window:
     wait = _wait(flown, limits)
     if seen.contact is None:
         return Window(free, order.start, seen.time, None, wait)
-    td = seen.contact - limits.margin_of(seen.contact - free)
+    td = seen.contact - limits.margin_of(seen.contact - free, idle=flown.idle)
     short = td - order.start < 2 * wait
     reason = f"shorter than two waits, {2 * wait:.4g}" if short else None
     return Window(free, order.start, td, seen.contact, wait, reason)

@@ -98,7 +98,7 @@ class _Motion(NamedTuple):
 
 
 class _Known(NamedTuple):
-    """What is known ``since`` a time: ``half`` a period of something [time], and its mean force."""
+    """What is known ``since`` a time: ``half`` a period of something [time], 0 where it tells none, and mean force."""
 
     since: float
     half: float
@@ -109,7 +109,8 @@ class _Known(NamedTuple):
 class InnerMotion:
     """The wait that a record asks for at each of its states, by what it has shown of its inner motion up to there.
 
-    ``given`` is asked for by the user [time]; ``of_deck`` is what the deck tells, of which a record may show more.
+    ``given`` is asked for by the user [time]; ``of_deck`` is what the deck tells, or the record of flights before, of
+    which the one at hand may show more.
     """
 
     def __init__(self, history: History, given: float | None = None, of_deck: Wait | None = None) -> None:
@@ -165,7 +166,8 @@ class InnerMotion:
     def _known(self) -> tuple[_Known, ...]:
         """Half periods in the order in which they become known, without those of a body that turns."""
         free = [*times_without_force(self._history)]
-        found = sorted(one for motion in self._motions for one in _own(motion, free))
+        before = self._of_deck is not None and self._of_deck.source == "record"
+        found = sorted(one for motion in self._motions for one in _own(motion, free, has_own=before))
         strongest = np.maximum.accumulate([one.strength for one in found])
         return tuple(one for one, most in zip(found, strongest, strict=True) if one.strength >= _SLOW * most)
 
@@ -192,18 +194,17 @@ def check_wait(given: float, known: Wait | None, name: str) -> None:
         )
 
 
-def _own(motion: _Motion, free: Sequence[tuple[float, float]]) -> Iterator[_Known]:
-    """Give the half periods of a motion: where it has shown one without a force, in ``free`` times, those alone.
+def _own(motion: _Motion, free: Sequence[tuple[float, float]], *, has_own: bool) -> Iterator[_Known]:
+    """Give the half periods of a motion: where it ``has_own``, without a force, in ``free`` times, of others 0.
 
     A push within a swing makes it longer or shorter.
     """
-    has_own = False
     for one in motion.swings:
         begin, end, known = (float(motion.time[state]) for state in (one.begin, one.end, one.known))
         own = any(start <= begin and end <= stop for start, stop in free)
-        has_own |= own and one.strength > 0
-        if one.strength > 0 and (own or not has_own):
-            yield _Known(known, one.half, one.strength, motion.name)
+        if one.strength > 0:
+            has_own |= own
+            yield _Known(known, one.half if own or not has_own else 0.0, one.strength, motion.name)
 
 
 def _of_parts(history: History) -> Iterator[_Motion]:
