@@ -62,6 +62,9 @@ def _flight(history: History, motion: InnerMotion, one: Quiet) -> Iterator[Event
     wait = motion.wait(one.start, one.seen)
     why = f"the wait is {one.wait:.4g}: {wait.reason}" if wait else ""
     told = f"{what} is constant within {one.left:.1e} of its largest value for {one.seen - one.start:.4g}; {why}"
+    told += (
+        "; nothing tells when it lands" if one.level is None else f"; on level ground it lands about {one.level:.4g}"
+    )
     yield Event("flight", one.start, one.seen, told, one.wait, one.left)
     if wait and wait.source == "at-rest":
         told = "switch now: nothing vibrates, so that any tr is right, and the earlier it is the more it saves"

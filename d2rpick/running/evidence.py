@@ -41,7 +41,8 @@ class Quiet(NamedTuple):
 
     ``end`` is None where the record ends before.  ``source`` is "momentum" or "contact-energy"; ``left`` what changes
     from ``start`` to ``seen``, as a share of the largest value so far; ``gravity`` as of `FreeFlight`; ``parts`` are
-    those that fly together, None for the whole model.
+    those that fly together, None for the whole model; ``level``: when the centre of mass is as high again as at
+    ``start`` [time], None where that was over when the flight was seen.
     """
 
     start: float
@@ -52,6 +53,7 @@ class Quiet(NamedTuple):
     left: float
     gravity: float = 0.0
     parts: tuple[Part, ...] | None = None
+    level: float | None = None
 
 
 class _Witness:
@@ -96,6 +98,15 @@ class _Witness:
         if so_far.change(self.members) <= so_far.noise(self.members):
             return 0.0
         return laws_of(so_far, self.members, balance).gravity(first, last)
+
+    def level(self, first: int, last: int) -> float | None:
+        """When the centre of mass is as high again as at the first of two states [time]; None where it was before."""
+        if self.momenta is None:
+            return None
+        begin, end = self.momenta.of(self.members)[[first, last]]
+        pulled, lasted = end - begin, float(self.time[last] - self.time[first])
+        risen = -2 * lasted * float(begin @ pulled) / float(pulled @ pulled)
+        return float(self.time[first]) + risen if risen > lasted else None
 
 
 def quiet_times(history: History, waiting: Waiting) -> tuple[Quiet, ...]:
@@ -173,7 +184,8 @@ def _seen(history: History, witness: _Witness, waiting: Waiting, first: int, las
             momenta, end = witness.momenta, float(time[last + 1]) if last < time.size - 1 else None
             parts = momenta.parts and tuple(momenta.parts[i] for i in witness.members) if momenta else None
             source, left = "momentum" if momenta else "contact-energy", CONSTANT * witness.left(first, state)
-            return Quiet(start, now, end, wait, source, left, gravity, parts)
+            level = witness.level(first, state) if gravity else None
+            return Quiet(start, now, end, wait, source, left, gravity, parts, level)
         state += 1 + int(_AGAIN * (state - first))
     return None
 

@@ -42,7 +42,7 @@ _OF_ALL: Final = (
 )
 _OF_RADIOSS: Final = (
     "Each deformable leg ends when no contact has had a force for the wait.",
-    "Each rigid leg ends with the first force: it is rigid in the first step of that contact.",
+    "No window keeps a margin: each rigid leg ends in the first step of a contact, {cap:g} at most into it.",
     "A contact of the parts with themselves counts: while it pushes, they do not fly.",
     "Legs behind the end of the run take one step.",
 )
@@ -149,7 +149,8 @@ def _radioss(path: str, inventory: Inventory, parts: Sequence[int], wait: Wait, 
         lines += switch if rigid else off((*bodies.nodes, *others))
         files[f"{leg.name}_{number:04d}.rad"] = "\n".join(lines) + "\n"
     how = f"at rest in free fall: rigid from 0; then {_waited(wait)}" if at_rest else _waited(wait)
-    notes = (how, *bodies.notes, *_OF_ALL, *_OF_RADIOSS, *((_OF_WALLS,) if run.starter.walls else ()))
+    told = (note.format(cap=cap) for note in _OF_RADIOSS)
+    notes = (how, *bodies.notes, *_OF_ALL, *told, *((_OF_WALLS,) if run.starter.walls else ()))
     head = "".join(f"# {line}\n" for line in comments([*notes, *PHYSICS]))
     return First(PrintedCard(head, (), files, starter=bodies.cards + sensors), wait, notes)
 

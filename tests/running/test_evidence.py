@@ -113,3 +113,12 @@ def test_flights_begin_and_end_where_info_and_plan_find_them() -> None:
         if found[1] - one.start < 2 * one.wait:
             continue  # info lists none that is so short beside the others
         assert np.abs(listed - found).max(axis=1).min() <= 3 * history.step
+
+
+def test_a_flight_that_rises_says_when_it_is_level_again() -> None:
+    """The rollover box rises by 1.5 m/s; it lands 6 % before that, turned."""
+    rising = open_run([str(ROOT / "sample_data" / "rolloverT01.gz")]).history(Selection(parts=("box",)))
+    (one,) = (q for q in quiet_times(rising, InnerMotion(rising)) if q.start < 0.2)
+    assert one.level is not None
+    assert one.level - one.start == pytest.approx(0.31, rel=0.02)
+    assert all(q.level is None for q in quiet_times(record(BOX), InnerMotion(record(BOX))) if q.start < 0.6)

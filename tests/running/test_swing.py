@@ -8,13 +8,14 @@ import pytest
 from d2rpick.deck import read_inventory
 from d2rpick.flight.flight import Flight
 from d2rpick.flight.position_error import drift_in_flight
-from d2rpick.histories.names import Selection
+from d2rpick.histories.history import EXACT, Momenta
+from d2rpick.histories.names import Part, Selection
 from d2rpick.histories.opening import open_run
 from d2rpick.running.look import Looks
 from d2rpick.running.sequence import RIGID, Order
 from d2rpick.running.swing import swing_in
 from tests.command import ROOT, run
-from tests.records import known
+from tests.records import known, table
 
 CAR = ROOT / "tests" / "data" / "carT01.gz"
 FREE, TD = 0.0385, 0.1464
@@ -33,6 +34,21 @@ def test_what_a_flight_shows_up_to_tr_is_about_the_error_at_td(tr: float) -> Non
     # a flight of that length has a path of a hundred times the error, at the speed so far
     mean = float(np.interp(tr, whole.time, whole.path)) / (tr - float(whole.time[0]))
     assert found.flight * mean == pytest.approx(100 * found.error, rel=0.05)
+
+
+@pytest.mark.parametrize("swings", [0.0, 0.004])
+def test_of_two_parts_the_most_that_the_heavy_one_may_be_off_is_told(swings: float) -> None:
+    """They swing against each other at 25 Hz, fall, and do not turn; from an end of the swing it is twice as far."""
+    time, masses = np.linspace(0.0, 0.06, 241), np.array([30.0, 10.0])
+    values = np.zeros((time.size, 2, 3))
+    values[:, :, 2] = np.outer(-9.81 * time - 1.0, masses)
+    swing = 30.0 * swings * 50 * np.pi * np.sin(50 * np.pi * time)
+    values[:, 0, 0], values[:, 1, 0] = swing, -swing
+    momenta = Momenta(time, values, (Part(1, "shell"), Part(2, "block")), EXACT, (0, 1), masses=masses)
+    found = known(swing_in(table(time, np.zeros(time.size), momenta), 0.0, 0.06))
+    assert found.name == "block"
+    assert found.error == pytest.approx(2 * swings, abs=1e-5)
+    assert "at most" in found.told
 
 
 def test_nothing_is_said_where_no_momenta_of_parts_tell() -> None:
