@@ -12,7 +12,6 @@ from d2rpick.base.errors import D2RPickError
 from d2rpick.cli import options
 from d2rpick.cli.options import FILES, RESULT
 from d2rpick.cli.progress import counting
-from d2rpick.cli.values import click_type
 from d2rpick.report.formats import FORMATS, PLAIN
 
 if TYPE_CHECKING:
@@ -315,28 +314,17 @@ _ABSENT = (
 
 
 @options.command
+@options.file("--output-dir", "Folder for figures and tables; created if missing.", "DIR", required=True)
 @click.option(
-    "--output-dir",
-    metavar="DIR",
-    required=True,
-    type=click_type("file"),
-    help="Folder for figures and tables; created if missing.",
-)
-@click.option(
-    "--section",
-    type=click.Choice(SECTIONS),
-    multiple=True,
+    "--section", type=click.Choice(SECTIONS), multiple=True,
     help="Only the figures of this section of the paper; repeatable.  1: the setting, early switches of the box; 2: "
     "the oscillator; 3: finite elements; 4: the choice, the revised pair, variants; 5: what is saved.",
-)
-@click.option(
+)  # fmt: skip
+@options.file(
     "--solver",
-    metavar="FILE",
-    multiple=True,
-    type=click_type("file"),
-    help="A solver's runs of the same oscillator to draw for comparison: a table of time_s and "
-    + ", or ".join(", ".join(columns) for columns in SOLVER.values())
-    + "; repeatable.",
+    "A solver's runs of the same oscillator to draw for comparison: a table of time_s and "
+    f"{', or '.join(', '.join(columns) for columns in SOLVER.values())}; repeatable.",
+    many=True,
 )
 @options.takes("report", *RESULT, report="Write all of it to one HTML page.", forms=PLAIN)
 def reproduce(output_dir: str, section: Sequence[str], solver: Sequence[str], output: Output) -> None:

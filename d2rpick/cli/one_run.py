@@ -86,9 +86,8 @@ def extract(write_as: str | None, request: Request, output: Output) -> None:
 @options.command
 @options.time("--td", "Switch back to deformable at this time.", instead_of=("td_window",))
 @options.time("--td-window", "Choose the time to switch back within this window.", instead_of=("td",), pair=True)
-@options.LIMIT
-@options.takes(*ONE_RUN, *ANSWER, deck=DECK_OF_PARTS, forms=[*FORMATS["suggestion"], "card"])
-def suggest(td: float | None, td_window: WINDOW, limit: int, request: Request, cards: Cards, output: Output) -> None:
+@options.takes("limit", *ONE_RUN, *ANSWER, deck=DECK_OF_PARTS, forms=[*FORMATS["suggestion"], "card"])
+def suggest(td: float | None, td_window: WINDOW, request: Request, cards: Cards, output: Output) -> None:
     """Rank the times tr at which the parts of HISTORY can be made rigid until td, or choose both times.
 
     Without --td both are chosen, in --td-window or in the longest flight.
@@ -124,7 +123,7 @@ def suggest(td: float | None, td_window: WINDOW, limit: int, request: Request, c
         found = answer.printed(cards)
         told = [] if found is None else [one for one in all_cautions(found.verdicts) if one not in answer.cautions]
         return output.finish(objection=not output.card(found, told), quality=answer.quality)
-    output.answer(answer, limit=limit)
+    output.answer(answer)
     return output.finish(objection=answer.recommended is None, quality=answer.quality)
 
 
@@ -133,18 +132,19 @@ def suggest(td: float | None, td_window: WINDOW, limit: int, request: Request, c
 @options.time(
     "--td-window", "Explore the times to switch back within this window.  [default: the longest flight]", pair=True
 )
-@click.option(
-    "--steps", type=click.IntRange(1, 100_000), default=200, show_default=True,
-    help="Number of evenly spaced td; peaks of the energy come on top.",
-)  # fmt: skip
-@click.option(
-    "--limit", type=click.IntRange(min=1), default=10, show_default=True,
-    help="Number of rows in the table, of the pairs that nothing beats; json and csv have all.",
-)  # fmt: skip
-@options.takes(*ONE_RUN, *ANSWER, deck=DECK_OF_PARTS, forms=FORMATS["trade_off"])
-def explore(
-    td: float | None, td_window: WINDOW, steps: int, limit: int, request: Request, cards: Cards, output: Output
-) -> None:
+@options.option(
+    "steps", Option("Number of evenly spaced td; peaks of the energy come on top.", range(1, 100_001)), default=200
+)
+@options.takes(
+    *("limit", *ONE_RUN, *ANSWER),
+    limit={
+        "default": 10,
+        "help": "Number of rows in the table, of the pairs that nothing beats; json and csv have all.",
+    },
+    deck=DECK_OF_PARTS,
+    forms=FORMATS["trade_off"],
+)
+def explore(td: float | None, td_window: WINDOW, steps: int, request: Request, cards: Cards, output: Output) -> None:
     """Show what each time td to switch back costs: the best tr for it, its error, and what it saves.
 
     A grid of td over --td-window or the longest flight, and every peak of the energy, each as `suggest --td` answers
@@ -168,7 +168,7 @@ def explore(
     answer = explored(asked, td, td_window, steps)
     output.notes(asked.reference.history.notes, answer.cautions)
     output.beside_answer(answer, lambda: answer.page(options.repeat(), request.judging(), cards))
-    output.answer(answer, limit=limit)
+    output.answer(answer)
     chosen = answer.recommended
     output.finish(objection=chosen is None, quality=chosen.quality if chosen else None)
 
@@ -176,8 +176,8 @@ def explore(
 @options.command
 @options.time("--tr", "Switch to rigid at this time.  [with --switched: read off that run]")
 @options.time("--td", "Switch back to deformable at this time.  [with --switched: read off that run]")
-@options.files(
-    "--switched", "Compare a finished switched run with the reference: file, folder or glob; repeatable.", "FILE"
+@options.file(
+    "--switched", "Compare a finished switched run with the reference: file, folder or glob; repeatable.", many=True
 )
 @options.option(
     "min_mean_energy",

@@ -207,14 +207,10 @@ def time(name: str, text: str, **more: Any) -> Callable[[Decorated], Decorated]:
     return option(name[2:].replace("-", "_"), Option(text, TIME, "LO HI" if pair else "T", **more), required=required)
 
 
-def file(name: str, text: str, metavar: str = "FILE") -> Callable[[Decorated], Decorated]:
-    """Make an option of one command that names a file."""
-    return option(name[2:].replace("-", "_"), Option(text, "file", metavar))
-
-
-def files(name: str, text: str, metavar: str) -> Callable[[Decorated], Decorated]:
-    """Make an option of one command that names files, one each time."""
-    return option(name[2:].replace("-", "_"), Option(text, "file", metavar, many=True))
+def file(name: str, text: str, metavar: str = "FILE", **more: Any) -> Callable[[Decorated], Decorated]:
+    """Make an option of one command that names a file, or ``many`` of them, one each time."""
+    required = more.pop("required", False)
+    return option(name[2:].replace("-", "_"), Option(text, "file", metavar, **more), required=required)
 
 
 def windows_in(file: str) -> Sequence[Times]:
@@ -233,12 +229,6 @@ def judging_run(request: Request) -> Run | None:
     from d2rpick.api.asked import open_run  # not above: without a history nothing is computed
 
     return open_run(request)
-
-
-LIMIT: Final = click.option(
-    "--limit", type=click.IntRange(min=1), default=3, show_default=True,
-    help="Number of rows in the table; json and csv have all.",
-)  # fmt: skip
 
 
 def _flags(function: Decorated) -> Decorated:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, TextIO
 import click
 
 from d2rpick.api.cards import Cards, JudgedCard
-from d2rpick.api.request import OPTIONS, Request, dashed, option, options_of
+from d2rpick.api.request import OPTIONS, UNLIMITED, Request, dashed, option, options_of
 from d2rpick.base.errors import FORESEEN, ArgumentError, D2RPickError, listing, one_line, printable
 from d2rpick.base.files import write_whole
 from d2rpick.cli.progress import reading
@@ -70,6 +70,7 @@ class Output:
     )
     overwrite: bool = option("Replace existing files.", "flag", default=False)
     quiet: bool = option("Print no notes and warnings to stderr.", "flag", default=False, short=("-q",))
+    limit: int = option("Number of rows in the table; json and csv have all.", range(1, UNLIMITED), default=3)
     inputs: tuple[str, ...] = ()
 
     @property
@@ -108,7 +109,7 @@ class Output:
 
         meta = click.get_current_context().meta
         width = None if self.file else columns_of(sys.stdout)
-        shown = Shown(meta["d2rpick.command"], verbose=meta.get("d2rpick.verbose", False), **more)
+        shown = Shown(meta["d2rpick.command"], self.limit, verbose=meta.get("d2rpick.verbose", False), **more)
         return shown if width is None else shown._replace(width=width)
 
     def answer(self, answer: Answer, below: str = "", **shown: Any) -> None:

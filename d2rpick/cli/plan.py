@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from d2rpick.api.request import CHOOSING, NOT_NEGATIVE, READING, Request
+from d2rpick.api.request import CHOOSING, NOT_NEGATIVE, READING, Option, Request
 from d2rpick.base.errors import ArgumentError, DeckError, printable
 from d2rpick.cli import options
 from d2rpick.cli.options import DECK_OF_PARTS, HISTORY, RESULT
 from d2rpick.cli.output import Output, check_switched, opened
-from d2rpick.cli.values import CARDS, click_type
+from d2rpick.cli.values import CARDS
 from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
 
 @options.command
-@click.option(
-    "--min-rigid", type=click_type(NOT_NEGATIVE), metavar="T",
-    help="Leave shorter windows out.  [default: 5% of the record; one gives way to a later one twice as long]",
-)  # fmt: skip
+@options.option("min_rigid", Option(
+    "Leave shorter windows out.  [default: 5% of the record; one gives way to a later one twice as long]",
+    *(NOT_NEGATIVE, "T"),
+))  # fmt: skip
 @click.option(
     "--all", "every", is_flag=True,
     help="With -f value, -f card and --write-deck: all windows, not only the supported ones.",
@@ -36,11 +36,11 @@ if TYPE_CHECKING:
     "Windows in which HISTORY was switched, a line 'tr td' for each, or a journal: plan those after.  -f value, "
     "-f card and --write-deck hold both, as the next run needs them.",
 )
-@options.files(
+@options.file(
     "--before",
     "The run that the windows of --done were planned from: its landings are compared; repeatable.",
-    "HISTORY",
-)
+    *("HISTORY",), many=True,
+)  # fmt: skip
 @options.file(
     "--write-deck", "Write a copy of --deck with the cards of the windows into this folder, and check it.", "DIR"
 )

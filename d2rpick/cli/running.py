@@ -31,11 +31,10 @@ CMD = ("text", "CMD")
 @options.option(
     "part", Option("Parts to switch.  [default: those of the bodies that the deck puts off]", "text", "IDS", many=True)
 )
-@options.option(
-    "wait",
-    Option("Time without force that counts as flight.  [default: half of the longest inner period known so far]",
-           POSITIVE, "T"),
-)  # fmt: skip
+@options.option("wait", Option(
+    "Time without force that counts as flight.  [default: half of the longest inner period known so far]",
+    *(POSITIVE, "T"),
+))  # fmt: skip
 @options.option(
     "margin", Option("From td to the contact.  [default: 2 ms, or 3% of the flight if that is more]", POSITIVE, "T")
 )
@@ -130,10 +129,10 @@ def _progress(driver: Driver, seconds: float) -> str:
 
 @options.command
 @click.argument("run", metavar="RUN", type=click_type("file"))
-@click.option(
-    "--wait", type=click_type(POSITIVE), metavar="T",
-    help="Time without a force that counts as flight.  [default: half of the longest inner period that is known]",
-)  # fmt: skip
+@options.option("wait", Option(
+    "Time without a force that counts as flight.  [default: half of the longest inner period that is known]",
+    *(POSITIVE, "T"),
+))  # fmt: skip
 @click.option(
     "--once", is_flag=True, cls=options.Either, instead_of=("lasting",), help="Tell what there is now, and end."
 )

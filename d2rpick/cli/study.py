@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from d2rpick.api.request import LIMITS, READING, Request, needed_time, time_or_window
+from d2rpick.api.request import LIMITS, READING, UNLIMITED, Option, Request, needed_time, time_or_window
 from d2rpick.base.errors import INTERNAL_ERROR, D2RPickError, FormatError
 from d2rpick.cli import options
 from d2rpick.cli.options import RESULT, WINDOW
@@ -38,14 +38,12 @@ if TYPE_CHECKING:
     help="File with more names of runs, one per line; - is stdin.",
 )  # fmt: skip
 @options.file("--resume", "Keep finished runs in FILE, and skip those that are in it and unchanged.")
-@click.option(
-    "--jobs", type=click.IntRange(min=1), metavar="N", cls=options.Either, instead_of=("scheduler",),
-    help="Number of processes.  [default: one per core]",
-)  # fmt: skip
-@click.option(
-    "--scheduler", metavar="ADDRESS", cls=options.Either, instead_of=("jobs",),
-    help="Use a running Dask cluster, which must see the same files.",
-)  # fmt: skip
+@options.option("jobs", Option(
+    "Number of processes.  [default: one per core]", range(1, UNLIMITED), "N", instead_of=("scheduler",)
+))  # fmt: skip
+@options.option("scheduler", Option(
+    "Use a running Dask cluster, which must see the same files.", metavar="ADDRESS", instead_of=("jobs",)
+))  # fmt: skip
 @options.takes(
     *(*READING, *LIMITS, "plot", "report", *RESULT),
     plot="Draw the energies of all runs to FILE (png, svg, pdf).",
