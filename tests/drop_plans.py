@@ -47,7 +47,7 @@ def outcome(parameters: Parameters, interval: float = INTERVAL) -> Outcome:
     """Plan the run of some parameters, and compute it switched in the supported windows."""
     with tempfile.TemporaryDirectory() as folder:
         files = written(simulate(parameters, T_END, interval=interval), Path(folder))
-        windows = plan_of(read(files, BOX), Settings()).new_windows()
+        windows = plan_of(read(files, BOX), Settings()).windows
     switched = simulate(parameters, T_END, *(RigidWindow(*one) for one in windows), interval=interval)
     contacts = switched.landings
     after = tuple(next((start for start, _ in contacts if start > tr), None) for tr, _ in windows)

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from d2rpick.api.cards import Cards
     from d2rpick.api.request import Request
     from d2rpick.api.runs import Run
-    from d2rpick.choice.calibration import Observation
     from d2rpick.choice.cost import Weights
     from d2rpick.choice.switched_run import Times
 
@@ -154,11 +153,6 @@ class Calibration(Answer, calibration.Calibration):
     command: tuple[str, ...]
     kind = "calibration"
     said = ("weights", "told", "misfit")
-
-    @property
-    def legs(self) -> tuple[Observation, ...]:
-        """What each leg took per cycle [us], and what it computed."""
-        return self.observations
 
     def to_frame(self) -> pd.DataFrame:
         """Give a row per formulation: its weight, what was measured with OpenRadioss, whether the runs tell it.

@@ -140,26 +140,6 @@ class Plan(RunAnswer, planning.Plan):
 
     kind = name = "plan"
 
-    @property
-    def flights(self) -> tuple[planning.Planned, ...]:
-        """What is planned for each flight."""
-        return self.rows
-
-    @property
-    def windows(self) -> tuple[Times, ...]:
-        """Windows that this run supports [time]."""
-        return self.new_windows()
-
-    @property
-    def all_windows(self) -> tuple[Times, ...]:
-        """The same with those that wait for a switched run [time]."""
-        return self.new_windows(every=True)
-
-    @property
-    def next_run(self) -> tuple[Times, ...]:
-        """What the next run is switched in [time]."""
-        return self.run_windows()
-
     def to_frame(self) -> pd.DataFrame:
         """Give a row per flight, a column per key of ``windows`` in the JSON; what is not known is NaN.
 
@@ -179,7 +159,7 @@ class Plan(RunAnswer, planning.Plan):
 
     def printed(self, cards: Cards, *, every: bool = False) -> JudgedCard | None:
         """Print the card of the next run, its new windows judged; None where none is new."""
-        new, asked = self.new_windows(every=every), self.question
+        new, asked = self.all_windows if every else self.windows, self.question
         asked = replace(asked, reference=asked.reference._replace(history=self.history))
         return judged(asked, cards, new, done=self.done) if new else None
 

@@ -171,11 +171,6 @@ class Study(Paged, core.Study):
     command: tuple[str, ...]
     kind = "study"
 
-    @property
-    def runs(self) -> tuple[StudyRow, ...]:
-        """What is known of each run."""
-        return self.rows
-
     def to_frame(self) -> pd.DataFrame:
         """Give a row per run, a column per key of ``runs`` in the JSON; what is not known is NaN.
 

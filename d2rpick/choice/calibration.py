@@ -65,7 +65,7 @@ class Calibration:
     weights: Weights
     told: tuple[str, ...]
     misfit: float
-    observations: tuple[Observation, ...]
+    legs: tuple[Observation, ...]
     cautions: tuple[Caution, ...] = ()
 
 

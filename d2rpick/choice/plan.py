@@ -115,27 +115,32 @@ class Plan:
     history: History
     settings: Settings
     min_rigid: float
-    rows: tuple[Planned, ...]
+    flights: tuple[Planned, ...]
     cautions: tuple[Caution, ...]
     done: tuple[Times, ...] = ()
 
     @property
     def supported(self) -> tuple[Planned, ...]:
         """Windows that this reference supports."""
-        return tuple(row for row in self.rows if row.status == "supported")
+        return tuple(row for row in self.flights if row.status == "supported")
 
-    def new_windows(self, *, every: bool = False) -> tuple[Times, ...]:
-        """Give (tr, td) of the supported windows, or of ``every`` one that is not done [time]."""
-        wanted = ("supported", "re-plan") if every else ("supported",)
-        return tuple(row.window for row in self.rows if row.status in wanted and row.window)
+    @property
+    def windows(self) -> tuple[Times, ...]:
+        """(tr, td) of the supported windows [time]."""
+        return tuple(row.window for row in self.supported if row.window)
 
-    def run_windows(self, *, every: bool = False) -> tuple[Times, ...]:
-        """Give (tr, td) of the run to be computed next: the windows that are done and the new ones, in order [time].
+    @property
+    def all_windows(self) -> tuple[Times, ...]:
+        """The same of every window that is not done: also those that wait for a switched run [time]."""
+        return tuple(row.window for row in self.flights if row.status in ("supported", "re-plan") and row.window)
+
+    @property
+    def next_run(self) -> tuple[Times, ...]:
+        """(tr, td) of the run to be computed next: the windows that are done and the supported ones, in order [time].
 
         None where nothing is new.  The next run starts at the beginning again, so it needs both.
         """
-        new = self.new_windows(every=every)
-        return (*self.done, *new) if new else ()
+        return (*self.done, *self.windows) if self.windows else ()
 
     @property
     def rigid_time(self) -> float:

@@ -144,7 +144,7 @@ class Study:
 
     td: float | None
     td_window: tuple[float, float] | None
-    rows: tuple[StudyRow, ...]
+    runs: tuple[StudyRow, ...]
     spread: Spread | None
     agree: bool | None
     common: Common
@@ -153,12 +153,12 @@ class Study:
     @property
     def judged(self) -> int:
         """How many runs could be read and judged."""
-        return sum(row.judged for row in self.rows)
+        return sum(row.judged for row in self.runs)
 
     @property
     def objection(self) -> bool:
         """Whether a run has no tr, or all have none in common."""
-        return self.common.tr is None or any(row.status != OK for row in self.rows)
+        return self.common.tr is None or any(row.status != OK for row in self.runs)
 
 
 def find_runs(names: Iterable[str]) -> tuple[str, ...]:

@@ -236,8 +236,8 @@ _FEWEST_STEPS: Final = 40
 
 def explored_flights(reference: Reference, plan: Plan) -> tuple[TradeOff, ...]:
     """Find what other td cost than those of a plan, for each of its flights; its grids are the coarser the more."""
-    answers = {row.number: row.answer for row in plan.rows if row.answer and row.window}
-    landings = {row.number: row.flight.end for row in plan.rows}
+    answers = {row.number: row.answer for row in plan.flights if row.answer and row.window}
+    landings = {row.number: row.flight.end for row in plan.flights}
     reference = reference._replace(history=plan.history)
     steps = max(_STEPS_OF_PAGE // max(len(answers), 1), _FEWEST_STEPS)
     found = (

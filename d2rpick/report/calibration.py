@@ -28,7 +28,7 @@ DOCUMENT: Final = Document("d2rpick/calibrate/1", "Answer of d2rpick calibrate; 
     Field("per_element", each("number"), "cost of an element by formulation", lambda ours: ours.weights.per_element),
     Field("told", "texts", "what the legs decide; the others keep the measured ratio"),
     Field("misfit", "number"),
-    Field("legs", many(_LEG), get=lambda ours: ours.observations),
+    Field("legs", many(_LEG)),
 ), closed=True)  # fmt: skip
 HEAD = ("formulation", "weight", "measured with OpenRadioss", "by")
 COLUMNS = ("formulation", "weight", "measured", "told")
@@ -79,5 +79,5 @@ def _legs(found: Calibration) -> list[list[tables.Cell]]:
     return [
         [printable(one.name), f"{one.total:.4g} us", None if one.elements is None else f"{one.elements:.4g} us",
          f"{one.rigid_nodes:.0f}"]
-        for one in found.observations
+        for one in found.legs
     ]  # fmt: skip

@@ -168,7 +168,7 @@ def draw_plan(plan: Plan, *, page: bool = False) -> Figure:
     axes = figure.subplots()
     history = plan.history
     axes.plot(history.time, history.energy, color=REFERENCE, linewidth=1, label="internal energy")
-    for row in plan.rows:
+    for row in plan.flights:
         axes.axvspan(row.start, row.end, color=FLIGHT, alpha=0.15, linewidth=0, label="flight")
         if row.window:
             axes.axvspan(
@@ -289,7 +289,7 @@ def draw_study(answer: Study, *, page: bool = False) -> Figure:
     # names of runs stand beside the axes, so that the margins are not known, on a page neither
     figure = Figure(figsize=(PAGE_WIDTH if page else WIDTH, _HEIGHT), layout="constrained")
     axes = figure.subplots()
-    drawn = [row for row in answer.rows if row.curve is not None]
+    drawn = [row for row in answer.runs if row.curve is not None]
     named = _named(drawn)
     _draw_others(axes, drawn, named)
     for one in named:
@@ -298,7 +298,7 @@ def draw_study(answer: Study, *, page: bool = False) -> Figure:
     if answer.common.window:
         axes.axvspan(*answer.common.window, color=GOOD, alpha=0.2, linewidth=0, label="acceptable in all runs")
     _draw_times(axes, drawn)
-    units = {row.time_unit for row in answer.rows if row.judged}
+    units = {row.time_unit for row in answer.runs if row.judged}
     unit = units.pop() if len(units) == 1 else ""
     axes.set(xlabel=with_unit("time", unit), ylabel="internal energy")
     finish(axes, legend=False)

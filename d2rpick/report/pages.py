@@ -204,7 +204,7 @@ def _window(row: Planned, found: Plan) -> Markup:
 
 def study_page(answer: Study, command: Sequence[str]) -> str:
     """Write the page of ``study``; ``command`` are the arguments that repeat it."""
-    title = f"Switch times of {runs_of(len(answer.rows))}"
+    title = f"Switch times of {runs_of(len(answer.runs))}"
     return document(title, *_of_study(answer, command), signed=page.CHECKED)
 
 
@@ -233,7 +233,7 @@ def _files(answer: Study) -> str:
     """Name what was read, with size and time, in the order of the runs."""
     from datetime import UTC, datetime
 
-    files = dict.fromkeys(stamp for row in answer.rows for stamp in row.files)
+    files = dict.fromkeys(stamp for row in answer.runs for stamp in row.files)
     return "\n".join(
         f"{datetime.fromtimestamp(stamp.mtime_ns / 1e9, UTC):%Y-%m-%d %H:%M:%S} UTC {stamp.size:>12} {stamp.name}"
         for stamp in files

@@ -70,7 +70,7 @@ WINDOW: Final = row(
 DOCUMENT: Final = Document("d2rpick/plan/1", "Answer of d2rpick plan; times in the unit of the history.", row(
     *keys.FRAME,
     Field("min_rigid", "number", "shorter windows are left out"),
-    Field("windows", many(WINDOW), "a row per flight, in the order of time", lambda plan: plan.rows),
+    Field("windows", many(WINDOW), "a row per flight, in the order of time", lambda plan: plan.flights),
     Field("rigid_time", "number", "of all supported windows"),
     Field("rigid_fraction", "number", "of the record, with all supported windows"),
     Field("run_time_share", "number?", "of the reference, with all supported windows; null without a cost share"),
@@ -83,15 +83,15 @@ _SPARE: Final = ("margin", "of record", "error", "run time", "out of place")
 
 def as_table(plan: Plan, shown: Shown) -> str:
     """The plan in a sentence, what was read, a row per flight, what is saved, and why others are not supported."""
-    rows = tables.as_text(*table(plan), shown.width, _SPARE) if plan.rows else "no flight"
+    rows = tables.as_text(*table(plan), shown.width, _SPARE) if plan.flights else "no flight"
     told = [(name, printable(text)) for name, text in (*outlook(plan), *reasons(plan))]
     return "\n".join([sentence(plan), "", heading(plan), "", rows, "", *tables.in_line(told, 9)])
 
 
 def sentence(plan: Plan) -> str:
     """What to do, in a sentence."""
-    new = plan.new_windows()
-    waiting = len(plan.new_windows(every=True)) - len(new)
+    new = plan.windows
+    waiting = len(plan.all_windows) - len(new)
     more = f"{waiting} more windows" if waiting > 1 else "a second window" if len(new) == 1 else "another window"
     spans = " and ".join(f"from {tr:.6g} to {td:.6g}" for tr, td in new)
     found = f"make rigid {spans}, {plan.rigid_fraction:.0%} of the record" if new else "nothing to make rigid"
@@ -106,12 +106,12 @@ def as_markdown(plan: Plan, _: Shown) -> str:
 
 def reasons(plan: Plan) -> list[tuple[str, str]]:
     """Why windows are not supported; the flight and a sentence each."""
-    return [(f"flight {row.number}", row.reason) for row in plan.rows if row.reason]
+    return [(f"flight {row.number}", row.reason) for row in plan.flights if row.reason]
 
 
 def as_csv(plan: Plan, _: Shown) -> str:
     """A row per flight, a column for each key of ``windows`` in the JSON output."""
-    return csv_of(WINDOW.keys, map(WINDOW.plain, plan.rows))
+    return csv_of(WINDOW.keys, map(WINDOW.plain, plan.flights))
 
 
 def as_value(plan: Plan, shown: Shown) -> str:
@@ -119,7 +119,8 @@ def as_value(plan: Plan, shown: Shown) -> str:
 
     Those that are done, and the supported ones, or every new one; nothing where none is new.
     """
-    return "\n".join(f"{tr!r} {td!r}" for tr, td in plan.run_windows(every=shown.every))
+    new = plan.all_windows if shown.every else plan.windows
+    return "\n".join(f"{tr!r} {td!r}" for tr, td in ((*plan.done, *new) if new else ()))
 
 
 def heading(plan: Plan) -> str:
@@ -129,7 +130,7 @@ def heading(plan: Plan) -> str:
 
 def outlook(plan: Plan) -> list[tuple[str, str]]:
     """What the supported windows save, and what comes next; a name and a sentence each."""
-    supported, waiting = plan.supported, [row for row in plan.rows if row.status == "re-plan"]
+    supported, waiting = plan.supported, [row for row in plan.flights if row.status == "re-plan"]
     if not supported:
         return []
     lines = []
@@ -143,7 +144,7 @@ def outlook(plan: Plan) -> list[tuple[str, str]]:
     ]
     graded = [(f"flight {row.number}", row.quality) for row in supported if row.quality]
     lines += [(name, quality.told) for name, quality in graded if quality.grade == "poor"]
-    assumed = [row for row in plan.rows if row.candidate and row.candidate.position_error_assumes]
+    assumed = [row for row in plan.flights if row.candidate and row.candidate.position_error_assumes]
     if assumed:
         told = "; `deck` tells which do" if plan.settings.bodies is None else ""
         listed = ", ".join(f"flight {row.number} by {_place(row)}" for row in assumed)
@@ -157,9 +158,9 @@ def outlook(plan: Plan) -> list[tuple[str, str]]:
 
 def table(plan: Plan) -> tuple[list[str], list[list[tables.Cell]]]:
     """Give names of columns and cells of all flights; run time and place only where they are known."""
-    placed = any(row.candidate and row.candidate.position_error is not None for row in plan.rows)
+    placed = any(row.candidate and row.candidate.position_error is not None for row in plan.flights)
     unknown = [*["run time"] * (plan.settings.cost_share is None), *["out of place"] * (not placed)]
-    return tables.filled({name: cell for name, cell in _COLUMNS.items() if name not in unknown}, plan.rows)
+    return tables.filled({name: cell for name, cell in _COLUMNS.items() if name not in unknown}, plan.flights)
 
 
 def error(row: Planned) -> str | None:

@@ -95,7 +95,7 @@ DOCUMENT: Final = Document(
 def as_table(answer: Study, shown: Shown) -> str:
     """One line per run, by what tells its name from the others, and below what they have in common."""
     head, rows = tables.known(*table(answer))
-    rows = [[name, *row[1:]] for name, row in zip(short_names([row.source for row in answer.rows]), rows, strict=True)]
+    rows = [[name, *row[1:]] for name, row in zip(short_names([row.source for row in answer.runs]), rows, strict=True)]
     return "\n".join([tables.as_text(head, rows, shown.width, _SPARE), "", *tables.in_line(outcome(answer))])
 
 
@@ -117,12 +117,12 @@ def as_ndjson(answer: Study, shown: Shown) -> str:
 
 def with_errors(answer: Study) -> Iterator[tuple[StudyRow, float | None]]:
     """Give the runs, each with its error at the common tr."""
-    return zip(answer.rows, answer.common.errors or [None] * len(answer.rows), strict=True)
+    return zip(answer.runs, answer.common.errors or [None] * len(answer.runs), strict=True)
 
 
 def table(answer: Study) -> tuple[list[str], list[list[tables.Cell]]]:
     """Give names of columns and cells of the runs."""
-    cut = {row.source: f"cut at {row.record_end:g}; " for row in cut_runs(answer.rows)}
+    cut = {row.source: f"cut at {row.record_end:g}; " for row in cut_runs(answer.runs)}
     columns: dict[str, Callable[[tuple[StudyRow, float | None]], tables.Cell]] = {
         "run": lambda one: one[0].source,
         "tr": lambda one: one[0].tr,
@@ -155,7 +155,7 @@ def outcome(answer: Study) -> list[tuple[str, str]]:
         shared += f"so is every tr from {window_as_read(*common.window)}; "
         shared += f"error there {tables.measure(min(known))} to {tables.measure(max(known))}"
     return [
-        ("td", f"{td_of(answer)}, {answer.judged} of {runs_of(len(answer.rows))} judged"),
+        ("td", f"{td_of(answer)}, {answer.judged} of {runs_of(len(answer.runs))} judged"),
         ("tr", found),
         ("common tr", shared),
     ]

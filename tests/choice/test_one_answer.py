@@ -77,7 +77,7 @@ def test_a_start_that_is_read_does_not_lie_before_the_flight() -> None:
 
 def test_a_td_that_is_read_keeps_the_margin(box: Reference) -> None:
     asked = Settings(margin=0.0123456789, replay=False)
-    for row in plan_of(box, asked).rows:
+    for row in plan_of(box, asked).flights:
         if row.window:
             assert read_again(box.history, *row.window, asked).verified
 
@@ -92,9 +92,9 @@ def test_every_tr_of_the_windows_that_are_read_verifies() -> None:
 
 
 def test_a_plan_begins_a_flight_where_the_load_is_said_to_end(box: Reference) -> None:
-    second = plan_of(box, PLAIN).rows[1]
+    second = plan_of(box, PLAIN).flights[1]
     after = (second.start + second.end) / 2
-    (row,) = (one for one in plan_of(box, Settings(after=after)).rows if one.number == second.number)
+    (row,) = (one for one in plan_of(box, Settings(after=after)).flights if one.number == second.number)
     assert row.window
     flight = verify(box.history, *row.window, Settings(after=after)).situation.flight
     assert (row.flight.start, row.flight.end, row.flight.source) == (after, flight.end, flight.source)
@@ -104,7 +104,7 @@ def test_a_plan_begins_a_flight_where_the_load_is_said_to_end(box: Reference) ->
 
 def test_verify_and_check_name_the_same_ends_of_a_flight(box: Reference) -> None:
     asked = Settings(margin=0.01)
-    flight = plan_of(box, PLAIN).rows[1]
+    flight = plan_of(box, PLAIN).flights[1]
     verdict = verify(box.history, flight.start + 0.005, flight.end - 0.005, asked)
     reasons = [reason for reason in verdict.reasons if "with the margin" in reason]
     told = [fault.message for fault in faults_of(verdict) if fault.rule == "D2R204"]
@@ -115,7 +115,7 @@ def test_verify_and_check_name_the_same_ends_of_a_flight(box: Reference) -> None
 
 @pytest.mark.parametrize("margin", [None, 0.01])
 def test_the_last_td_that_is_named_lies_in_the_flight(box: Reference, margin: float | None) -> None:
-    asked, flights = Settings(margin=margin), plan_of(box, PLAIN).rows
+    asked, flights = Settings(margin=margin), plan_of(box, PLAIN).flights
     answer = suggest(box.history, (flights[1].end + flights[2].start) / 2, asked)
     (message,) = (one.message for one in answer.cautions if one.code == "no-free-flight")
     found = sure(re.search(r"its last td is (\S+)$" if margin else r"to (\S+); td must lie in it$", message))
@@ -152,7 +152,7 @@ def test_a_plan_knows_a_flight_as_surely_as_the_td_in_it(tmp_path: Path) -> None
     file = tmp_path / "energy.csv"
     save(file, time, energy)
     reference = read([str(file)])
-    rows = [row for row in plan_of(reference, PLAIN).rows if row.window]
+    rows = [row for row in plan_of(reference, PLAIN).flights if row.window]
     assert rows
     for row in rows:
         flight = verify(reference.history, *sure(row.window), PLAIN).situation.flight
@@ -165,7 +165,7 @@ def test_a_flight_whose_start_is_given_ends_where_the_oscillator_does(tmp_path: 
     file, asked = tmp_path / "energy.csv", Settings(after=0.1)
     save(file, time, energy)
     reference = read([str(file)])
-    (row,) = plan_of(reference, asked).rows
+    (row,) = plan_of(reference, asked).flights
     flight = verify(reference.history, *sure(row.window), asked).situation.flight
     assert row.flight == flight
     assert row.end == pytest.approx(0.8, abs=0.01)
@@ -200,7 +200,7 @@ def test_a_plan_keeps_the_margin_that_it_lists(tmp_path: Path) -> None:
     energy = np.sin(omega[0] * time + phase[0]) ** 2 + 0.5 * np.sin(omega[1] * time + phase[1]) ** 2 + 0.6
     file = tmp_path / "energy.csv"
     save(file, time, energy)
-    rows = [row for row in plan_of(read([str(file)]), Settings(replay=False)).rows if row.window and row.flight.end]
+    rows = [row for row in plan_of(read([str(file)]), Settings(replay=False)).flights if row.window and row.flight.end]
     assert rows
     for row in rows:
         assert sure(row.window)[1] <= row.end - row.margin.time

@@ -303,7 +303,7 @@ def test_files_of_all_formats_are_rows_of_one_study() -> None:
     sources = [*samples, *(stored(name) for name in ("chain_ref.csv.gz", "load_L1_ref.csv.gz", "car_all_T01.gz"))]
     rows = [ask(Question(0.05, Settings()), source) for source in sources]
     answer = summarise(0.05, rows)
-    assert [found.source for found in answer.rows] == sources
+    assert [found.source for found in answer.runs] == sources
     assert {"ok", "unreadable", "out-of-range"} <= {found.status for found in rows}
     assert all((found.message is None) == (found.status == OK) for found in rows)
 
