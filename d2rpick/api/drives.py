@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -15,8 +16,8 @@ from d2rpick.choice.deck_of_run import doubts_of_solver
 from d2rpick.deck import read_inventory
 from d2rpick.deck.driven import driven_deck
 from d2rpick.histories.opening import open_run
-from d2rpick.running.drive import JOURNAL, Commands, Cost, Driven, Driver
-from d2rpick.running.engine import Solver, alone
+from d2rpick.running.drive import JOURNAL, Cost, Driven, Driver
+from d2rpick.running.engine import Commands, Solver, alone
 from d2rpick.running.journal import Journal
 from d2rpick.running.look import Looks
 from d2rpick.running.sequence import Limits, windows
@@ -87,7 +88,7 @@ class Driving:
         """Give the driver of the run in its folder, and keep others out.
 
         D2RPickError where one is at work there, the folder holds something else, or the run has begun and is not to
-        be resumed.
+        be resumed, or the disk is full.
         """
         folder = self.asked.folder
         folder.mkdir(parents=True, exist_ok=True)
@@ -103,7 +104,12 @@ class Driving:
                 if any(not one.name.startswith(".") for one in folder.iterdir()):
                     raise D2RPickError(f"{folder}: the folder is not empty; choose another one")
                 journal.add("begun", deck=digest)
-            yield Driver(self.deck, self.solver, journal, self.asked.commands, self.limits, self.looks, self._told)
+            try:
+                yield Driver(self.deck, self.solver, journal, self.asked.commands, self.limits, self.looks, self._told)
+            except OSError as error:
+                if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+                    raise
+                raise D2RPickError(f"{folder}: {error.strerror}; make room, then --resume") from None
 
     def answer(self, driver: Driver, command: Sequence[str]) -> Drive:
         """Say what has come of the run so far."""

@@ -84,7 +84,7 @@ def drive(
     from pathlib import Path
 
     from d2rpick.api.drives import Asked, Driving
-    from d2rpick.running.drive import Commands
+    from d2rpick.running.engine import Commands
 
     asked = Asked(
         deck=deck, folder=Path(folder), part=part, wait=wait, margin=margin,

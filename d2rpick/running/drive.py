@@ -11,7 +11,6 @@ from d2rpick.base.errors import D2RPickError
 from d2rpick.base.files import write_whole
 from d2rpick.choice.warnings import Caution
 from d2rpick.deck.driven import RESTARTS
-from d2rpick.running import engine
 from d2rpick.running.sequence import LOAD, RIGID, RIGID_KINDS, SEARCH, Leg, Order, Seen, control, next_order, window_of
 
 if TYPE_CHECKING:
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.driven import DrivenDeck
     from d2rpick.histories.run import Run
-    from d2rpick.running.engine import Left, Solver
+    from d2rpick.running.engine import Commands, Left, Solver
     from d2rpick.running.journal import Journal
     from d2rpick.running.look import Looks
     from d2rpick.running.sequence import Limits, Window
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
 JOURNAL: Final = "drive.ndjson"
 # Largest step while rigid over the mean one before: a rigid leg costs a few percent of a deformable one then, and the
 # state of a run is written often enough to show a contact.
-_STEP_RATIO: Final = 10.0
+_STEP_RATIO: Final = 5.0
 # Restarts that a search keeps: it goes back by an eighth of the wait at most.
 _IN_SEARCH: Final = 9
 # Looks at a leg: so many seconds apart, so many times as long as a look takes, and by this share of the leg.
@@ -64,18 +63,6 @@ class Driven:
     why: str
     saved: tuple[float | None, float | None]
     cautions: tuple[Caution, ...]
-
-
-class Commands(NamedTuple):
-    """How starter and engine are started, None for those of the installation, on so many threads."""
-
-    starter: str | None = None
-    engine: str | None = None
-    threads: int = 1
-
-    def words(self, program: str, deck: str) -> list[str]:
-        """Words of the command that starts one of the two."""
-        return engine.words(program, getattr(self, program), deck, self.threads)
 
 
 class Driver:
@@ -217,9 +204,8 @@ class Driver:
         many, every = self._ring(order)
         seen = self._seen(order)
         step = (seen.time - order.start) / left.timing.cycles if seen else 0.0
-        count = min(
-            (left.timing.cycles - 1) // every, many - 1
-        )  # the last one, at its end, may have taken the next letter
+        # the last one, at its end, may have taken the next letter
+        count = min((left.timing.cycles - 1) // every, many - 1)
         return [(order.start + n * every * step, chr(ord("I") + n - 1)) for n in range(1, count + 1)]
 
     def _watch(self, order: Order) -> None:

@@ -35,31 +35,39 @@ _LAST_LINES: Final = 5
 _RESTARTS: Final = 3
 
 
-def words(program: str, template: str | None, deck: str, threads: int) -> list[str]:
-    """Split the command that starts the ``program`` on a deck as a shell would; without one, that of the installation.
+class Commands(NamedTuple):
+    """How starter and engine are started, None for those of the installation, on so many threads."""
 
-    Raises
-    ------
-    ConfigurationError
-        If it cannot be split or does not name the deck, or no installation is known.
-    """
-    if template is None:
-        home = os.environ.get(_HOME, "")
-        names, options = _PROGRAMS[program]
-        found = [path for path in (Path(home, name) for name in names) if home and path.is_file()]
-        if not found:
-            raise ConfigurationError(
-                f"no {program} is known; set {_HOME} to the folder of OpenRadioss, or give --{program} 'CMD {{deck}}'"
-            )
-        split = [str(found[0].resolve()), *options.split()]
-    else:
+    starter: str | None = None
+    engine: str | None = None
+    threads: int = 1
+
+    def words(self, program: str, deck: str) -> list[str]:
+        """Split the command that starts a program on a deck as a shell would.
+
+        ConfigurationError where it cannot be split or does not name the deck, or no installation is known.
+        """
+        template = getattr(self, program)
         try:
-            split = shlex.split(template)
+            split = _installed(program) if template is None else shlex.split(template)
         except ValueError as error:
             raise ConfigurationError(f"--{program} {template!r}: cannot be split into words ({error})") from None
-    if not any("{deck}" in word for word in split):
-        raise ConfigurationError(f"--{program} {template!r}: {{deck}} was expected, where the name of the file goes")
-    return [word.replace("{deck}", deck).replace("{threads}", str(threads)) for word in split]
+        if not any("{deck}" in word for word in split):
+            raise ConfigurationError(
+                f"--{program} {template!r}: {{deck}} was expected, where the name of the file goes"
+            )
+        return [word.replace("{deck}", deck).replace("{threads}", str(self.threads)) for word in split]
+
+
+def _installed(program: str) -> list[str]:
+    home = os.environ.get(_HOME, "")
+    names, options = _PROGRAMS[program]
+    for path in (Path(home, name) for name in names if home):
+        if path.is_file():
+            return [str(path.resolve()), *options.split()]
+    raise ConfigurationError(
+        f"no {program} is known; set {_HOME} to the folder of OpenRadioss, or give --{program} 'CMD {{deck}}'"
+    )
 
 
 def _surroundings(threads: int) -> dict[str, str]:
@@ -179,9 +187,7 @@ class Solver:
         except FormatError:
             timing = None
         restarts = self._restarts(number)
-        if (
-            not normal and self.history(number).exists()
-        ):  # of one that was written last nobody knows whether it is whole
+        if not normal and self.history(number).exists():  # nobody knows whether one that was written last is whole
             written = self.history(number).stat().st_mtime_ns
             restarts = [path for path in restarts if path.stat().st_mtime_ns < written]
         latest = max(restarts, key=lambda path: path.stat().st_mtime_ns, default=None)
@@ -219,7 +225,7 @@ class Solver:
         free = shutil.disk_usage(self.folder).free
         if free < needed:
             raise D2RPickError(
-                f"{self.folder}: leg {number} may need {needed / 1e6:.0f} MB, {free / 1e6:.0f} MB are free; "
+                f"{self.folder}: leg {number} may need {needed / 1e6:.3g} MB, {free / 1e6:.3g} MB are free; "
                 "make room, then --resume"
             )
 

@@ -177,9 +177,8 @@ def _seen(history: History, witness: _Witness, waiting: Waiting, first: int, las
         if wait is None or now - start < wait:
             state += 1
             continue
-        gravity = (
-            None if history.surroundings.held(history.parts, now) else witness.gravity(first, state, history.balance)
-        )
+        held = history.surroundings.held(history.parts, now)
+        gravity = None if held else witness.gravity(first, state, history.balance)
         if gravity is not None:
             momenta, end = witness.momenta, float(time[last + 1]) if last < time.size - 1 else None
             parts = momenta.parts and tuple(momenta.parts[i] for i in witness.members) if momenta else None

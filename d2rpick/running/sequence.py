@@ -1,14 +1,7 @@
 """Which leg comes next in a first run that is switched while it runs: from what the legs so far have shown.
 
-Each flight takes these legs:
-
-* ``load``: deformable, until no force has acted for the wait.
-* ``search``: deformable, one more wait at most: tr is the time of its highest energy.  It ends where nothing higher
-  came for a quarter of the wait.  Where it ran beyond tr, ``approach`` runs from the last restart before tr to tr.
-* ``probe``: rigid from tr until a contact shows, at tc.  It is thrown away.
-* ``rigid``: from the same restart to td, the margin before tc.
-
-A leg that is thrown away has the number of the leg that takes its place.
+What each kind of leg does is said in docs/first-run.md.  One that is thrown away has the number of the leg that takes
+its place.
 """
 
 from __future__ import annotations

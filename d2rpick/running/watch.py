@@ -133,10 +133,8 @@ def follow(
     *, lasting: float | None = None, rest: Callable[[float], None] = time.sleep,
 ) -> Iterator[Event]:  # fmt: skip
     """Tell what happens in a run as it goes on, until it has ended, or for so long [s]; arguments as of `Watch`."""
-    watch, end = (
-        Watch(names, selection, wait, inventory),
-        time.monotonic() + (float("inf") if lasting is None else lasting),
-    )
+    watch = Watch(names, selection, wait, inventory)
+    end = time.monotonic() + (float("inf") if lasting is None else lasting)
     while True:
         begun = time.process_time()
         yield from watch.news()

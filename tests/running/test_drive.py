@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import shlex
@@ -13,12 +14,15 @@ from pathlib import Path
 
 import pytest
 
+from d2rpick.api.drives import Asked, Driving
 from d2rpick.base.errors import D2RPickError
+from d2rpick.histories.formats.radioss_th import TimeHistory
 from d2rpick.histories.opening import open_run
 from d2rpick.running import engine
 from tests.command import ROOT, run
 from tests.deck.test_openradioss import ENGINE, starter
 from tests.decks import wide
+from tests.made_t01 import MadePart, headed
 
 FAKE = Path(__file__).with_name("fake_solver.py")
 GRAVITY = (
@@ -132,12 +136,13 @@ def test_a_leg_is_not_begun_on_a_full_disk(tmp_path: Path, monkeypatch: pytest.M
 
 def test_commands_are_split_as_a_shell_does_and_given_to_none() -> None:
     deck = "a b; rm -rf x_0001.rad"
-    assert engine.words("engine", "mpirun -np 2 'my engine' -i {deck} -nt {threads}", deck, 4) == [
+    given = engine.Commands(engine="mpirun -np 2 'my engine' -i {deck} -nt {threads}", threads=4)
+    assert given.words("engine", deck) == [
         "mpirun", "-np", "2", "my engine", "-i", deck, "-nt", "4",
     ]  # fmt: skip
     for wrong in ("engine", "engine '{deck}"):
         with pytest.raises(D2RPickError):
-            engine.words("engine", wrong, deck, 1)
+            engine.Commands(engine=wrong).words("engine", deck)
 
 
 def test_a_restart_that_may_be_cut_is_not_taken(tmp_path: Path) -> None:
@@ -148,3 +153,25 @@ def test_a_restart_that_may_be_cut_is_not_taken(tmp_path: Path) -> None:
     assert solver.left(1).restart == "I"
     (tmp_path / "strip_0001.out").write_text(" NORMAL TERMINATION\n")
     assert solver.left(1).restart == "J"
+
+
+def test_a_disk_that_is_full_is_told_with_what_to_do(tmp_path: Path) -> None:
+    driving = Driving(Asked(deck=asked(tmp_path)[1], folder=tmp_path / "run", wait=WAIT), print)
+    for wrong, message in (
+        (errno.ENOSPC, "run: No space left on device; make room, then --resume"),
+        (errno.EIO, "Input"),
+    ):
+        with pytest.raises((D2RPickError, OSError), match=message), driving.driver(resume=True):
+            raise OSError(wrong, os.strerror(wrong))
+
+
+def test_a_history_that_is_cut_in_a_record_ends_with_a_whole_state(tmp_path: Path) -> None:
+    made = headed([MadePart(1, "strip of shells", (1, 6))], globals_=6)
+    for time_ in (0.0, 1.0, 2.0):
+        made.state(time_, [1.0] * 6, [1.0, 1.0])
+    solver, history = engine.Solver(tmp_path, "strip"), tmp_path / "stripT01"
+    for cut in (1, 5, 41):  # of 60 bytes
+        history.write_bytes(made.data[:-cut])
+        solver.shorten(1, 9.0)
+        assert TimeHistory(history.read_bytes(), "T01").time.tolist() == [0.0, 1.0]
+        assert not TimeHistory(history.read_bytes(), "T01").notes
