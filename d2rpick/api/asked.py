@@ -13,6 +13,7 @@ from d2rpick.api import arguments
 from d2rpick.api.request import Request
 from d2rpick.base.errors import ArgumentError, FormatError, listing, name_units
 from d2rpick.choice.of_run import Reference
+from d2rpick.choice.warnings import Caution
 from d2rpick.histories.names import Selection
 
 if TYPE_CHECKING:
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from d2rpick.api.runs import Run
     from d2rpick.choice.cost import CostModel, Weights
     from d2rpick.choice.situation import Settings
-    from d2rpick.choice.warnings import Caution
     from d2rpick.histories import run as histories
 
 
@@ -188,7 +188,6 @@ def _check_recommended(request: Request, run: histories.Run) -> None:
 
 def _merged(asked: Asked, merge: int) -> Asked:
     """Let the parts become one rigid body, with a caution where nothing joins them."""
-    from d2rpick.choice.warnings import Caution
     from d2rpick.flight.bodies import RigidBody
 
     parts = asked.reference.history.parts

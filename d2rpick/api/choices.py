@@ -10,6 +10,7 @@ from d2rpick.api import arguments
 from d2rpick.api.answer import RunAnswer, frame_of
 from d2rpick.api.asked import Asked, ask, request_of
 from d2rpick.api.cards import CardOptions, Cards, JudgedCard
+from d2rpick.api.cards import judged as card_judged
 from d2rpick.api.request import MIN_MEAN_ENERGY, time_or_window
 from d2rpick.base.errors import ArgumentError
 from d2rpick.choice import answers, of_run
@@ -97,11 +98,9 @@ class Suggestion(Judged, answers.Suggestion):
 
     def printed(self, cards: Cards) -> JudgedCard | None:
         """Print the card of the recommended pair, judged as printed; None without one."""
-        from d2rpick.api.cards import judged as judged_card
-
         pair, asked = self.recommended, self.question
         judge = partial(of_run.judge_of, asked.reference, self.situation)
-        return judged_card(asked, cards, [(pair.tr, pair.td)], judge) if pair else None
+        return card_judged(asked, cards, [(pair.tr, pair.td)], judge) if pair else None
 
     def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:
         """Write the page, with the card of the recommended pair."""

@@ -10,6 +10,7 @@ from d2rpick.api.answer import Answer, Paged, frame_of, written
 from d2rpick.api.asked import model_of, request_of
 from d2rpick.base.errors import ArgumentError
 from d2rpick.choice import calibration, sets_of_parts
+from d2rpick.choice.cost import Weights, weights_as_toml
 from d2rpick.report.tables import positional
 
 if TYPE_CHECKING:
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from d2rpick.api.cards import Cards
     from d2rpick.api.request import Request
     from d2rpick.api.runs import Run
-    from d2rpick.choice.cost import Weights
     from d2rpick.choice.switched_run import Times
 
 
@@ -170,8 +170,6 @@ class Calibration(Answer, calibration.Calibration):
 
     def save(self, path: arguments.Path) -> Path:
         """Write the TOML file that ``--weights`` reads; an existing file is replaced."""
-        from d2rpick.choice.cost import weights_as_toml
-
         return written(path, f"{weights_as_toml(self.weights)}\n")
 
 
@@ -206,8 +204,6 @@ def calibrate(runs: arguments.Path | Iterable[arguments.Path]) -> Calibration:
 
 def fitted(runs: Sequence[str]) -> Calibration:
     """Fit the cost of elements to what the runs in folders took."""
-    from d2rpick.choice.calibration import observations_of_runs
-
-    observations, cautions = observations_of_runs(runs)
+    observations, cautions = calibration.observations_of_runs(runs)
     command = ("calibrate", *positional(runs))
     return Calibration.of(calibration.calibrate(observations), cautions=cautions, command=command)

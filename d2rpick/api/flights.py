@@ -165,12 +165,11 @@ class Plan(RunAnswer, planning.Plan):
 
     def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:  # noqa: ARG002
         """Write the page, with the cards of the next run."""
-        from d2rpick.choice.trade_off import explored_flights
         from d2rpick.report.pages import plan_page
 
         cards = cards or Cards()
         card = self.printed(cards) if cards.request(self.question).whom(self.history) else None
-        explorer = self._explorer(explored_flights(self.question.reference, self))
+        explorer = self._explorer(trade_off.explored_flights(self.question.reference, self))
         return plan_page(self, self.question.reference.run, command, card.card.text if card else None, explorer)
 
 

@@ -24,7 +24,7 @@ from d2rpick.base.files import record_of, signed
 from d2rpick.base.workers import Farm, answers, on_cores
 from d2rpick.choice import study as core
 from d2rpick.choice.study import FAILED, UNREADABLE, Question, Stamp, StudyRow, stamps
-from d2rpick.report.study import PLAIN
+from d2rpick.report.study import PLAIN, RUN
 from d2rpick.report.tables import positional
 
 if TYPE_CHECKING:
@@ -180,8 +180,6 @@ class Study(Paged, core.Study):
         >>> d2.study(["sample_data/energy.csv"], td=0.0687534).to_frame()["status"].tolist()
         ['ok']
         """
-        from d2rpick.report.study import RUN
-
         return frame_of(self.to_dict()["runs"], RUN.keys, td=self.td)
 
     def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:  # noqa: ARG002

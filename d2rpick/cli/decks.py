@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from d2rpick.api.cards import SETTINGS, Cards
+from d2rpick.api.cards import SETTINGS, Cards, all_cautions, card_of
 from d2rpick.base.errors import INTERNAL_ERROR, ConfigurationError, D2RPickError, DeckError
 from d2rpick.cli import options
 from d2rpick.cli.options import FILES, REFERENCE, RESULT
@@ -53,8 +53,6 @@ def card(
     d2rpick card --tr 0.02 --td 0.09 --tr 0.2 --td 0.3 --part 11
     d2rpick card --solver radioss --tr 0.0135867 --td 0.0687534 --node 1001 --end 0.15
     """
-    from d2rpick.api.cards import all_cautions, card_of
-
     if cards.solver:
         cards.check_solver(cards.solver)
     times = _windows(tr, td, windows)

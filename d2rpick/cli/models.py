@@ -12,7 +12,7 @@ from d2rpick.base.errors import D2RPickError
 from d2rpick.cli import options
 from d2rpick.cli.options import FILES, RESULT
 from d2rpick.cli.progress import counting
-from d2rpick.report.formats import FORMATS, PLAIN
+from d2rpick.report.formats import FORMATS, PLAIN, write
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -263,7 +263,6 @@ def _scan(box: Box, output: Output) -> None:
     from d2rpick.choice.answers import suggest
     from d2rpick.choice.situation import Settings
     from d2rpick.models.box_run import comparison_end, history_of, scan, scan_times, simulate
-    from d2rpick.report.formats import write
     from d2rpick.report.rollover import Scan
 
     output = output.beside()

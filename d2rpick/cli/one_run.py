@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import click
 
+from d2rpick.api.cards import Cards, all_cautions
 from d2rpick.api.request import (
     FRACTION,
     LIMITS,
@@ -22,9 +21,6 @@ from d2rpick.cli.options import ANSWER, DECK, DECK_OF_PARTS, FILES, HISTORY, ONE
 from d2rpick.cli.output import IN_WORDS, Output, check_switched, in_words, opened
 from d2rpick.cli.progress import reading
 from d2rpick.report.formats import FORMATS, write
-
-if TYPE_CHECKING:
-    from d2rpick.api.cards import Cards
 
 
 @options.command
@@ -106,7 +102,6 @@ def suggest(td: float | None, td_window: WINDOW, request: Request, cards: Cards,
     d2rpick suggest --td 0.064 --report report.html sample_data/energy.csv
     """
     from d2rpick.api.asked import ask
-    from d2rpick.api.cards import all_cautions
     from d2rpick.api.choices import suggested
 
     wanted, card = time_or_window(td, td_window), output.output_format == "card"

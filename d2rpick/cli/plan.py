@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from d2rpick.api.cards import SETTINGS, Cards, all_cautions
 from d2rpick.api.request import CHOOSING, NOT_NEGATIVE, READING, Option, Request
 from d2rpick.base.errors import ArgumentError, DeckError, printable
 from d2rpick.cli import options
@@ -17,7 +18,6 @@ from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:
     from d2rpick.api.asked import Asked
-    from d2rpick.api.cards import Cards
     from d2rpick.api.flights import Plan
     from d2rpick.deck.printed_card import PrintedCard
 
@@ -72,7 +72,6 @@ def plan(
     d2rpick plan --part box --plot plan.png --report plan.html sample_data/rollover_box.matsum
     """
     from d2rpick.api.asked import ask, open_run
-    from d2rpick.api.cards import all_cautions
     from d2rpick.api.flights import planned
 
     form = output.output_format
@@ -141,7 +140,6 @@ def _write_and_check(card: PrintedCard, plan: Plan, folder: str, output: Output)
     passed : bool
         Whether no finding is an error.
     """
-    from d2rpick.api.cards import SETTINGS
     from d2rpick.deck.writing import write_deck
     from d2rpick.report.findings import Checks, as_table
     from d2rpick.rules import Configuration, check_deck, configuration_for
