@@ -16,7 +16,7 @@ from d2rpick.choice.deck_of_run import doubts_of_solver
 from d2rpick.deck import read_inventory
 from d2rpick.deck.driven import driven_deck
 from d2rpick.histories.opening import open_run
-from d2rpick.running.drive import JOURNAL, Cost, Driven, Driver
+from d2rpick.running.drive import JOURNAL, Driven, Driver
 from d2rpick.running.engine import Commands, Solver, alone
 from d2rpick.running.journal import Journal
 from d2rpick.running.look import Looks
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from d2rpick.choice.warnings import Caution
+    from d2rpick.running.sequence import Leg
 
 # Of a second: where nothing vibrates so long without a force is flight, and so long before a contact td lies at least.
 _SHORTEST = 2e-3
@@ -113,32 +114,32 @@ class Driving:
 
     def answer(self, driver: Driver, command: Sequence[str]) -> Drive:
         """Say what has come of the run so far."""
-        legs, costs = driver.legs, driver.costs
+        legs = driver.legs
         last = max((leg.order.number for leg in legs), default=0)
         names = [str(self.solver.history(number)) for number in range(1, last + 1)]
         return Drive(
-            run=open_run(names), deck=self.deck, windows=tuple(windows(legs, self.limits)), costs=tuple(costs),
-            why=self.looks.why, saved=(self._by_model(costs), _by_time(costs, self.deck.end)),
+            run=open_run(names), deck=self.deck, windows=tuple(windows(legs, self.limits)), legs=tuple(legs),
+            why=self.looks.why, saved=(self._by_model(legs), _by_time(legs, self.deck.end)),
             cautions=(*self.cautions, *driver.out_of_place), command=tuple(command),
         )  # fmt: skip
 
-    def _by_model(self, costs: Sequence[Cost]) -> float | None:
+    def _by_model(self, legs: Sequence[Leg]) -> float | None:
         share = CostModel(self.inventory).saved(self.deck.parts).value
         steps = [
-            [one.length / one.cycles for one in costs if one.cycles and one.length > 0 and one.rigid is rigid]
+            [one.length / one.cycles for one in legs if one.cycles and one.length > 0 and one.order.rigid is rigid]
             for rigid in (False, True)
         ]
         if share is None or not all(steps):
             return None
         ratio = max(steps[1]) / min(steps[0])
-        took = sum(one.length * ((1 - share) / ratio if one.rigid else 1.0) for one in costs)
+        took = sum(one.length * ((1 - share) / ratio if one.order.rigid else 1.0) for one in legs)
         return 1 - took / self.deck.end
 
 
-def _by_time(costs: Sequence[Cost], end: float) -> float | None:
+def _by_time(legs: Sequence[Leg], end: float) -> float | None:
     """Share that is saved where a deformable run takes as long as the deformable legs do on the whole."""
-    if any(one.cpu is None for one in costs):
+    if any(one.cpu is None for one in legs):
         return None
-    deformable = [one for one in costs if not one.rigid]
+    deformable = [one for one in legs if not one.order.rigid]
     whole = sum(one.cpu or 0.0 for one in deformable) / sum(one.length for one in deformable) * end
-    return 1 - sum(one.cpu or 0.0 for one in costs) / whole if whole else None
+    return 1 - sum(one.cpu or 0.0 for one in legs) / whole if whole else None

@@ -30,7 +30,7 @@ _LEG: Final = row(
 DOCUMENT: Final = Document("d2rpick/drive/1", "Answer of d2rpick drive; times in the unit of the deck.", row(
     keys.WARNINGS,
     Field("windows", many(_WINDOW)),
-    Field("legs", many(_LEG), "in the order they were computed; probes are thrown away", lambda one: one.costs),
+    Field("legs", many(_LEG), "in the order they were computed; probes are thrown away"),
     Field("saved_by_model", "number?", "share of a deformable run, by the cost model", lambda one: one.saved[0]),
     Field("saved_by_time", "number?", "the same, by the processor time of the legs", lambda one: one.saved[1]),
 ))  # fmt: skip
@@ -60,8 +60,8 @@ def _windows(found: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
 
 def _legs(found: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
     rows: list[list[tables.Cell]] = []
-    for kind in dict.fromkeys(one.kind for one in found.costs):
-        own = [one for one in found.costs if one.kind == kind]
+    for kind in dict.fromkeys(one.kind for one in found.legs):
+        own = [one for one in found.legs if one.kind == kind]
         cpu = None if any(one.cpu is None for one in own) else f"{sum(one.cpu or 0.0 for one in own):.4g}"
         rows.append([kind, len(own), f"{sum(one.length for one in own):.4g}", sum(one.cycles or 0 for one in own), cpu])
     return ["kind", "legs", "time", "cycles", "CPU s"], rows

@@ -5,13 +5,13 @@ from __future__ import annotations
 import time
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import D2RPickError
 from d2rpick.base.files import write_whole
 from d2rpick.choice.warnings import Caution
 from d2rpick.deck.driven import RESTARTS
-from d2rpick.running.sequence import LOAD, RIGID, RIGID_KINDS, SEARCH, Leg, Order, Seen, control, next_order, window_of
+from d2rpick.running.sequence import LOAD, RIGID, SEARCH, Leg, Order, Seen, control, next_order, window_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -34,32 +34,18 @@ _IN_SEARCH: Final = 9
 _SHORTEST, _LOOKS, _SHARE = 0.1, 2.0, 0.005
 
 
-class Cost(NamedTuple):
-    """What a leg took: its kind, how long it was [time], its cycles and processor time [s], None where unknown."""
-
-    kind: str
-    length: float
-    cycles: int | None
-    cpu: float | None
-
-    @property
-    def rigid(self) -> bool:
-        """Whether the parts were rigid in it."""
-        return self.kind in RIGID_KINDS
-
-
 @dataclass(frozen=True, kw_only=True)
 class Driven:
     """What has come of a run so far.
 
-    ``windows`` are those of all flights, ``costs`` what each leg took, ``why`` the reason of the wait.  ``saved``: what
+    ``windows`` are those of all flights, ``legs`` what was computed, ``why`` the reason of the wait.  ``saved``: what
     share of a deformable run is saved, by the cost model and by the processor time of this run; None where unknown.
     """
 
     run: Run
     deck: DrivenDeck
     windows: tuple[Window, ...]
-    costs: tuple[Cost, ...]
+    legs: tuple[Leg, ...]
     why: str
     saved: tuple[float | None, float | None]
     cautions: tuple[Caution, ...]
@@ -89,16 +75,9 @@ class Driver:
     def legs(self) -> list[Leg]:
         """Legs that are over, those that were thrown away too."""
         return [
-            Leg(Order(*one["order"]), Seen(*one["seen"]), one["cut"], tuple(map(tuple, one["restarts"])))
+            Leg(Order(*one["order"]), Seen(*one["seen"]), one["cut"], restarts, one["cycles"], one["cpu"])
             for one in self.journal.all("ended")
-        ]
-
-    @property
-    def costs(self) -> list[Cost]:
-        """What they took, in their order."""
-        return [
-            Cost(one["order"][0], one["seen"][0] - one["order"][2], one["cycles"], one["cpu"])
-            for one in self.journal.all("ended")
+            for restarts in [tuple(map(tuple, one["restarts"]))]
         ]
 
     @property
@@ -188,7 +167,7 @@ class Driver:
 
     def _step(self) -> float:
         """Smallest mean step of a deformable leg, or the interval of the history where none is known yet [time]."""
-        known = [one.length / one.cycles for one in self.costs if one.kind == LOAD and one.cycles and one.length > 0]
+        known = [one.length / one.cycles for one in self.legs if one.kind == LOAD and one.cycles and one.length > 0]
         return float(f"{min([self.deck.interval, *known]):.3g}")
 
     def _ring(self, order: Order) -> tuple[int, int]:

@@ -85,13 +85,26 @@ class Seen(NamedTuple):
 class Leg(NamedTuple):
     """A leg that is over; ``cut``: the solver was ended from outside, and its last restart is what counts.
 
-    ``restarts`` are those that it wrote on its way, each with its time and letter.
+    ``restarts`` are those that it wrote on its way, each with its time and letter; ``cycles`` and processor time
+    ``cpu`` [s] are None where unknown.
     """
 
     order: Order
     seen: Seen
     cut: bool = False
     restarts: tuple[tuple[float, str], ...] = ()
+    cycles: int | None = None
+    cpu: float | None = None
+
+    @property
+    def kind(self) -> str:
+        """What it was ordered for."""
+        return self.order.kind
+
+    @property
+    def length(self) -> float:
+        """How long it was [time]."""
+        return self.seen.time - self.order.start
 
     def whole(self, limits: Limits) -> bool:
         """Whether it reached its end."""
