@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.candidates import Candidate, Candidates, find_candidates, judge
-from d2rpick.choice.expectation import Expectation, against_td, expectation
+from d2rpick.choice.expectation import Expectation, against_td, expectation, most_energy
 from d2rpick.choice.ranking import EQUALLY_GOOD, Quality, over_limits, quality_of, rank
 from d2rpick.choice.situation import Settings, Situation, examine
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution, cautions_of, out_of_place
+from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.digits import as_read
 
 if TYPE_CHECKING:
@@ -86,6 +87,8 @@ def _in_order(tr: float, td: float) -> None:
         raise RangeError(f"tr {tr:g} is not before td {td:g}; the part is rigid from tr to td")
 
 
+# Level error that rounding leaves of a crossing at most, of a level above this share of the highest energy.
+ROUNDING: Final = 1e-3
 # Pairs at other peaks that may turn out not to verify when the record is examined there, before it is given up.
 _MOST_REFUSED = 3
 
@@ -227,7 +230,7 @@ def find_better_pair(situation: Situation) -> Pair | None:
     refused = 0
     for td in sorted(situation.peaks(start, end), key=lambda peak: abs(peak - situation.td)):
         there = situation.at(td)
-        if there.vibration.doubts or not (best := _saving(there)):
+        if there.vibration.doubts or _level_refuses(there) or not (best := _saving(there)):
             continue
         anew = _anew(situation, td)
         best = best if anew.sees_as(there) else _saving(anew)
@@ -237,6 +240,14 @@ def find_better_pair(situation: Situation) -> Pair | None:
         if refused == _MOST_REFUSED:
             return None
     return None
+
+
+def _level_refuses(situation: Situation) -> bool:
+    """Whether the level at td alone speaks against any tr: noise makes thousands of peaks below zero, or too high."""
+    if situation.basis != "energy":
+        return False
+    level, least = situation.energy_td, max(0.0, 1 - situation.settings.tolerance - ROUNDING)
+    return level < -round_off(situation.history) or level * least**2 > most_energy(situation)
 
 
 def _saving(situation: Situation) -> Candidate | None:

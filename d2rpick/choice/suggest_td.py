@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.choice.answers import Pair, Suggestion, suggest_at
+from d2rpick.choice.answers import ROUNDING, Pair, Suggestion, suggest_at
 from d2rpick.choice.candidates import Candidate, candidates_of
 from d2rpick.choice.expectation import mean_in_flight, shortfall
 from d2rpick.choice.ranking import LIKE_LEVELS, like_quality, rank
@@ -28,9 +28,6 @@ if TYPE_CHECKING:
 
     Look = Callable[[float], Situation]
     Choice = tuple[Situation, Candidate]
-
-# Level error that rounding leaves of a crossing at most, of a level above this share of the highest energy.
-_ROUNDING: Final = 1e-3
 
 
 def longest_rigid_times(situation: Situation, times: Samples) -> Samples:
@@ -51,10 +48,10 @@ def longest_rigid_times(situation: Situation, times: Samples) -> Samples:
     time = np.append(start, history.time[later])
     energy = np.append(history.energy_at(start), history.energy[later])
     level, tolerance = history.energies_at(times), situation.settings.tolerance
-    passed = time[np.minimum(_reached(energy, level, np.full(times.shape, -_ROUNDING)), time.size - 1)]
+    passed = time[np.minimum(_reached(energy, level, np.full(times.shape, -ROUNDING)), time.size - 1)]
     turns = np.searchsorted(history.turns, times) - np.searchsorted(history.turns, passed, side="right")
-    passes = (turns >= 2) & (level > _ROUNDING * np.abs(history.energy).max())
-    near = np.where(passes, min(tolerance, LIKE_LEVELS), tolerance) + _ROUNDING
+    passes = (turns >= 2) & (level > ROUNDING * np.abs(history.energy).max())
+    near = np.where(passes, min(tolerance, LIKE_LEVELS), tolerance) + ROUNDING
     entered = time[np.maximum(_reached(energy, level, near) - 1, 0)]  # or since, but after the state before
     return np.asarray(np.maximum(times - np.where(level <= round_off(history), start, entered), 0.0))
 

@@ -159,10 +159,12 @@ def _widened(values: Samples, share: float) -> tuple[float, float]:
 
 def round_off(history: History) -> float:
     """Energy below which an internal energy is round-off beside the energies of the run [energy]."""
-    balance = history.balance
+    return history.known.once("round-off", lambda: _ROUND_OFF * _largest(history, history.balance))
+
+
+def _largest(history: History, balance: Balance | None) -> float:
     terms = (balance.internal, balance.kinetic, balance.external_work, balance.total) if balance else ()
-    largest = max(float(np.abs(term).max(initial=0.0)) for term in (history.energy, *terms) if term is not None)
-    return _ROUND_OFF * largest
+    return max(float(np.abs(term).max(initial=0.0)) for term in (history.energy, *terms) if term is not None)
 
 
 # The band of the last quarter of a flight, widened on both sides by this share of its width, holds all before it.

@@ -151,6 +151,33 @@ def find_turns(energy: Samples) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     return moving[turn] + 1, slope[moving[turn]] > 0
 
 
+# So many windows side by side are looked at as one: with eight the table of them is small, and is walked quickly.
+_TOGETHER: Final = 8
+
+
+def first_above(values: Samples, start: NDArray[np.intp], limit: Samples) -> NDArray[np.intp]:
+    """Place of the first of values (n,) from each ``start`` on that is above its ``limit``, of their shape (m,).
+
+    n where none is.  It takes O((n + m) log n).
+
+    Examples
+    --------
+    >>> first_above(np.array([5.0, 1.0, 2.0, 3.0]), np.array([1, 1, 3]), np.array([1.5, 9.0, 0.0])).tolist()
+    [2, 4, 3]
+    """
+    tops, width, places = [np.append(values, np.inf)], 1, np.arange(values.size + 1)  # largest of so many from each on
+    while width < values.size:
+        later = (np.minimum(places + width * step, values.size) for step in range(_TOGETHER))
+        tops.append(np.fmax.reduce([tops[-1][one] for one in later]))
+        width *= _TOGETHER
+    found = start
+    for top in reversed(tops):
+        for _ in range(_TOGETHER):
+            found = np.where(top[found] > limit, found, np.minimum(found + width, values.size))
+        width //= _TOGETHER
+    return found
+
+
 def outline(time: Samples, values: Samples, stretches: int) -> Samples:
     """Give times and values that draw the curve, shape (2, m): all, or the extremes of each of many stretches.
 

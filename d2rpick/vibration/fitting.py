@@ -44,6 +44,7 @@ _CELLS_PER_PERIOD: Final = 24  # of the strongest vibration in E, which a preloa
 COARSE: Final = 400  # samples on which starts are compared and first refined
 _MEDIUM: Final = 2048  # samples on which a fit is refused before it is refined on more
 _NEAR: Final = 1e-6  # of the sum of squares still to be gained where a fit is refused: nothing beside the structure
+MAX_MISFIT: Final = 0.4  # beyond, more than 16 % of the variance is unexplained and can hide another mode
 STARTS: Final = 3  # refined at most: with noise the first in rank may not be the one that ends best
 CERTAIN: Final = 0.01  # of the variance unexplained: no second start need be tried
 _MAX_STEPS: Final = 40  # a good start needs 4 to 8
@@ -75,14 +76,19 @@ def hopeless(poles: NDArray[np.complex128], s: Samples, e: Samples, worst: float
 def best_of_starts(
     starts: Callable[[Samples, Samples], Sequence[Samples]], model: Model, s: Samples, e: Samples, worst: float
 ) -> Samples | None:
-    """Return the best fit to all samples from what ``starts`` gives for a few of them; None as for `fit`."""
+    """Return the best fit to all samples from what ``starts`` gives for a few of them; None as for `fit`.
+
+    With a finite ``worst`` one whose misfit stays too large is not brought to its best: noise draws that out.
+    """
     few = _few(s, e)
     best = refine(starts(*few), model, *few, worst)
     if best is None:
         return None
-    if np.isfinite(worst) and (_structured(best, model, *few) or fails(best, model, s, e)):
+    quick = np.isfinite(worst)
+    if quick and (_structured(best, model, *few) or fails(best, model, s, e)):
         return None
-    return best if few[0].size == s.size else minimise(best, model, s, e)[0]
+    hopeless = MAX_MISFIT**2 * s.size * float(np.var(e)) if quick else np.inf
+    return best if few[0].size == s.size else minimise(best, model, s, e, hopeless)[0]
 
 
 def _few(s: Samples, e: Samples, most: int = COARSE) -> tuple[Samples, Samples]:

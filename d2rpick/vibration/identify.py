@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.vibration import fitting
+from d2rpick.vibration.fitting import MAX_MISFIT
 from d2rpick.vibration.modes import Mode, Modes, energy_and_jacobian, sum_and_jacobian
 
 if TYPE_CHECKING:
@@ -16,8 +17,7 @@ if TYPE_CHECKING:
 
 # Thresholds of acceptance.  White noise may be large; what a true model must not leave over is structure, the
 # part of the misfit that neighbouring samples share.
-MAX_MISFIT: Final = 0.4  # beyond, more than 16 % of the variance is unexplained and can hide another mode
-HOPELESS: Final = 0.5**2  # of the variance, unexplained on 400 samples: six standard deviations beyond that misfit
+HOPELESS: Final = 0.5**2  # of the variance, unexplained on 400 samples: six standard deviations beyond MAX_MISFIT
 MAX_LOCAL_STRUCTURE: Final = 0.1  # of the fit's energy at that time: a second mode that outlives the first
 MIN_SAMPLES: Final = 24  # four for each parameter of the richest model
 MIN_SAMPLES_PER_PERIOD: Final = 10  # of the energy, pi / omega: below, an aliased fast mode passes for a slow one

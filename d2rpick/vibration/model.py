@@ -16,7 +16,8 @@ import numpy as np
 
 from d2rpick.base.errors import listing
 from d2rpick.vibration import measures
-from d2rpick.vibration.identify import MAX_MISFIT, MIN_SAMPLES_PER_PERIOD, Identification
+from d2rpick.vibration.fitting import MAX_MISFIT
+from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD, Identification
 from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.moments import ModalEnergy, Moments, Profile, SampledEnergy
 from d2rpick.vibration.uncertainty import residual_bound

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.histories.samples import find_crossings, find_turns
+from d2rpick.histories.samples import find_crossings, find_turns, first_above
 from d2rpick.vibration import measures
 from d2rpick.vibration.uncertainty import fitted_reach, sampled_reach
 
@@ -265,27 +265,23 @@ class Profile:
         return np.where(moments.are("match"), self.cell(moments.tr) / 2, reach)
 
     def tolerances(self, tr: Samples, errors: Samples) -> Samples:
-        """Give the tolerance of each tr of shape (n,) with its error [time]."""
-        return np.array([self.tolerance(*one) for one in zip(tr.tolist(), errors.tolist(), strict=True)])
+        """How far each tr (n,) may be off before its error grows by 0.05; at most over all times [time].
 
-    def tolerance(self, tr: float, error: float) -> float:
-        """How far ``tr`` may be off before ``error``, the one there, grows by 0.05; at most over all times [time]."""
-        t, limit = self.time, error + measures.TOLERATED_GROWTH
-        outside = self.error > limit
-        middle = int(np.searchsorted(t, tr))
-        after, before = np.flatnonzero(outside[middle:]), np.flatnonzero(outside[:middle])
-        reaches = [float(t[-1] - t[0])]
-        if after.size:
-            reaches.append(self._leaving(middle + int(after[0]), -1, tr, limit))
-        if before.size:
-            reaches.append(self._leaving(int(before[-1]), 1, tr, limit))
-        return min(reaches)
+        ``errors`` are those at each tr; between its times the profile is linear.
+        """
+        limit, middle, last = errors + measures.TOLERATED_GROWTH, np.searchsorted(self.time, tr), self.time.size - 1
+        after = first_above(self.error, middle, limit)
+        before = last - first_above(self.error[::-1], last + 1 - middle, limit)
+        most = np.full(tr.shape, self.time[-1] - self.time[0])
+        for outside, inwards in ((after, -1), (before, 1)):
+            there = np.flatnonzero((outside >= 0) & (outside <= last))
+            most[there] = np.fmin(most[there], self._leaving(outside[there], inwards, tr[there], limit[there]))
+        return most
 
-    def _leaving(self, outside: int, inwards: int, tr: float, limit: float) -> float:
-        """Distance from ``tr`` to where the error passes ``limit``, linear from the sample ``outside`` inwards."""
-        inside = outside + inwards
-        if not 0 <= inside < self.time.size or self.error[inside] > limit:  # no sample between tr and the outside
-            return abs(float(self.time[outside]) - tr)
-        share = (limit - self.error[inside]) / (self.error[outside] - self.error[inside])
-        place = self.time[inside] + share * (self.time[outside] - self.time[inside])
-        return abs(float(place) - tr)
+    def _leaving(self, outside: NDArray[np.intp], inwards: int, tr: Samples, limit: Samples) -> Samples:
+        """Distance from each ``tr`` to where the error passes ``limit``, linear from the time ``outside`` inwards."""
+        inside = np.clip(outside + inwards, 0, self.time.size - 1)
+        (t0, e0), (t1, e1) = ((self.time[at], self.error[at]) for at in (inside, outside))
+        share = np.divide(limit - e0, e1 - e0, out=np.zeros(tr.shape), where=e1 != e0)
+        # where no time lies between tr and the outside, that counts
+        return np.asarray(np.abs(np.where(e0 > limit, t1, t0 + share * (t1 - t0)) - tr))

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.answers import Pair, suggest, verify, verify_at
+from d2rpick.choice.answers import Pair, suggest, suggest_at, verify, verify_at
 from d2rpick.choice.of_run import read
 from d2rpick.choice.situation import Settings, examine
 from d2rpick.choice.suggest_td import suggest_in_window
@@ -63,6 +63,19 @@ def test_td_after_the_next_contact_is_not_acceptable() -> None:
     before = suggest(of(energy, time), 2.4, PLAIN)
     assert before.recommended is not None
     assert before.situation.flight.end == pytest.approx(2.5, abs=0.03)
+
+
+@pytest.mark.parametrize("seed", [5, 6])
+def test_no_peak_of_noise_that_is_nearer_than_the_better_pair_saves_anything(seed: int) -> None:
+    time = np.linspace(0, 1, 400)
+    energy = 20 * np.exp(-8 * time) + np.random.default_rng(seed).standard_normal(time.size)
+    answer = suggest(of(energy, time), 0.9, Settings(replay=False))
+    own, better = answer.situation, sure(answer.better_pair).td
+    nearer = [td for td in own.peaks(sure(own.earliest_tr), own.td) if td > better]
+    assert nearer
+    for td in nearer:
+        there = suggest_at(own.at(td), with_better=False).chosen
+        assert there is None or there.same_swing
 
 
 @settings(max_examples=25, deadline=None)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from d2rpick.histories.samples import find_crossings, find_turns, narrow, outline
+from d2rpick.histories.samples import find_crossings, find_turns, first_above, narrow, outline
 
 # small integers hit every coincidence: samples on the level, plateaus, touching
 levels = st.integers(-3, 3)
@@ -159,3 +159,16 @@ def test_a_root_is_the_same_to_the_last_digit_alone_and_beside_others(roots: np.
         return [*map(float, narrow(lambda t: some**3 - t**3, *ends, slope=lambda t: -3 * t**2).at)]
 
     assert found(roots) == [found(roots[i : i + 1])[0] for i in range(roots.size)]
+
+
+@given(
+    st.lists(levels, min_size=1, max_size=80), st.lists(st.tuples(st.integers(0, 80), levels), min_size=1, max_size=9)
+)
+def test_the_first_value_above_a_limit_is_the_one_that_a_walk_meets(
+    values: list[int], asked: list[tuple[int, int]]
+) -> None:
+    start, limit = (np.array(column) for column in zip(*asked, strict=True))
+    start = np.minimum(start, len(values))
+    found = first_above(np.array(values, dtype=float), start, limit.astype(float))
+    for at, above, place in zip(start.tolist(), limit.tolist(), found.tolist(), strict=True):
+        assert place == next((i for i in range(at, len(values)) if values[i] > above), len(values))
