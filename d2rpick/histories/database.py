@@ -141,6 +141,8 @@ class Branch(Protocol):
 
 # An interval so many times the median one is no output interval.
 _LONG = 30.0
+# States of which the steps are looked at together: so many stay in the cache, and need no fresh memory.
+_PIECE: Final = 1 << 13
 
 
 class Legs:
@@ -309,8 +311,12 @@ def _digits(precision: Precision) -> int:
 
 def _holes(time: Samples) -> tuple[str, ...]:
     """Say where output stops for long, as it does where a leg is missing."""
-    steps = np.diff(time)
-    if steps.size < 3 or steps.max() <= _LONG * steps.min():  # as nearly always
+    if time.size < 4:
         return ()
+    pieces = (np.diff(time[first : first + _PIECE + 1]) for first in range(0, time.size - 1, _PIECE))
+    shortest, longest = zip(*((piece.min(), piece.max()) for piece in pieces), strict=True)
+    if max(longest) <= _LONG * min(shortest):  # as nearly always
+        return ()
+    steps = np.diff(time)
     holes = np.flatnonzero(steps > _LONG * np.sort(steps)[steps.size // 2])
     return tuple(f"no states between {time[i]:.6g} and {time[i + 1]:.6g}; is a leg missing?" for i in holes[:3])

@@ -227,9 +227,10 @@ class Column:
 def finite(values: Any, path: str, source: str) -> Samples:
     """``values`` as doubles, read-only so that nobody needs a copy of his own; FormatError unless all are finite."""
     numbers = np.asarray(values, dtype=np.float64)
-    bad = np.argwhere(~np.isfinite(numbers))
-    if bad.size:
-        found = f"{source}: {path} is {numbers[tuple(bad[0])]} at state {bad[0][0] + 1}, not a finite number"
+    known = np.isfinite(numbers)
+    if not known.all():
+        bad = np.argwhere(~known)[0]
+        found = f"{source}: {path} is {numbers[tuple(bad)]} at state {bad[0] + 1}, not a finite number"
         raise FormatError(f"{found}; choose another dataset")
     numbers.flags.writeable = False
     return numbers

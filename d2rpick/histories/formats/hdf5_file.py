@@ -218,7 +218,7 @@ def _line(group: h5py.Group, name: str) -> str:
 
 def _named(path: str, columns: Sequence[Column], source: str) -> Column:
     found = [column for column in columns if column.path == path.strip("/")]
-    near = near_miss(path.strip("/"), [column.path for column in columns])
+    near = "" if found else near_miss(path.strip("/"), [column.path for column in columns])
     return _only(found, columns, f"{path!r}{near}", source)
 
 
