@@ -19,6 +19,7 @@ from d2rpick.flight.flight import SOURCES
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.margin import margin_before_contact
 from d2rpick.histories.digits import not_after, sum_as_read
+from d2rpick.histories.samples import union
 from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
@@ -128,7 +129,7 @@ def offered_times(situation: Situation, window: tuple[float, float], steps: int)
         order = np.lexsort((-situation.vibration.whole.energies(peaks), place))
         highest = order[np.diff(place[order], prepend=-1) > 0]
         peaks, grid = peaks[highest], np.delete(grid, place[highest])
-    times = np.union1d(grid, peaks)
+    times = union(grid, peaks)
     return times[times < situation.history.time[-1]], set(peaks.tolist())  # a run that ends at td is no use
 
 

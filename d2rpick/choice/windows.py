@@ -16,7 +16,7 @@ from d2rpick.flight.flight import Flight, all_seen, witnesses
 from d2rpick.flight.margin import margin_before_contact
 from d2rpick.flight.window import moments
 from d2rpick.histories.digits import not_after, sum_as_read
-from d2rpick.histories.samples import find_crossings, narrow
+from d2rpick.histories.samples import find_crossings, narrow, union
 from d2rpick.vibration.measures import TOLERATED_GROWTH
 from d2rpick.vibration.span import Fits
 
@@ -272,7 +272,7 @@ def monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
     # what may be locked in at most is passed between the samples, and is just kept there in doubles too
     most = find_crossings(history.time, history.energy, (1 - _BELOW) * most_energy(situation))[0]
     times = np.concatenate([history.time, candidates.tr, most, situation.vibration.knots(), ends])
-    return np.unique(times[(times >= max(start, history.time[0])) & (times < td)])
+    return union(times[(times >= max(start, history.time[0])) & (times < td)])
 
 
 def _residual_left(situation: Situation) -> float:
@@ -329,14 +329,14 @@ def error_profile(situation: Situation, candidates: Candidates, windows: Samples
     if not windows.size:
         return np.zeros((2, 0))
     inner = monotone_grid(situation, candidates)
-    times = np.union1d(inner[_inside(inner, windows)], windows)
+    times = union(inner[_inside(inner, windows)], windows)
     for _ in range(_HALVINGS):
         middles = (times[1:] + times[:-1]) / 2
         middles = middles[_inside(middles, windows)]
         bent = np.abs(_errors(situation, middles) - np.interp(middles, times, _errors(situation, times))) > _EXACT / 2
         if not bent.any():
             break
-        times = np.union1d(times, middles[bent])
+        times = union(times, middles[bent])
     return _thinned(times, _errors(situation, times), windows)
 
 

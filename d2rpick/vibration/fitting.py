@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.histories.samples import integral
-from d2rpick.vibration.modes import energy_and_jacobian, sum_and_jacobian
+from d2rpick.vibration.modes import BLOCK, energy_and_jacobian, sum_and_jacobian
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -48,7 +48,6 @@ MAX_MISFIT: Final = 0.4  # beyond, more than 16 % of the variance is unexplained
 STARTS: Final = 3  # refined at most: with noise the first in rank may not be the one that ends best
 CERTAIN: Final = 0.01  # of the variance unexplained: no second start need be tried
 _MAX_STEPS: Final = 40  # a good start needs 4 to 8
-_BLOCK: Final = 8192  # samples whose derivatives are held at a time, so that they stay in the processor's cache
 
 
 def fit(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int, worst: float = np.inf) -> Samples | None:
@@ -239,12 +238,22 @@ def minimise(
 def _normal_equations(parameters: Samples, model: Model, s: Samples, e: Samples) -> tuple[float, Samples, Samples]:
     """Sum of squares of the rest, J J^T and J rest, block by block."""
     cost, normal, gradient = 0.0, np.zeros(()), np.zeros(())
-    for first in range(0, s.size, _BLOCK):
-        block = slice(first, first + _BLOCK)
+    for first in range(0, s.size, BLOCK):
+        block = slice(first, first + BLOCK)
         energy, jacobian = model(parameters, s[block])
         rest = e[block] - energy
         cost, normal, gradient = cost + float(rest @ rest), normal + jacobian @ jacobian.T, gradient + jacobian @ rest
     return cost, normal, gradient
+
+
+def evaluated(parameters: Samples, model: Model, s: Samples) -> tuple[Samples, Samples]:
+    """Energies (n,) and J J^T (p, p) of their derivatives, block by block: all derivatives take p times the record."""
+    energy, normal = np.empty(s.size), np.zeros(())
+    for first in range(0, s.size, BLOCK):
+        block = slice(first, first + BLOCK)
+        energy[block], jacobian = model(parameters, s[block])
+        normal = normal + jacobian @ jacobian.T
+    return energy, normal
 
 
 # Least difference of two rates over the record to start from [rad]: below a quarter of a beat two modes act as one.

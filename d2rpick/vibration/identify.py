@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -253,31 +254,31 @@ def _lacking(time: Samples, energy: Samples) -> str | None:
 
 
 class _Attempt(NamedTuple):
-    """A fit: scaled and in the units of the record, with its scaled energies (n,) and derivatives (p, n)."""
+    """A fit: scaled and in units of the record, with scaled energies (n,) and J J^T (p, p) of their derivatives."""
 
     name: str
     scaled: Mode | Modes
     mode: Mode | Modes
     energy: Samples
-    jacobian: Samples
+    normal: Samples
     units: Samples
 
 
 def _one(parameters: Samples, size: int, record: _Record) -> _Attempt:
     """Fit of one mode with its first ``size`` parameters free."""
-    fitted, jacobian = energy_and_jacobian(parameters, record.s, size)
+    fitted, normal = fitting.evaluated(parameters, partial(energy_and_jacobian, size=size), record.s)
     scaled, mode = _mode(parameters, 0.0), _mode(parameters * record.units, record.start)
-    return _Attempt("one oscillator", scaled, mode, fitted, jacobian, record.units[:size])
+    return _Attempt("one oscillator", scaled, mode, fitted, normal, record.units[:size])
 
 
 def _sum(parameters: Samples, record: _Record) -> _Attempt:
     """Fit of several modes."""
-    fitted, jacobian = sum_and_jacobian(parameters, record.s)
+    fitted, normal = fitting.evaluated(parameters, sum_and_jacobian, record.s)
     rate, root = record.units[1], record.units[2]
     count = parameters.size // 3
     units = np.array([rate, *(rate, root, root) * count])
     scaled, modes = Modes.of(parameters, 0.0), Modes.of(parameters * units, record.start)
-    return _Attempt(f"a sum of {count} modes", scaled, modes, fitted, jacobian, units)
+    return _Attempt(f"a sum of {count} modes", scaled, modes, fitted, normal, units)
 
 
 def _judged(
@@ -302,7 +303,7 @@ def _judged(
         structure=structure * record.scale,
         start=record.start,
         end=record.end,
-        covariance=_covariance(attempt.jacobian, rest) * attempt.units * attempt.units[:, None],
+        covariance=_covariance(attempt.normal, rest) * attempt.units * attempt.units[:, None],
         vibration=float(np.hypot.reduce(vibration) / np.sqrt(s.size)) * record.scale,  # squares may overflow
     )
     return found, loose is None
@@ -352,14 +353,13 @@ def _implausible(
     return None
 
 
-def _covariance(jacobian: Samples, rest: Samples) -> Samples:
+def _covariance(normal: Samples, rest: Samples) -> Samples:
     """s**2 (J J^T)^-1, by the pseudo-inverse of the matrix scaled to a unit diagonal."""
-    products = jacobian @ jacobian.T
-    norm = np.sqrt(products.diagonal())
+    norm = np.sqrt(normal.diagonal())
     norm[norm < _NO_EFFECT] = 1.0
     scale = norm * norm[:, None]
     variance = float(rest @ rest) / (rest.size - norm.size)
-    covariance: Samples = variance * np.linalg.pinv(products / scale, hermitian=True) / scale
+    covariance: Samples = variance * np.linalg.pinv(normal / scale, hermitian=True) / scale
     return covariance
 
 

@@ -63,6 +63,19 @@ def noisy_growth() -> float:
     return _ratio(_suggest(str(_noisy(1_000_000))), _suggest(str(_noisy(100_000))), rounds=1)
 
 
+def drowned_growth() -> float:
+    """`suggest --td` of 2e5 states of a vibration that decays into its noise over the same of 1e5."""
+
+    def build(states: int) -> tuple[str, ...]:
+        time = np.linspace(0.0, 1.0, states)
+        energy = MODE.energy(0.15 * time)
+        energy += 0.1 * energy.max() * np.random.default_rng(3).standard_normal(states)
+        file = str(_written(f"drowned{states}.csv", time, energy))
+        return "-m", "d2rpick", "suggest", "--td", str(_TD), "--exit-zero", file
+
+    return _ratio(build(200_000), build(100_000), rounds=1)
+
+
 def window_to_td(kind: str, width: str, *options: str) -> float:
     """`--td-window` over `--td` in the same record of 1e5 states, ``kind`` "noisy", "clean" or "parts"."""
     file = str({"noisy": _noisy, "clean": _clean, "parts": _two_parts}[kind](100_000))

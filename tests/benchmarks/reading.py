@@ -181,6 +181,16 @@ def csv_to_pandas(columns: int) -> float:
     return ratio(lambda: _read(file), lambda: pd.read_csv(file), _ROUNDS)
 
 
+def suggest_memory() -> float:
+    """Peak memory of `suggest` of that csv, pandas with it [MB]."""
+    code = (
+        "import resource, subprocess, sys; subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL);"
+        "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024)"
+    )
+    suggest = ("-m", "d2rpick", "suggest", "--td", "0.9", "--exit-zero", "-q", str(_csv(_ROWS, 2)))
+    return float(output("-c", code, sys.executable, *suggest))
+
+
 def hdf5_to_h5py() -> float:
     """Reading an hdf5 of 1e6 rows over h5py alone: processes."""
     file = _folder_file("rows.h5")
