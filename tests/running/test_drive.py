@@ -19,6 +19,7 @@ from d2rpick.base.errors import D2RPickError
 from d2rpick.histories.formats.radioss_th import TimeHistory
 from d2rpick.histories.opening import open_run
 from d2rpick.running import engine
+from d2rpick.running.sequence import LOAD, PROBE, Leg, Limits, Order, Seen, window_of
 from tests.command import ROOT, run
 from tests.deck.test_openradioss import ENGINE, starter
 from tests.decks import wide
@@ -175,3 +176,11 @@ def test_a_history_that_is_cut_in_a_record_ends_with_a_whole_state(tmp_path: Pat
         solver.shorten(1, 9.0)
         assert TimeHistory(history.read_bytes(), "T01").time.tolist() == [0.0, 1.0]
         assert not TimeHistory(history.read_bytes(), "T01").notes
+
+
+@pytest.mark.parametrize(("idle", "margin"), [(True, 0.002), (False, 0.03 * 0.4)])
+def test_the_margin_is_the_least_one_where_nothing_vibrates(idle: bool, margin: float) -> None:
+    flown = Leg(Order(LOAD, 1, 0.0, 1.0), Seen(0.01, 0.0, 0.02, idle=idle))
+    probe = Leg(Order(PROBE, 2, 0.01, 1.0), Seen(0.45, contact=0.4))
+    assert window_of([flown, probe], Limits(1.0, 1e-3, 0.002)).td == pytest.approx(0.4 - margin)
+    assert window_of([flown, probe], Limits(1.0, 1e-3, 0.002, 0.05)).td == pytest.approx(0.35)

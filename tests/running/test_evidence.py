@@ -13,7 +13,7 @@ from d2rpick.choice.situation import Settings
 from d2rpick.choice.windows import bounds, flights_of
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.running.evidence import contact_after, highest_energy, quiet_times
-from d2rpick.running.wait import InnerMotion
+from d2rpick.running.wait import InnerMotion, Wait
 from tests.command import ROOT
 from tests.records import until
 
@@ -58,8 +58,9 @@ def test_flights_of_computed_runs_are_seen_and_gaps_in_the_load_are_not(
 
 def test_a_swing_with_a_push_in_it_makes_no_wait_longer() -> None:
     """In the box the longest swing was pushed at 302 ms and took 24 ms, half of the period of the springs is 17 ms."""
-    waits = [one.wait for one in quiet_times(record(BOX), InnerMotion(record(BOX)))]
-    assert all(0.016 <= one <= 0.021 for one in waits[1:])
+    for before in (None, Wait(0.018, "record", "as in the flight before")):
+        waits = [one.wait for one in quiet_times(record(BOX), InnerMotion(record(BOX), None, before))]
+        assert all(0.016 <= one <= 0.021 for one in waits[1:])
 
 
 @pytest.mark.parametrize("name", [CAR, BOX])
