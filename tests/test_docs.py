@@ -8,13 +8,14 @@ import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 import d2rpick
 from d2rpick.cli import COMMANDS
 from d2rpick.histories.opening import READERS
 from d2rpick.rules import RULES, read_configuration
-from tests.command import DECK, GLSTAT, ROOT, run
+from tests.command import DECK, ENERGY, GLSTAT, ROOT, run
 from tests.examples import (
     PAGES,
     blocks,
@@ -187,6 +188,15 @@ def test_the_settings_in_the_documentation_are_taken(
     table = tomllib.loads(settings)
     taken = {*table, *table.pop("suggest")} - {"suggest", "fail-on"}  # which check alone takes
     assert shown.count(f"# settings, {tmp_path / 'd2rpick.toml'}") == len(taken)
+
+
+def test_the_parquet_of_the_recipes_is_read(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Where pandas can: pyarrow is no dependency."""
+    pytest.importorskip("pyarrow")
+    monkeypatch.chdir(tmp_path)
+    (line,) = re.findall(r"`(pd\.read_parquet\(.*?\))`", text_of("docs/recipes.md"))
+    pd.read_csv(ENERGY, index_col="time").to_parquet("energies.parquet")
+    assert d2rpick.from_frame(eval(line)).parts == ()
 
 
 def test_the_pre_commit_hook_is_the_one_of_the_documentation() -> None:
