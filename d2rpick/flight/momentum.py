@@ -36,6 +36,8 @@ _LONGER = 1.1
 # Parts that may be attached are looked for in this share of the record before td, on so many states at most.  What
 # bends the momenta of a body cancels but for this share: digits and the solver's own errors.
 _LOOK_BACK, _LOOK_STATES, _CANCELS = 0.1, 200, 1e-3
+# What makes a sum less by this share is rounding: a part of next to no mass would go in and out for ever.
+_ROUNDED: Final = 1e-9
 # What moves no faster than at this share of its largest momentum stands, or is held, unless it goes on as it does.
 _HELD = 0.01
 # Momenta of parts are those of the model within this share of it, or a rigid body has taken some of them.
@@ -243,7 +245,7 @@ def _polished(rests: Samples, members: set[int], chosen: Sequence[int], moving: 
         sides = np.array([-1.0 if i in members else 1.0 for i in free])
         sizes = np.linalg.norm(total + sides[:, np.newaxis] * rests[free], axis=1)
         best = int(np.argmin(sizes))
-        if sizes[best] >= np.linalg.norm(total):
+        if sizes[best] >= (1 - _ROUNDED) * np.linalg.norm(total):
             break
         total = total + sides[best] * rests[free[best]]
         members = members ^ {free[best]}

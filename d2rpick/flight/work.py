@@ -155,7 +155,8 @@ def _unexplained(balance: Balance, first: int, last: int) -> float:
     """What stands for gravity in a window: 0 where energies change by nothing or damping alone, else of unknown size.
 
     NaN where they are lost, by gravity, friction or damping: what damping takes falls off with the kinetic energy,
-    which shows when much of it is gone.  Infinity where they grow, by gravity or another load.
+    which shows when much of it is gone.  Infinity where they grow, or lose more than a vibration has, by gravity or
+    another load.
     """
     whole, kinetic = balance.kinetic_and_internal, balance.kinetic
     if whole is None or kinetic is None:
@@ -170,7 +171,9 @@ def _unexplained(balance: Balance, first: int, last: int) -> float:
     lost = float(whole[first] - whole[last])
     bent = float(np.ptp(rest)) / largest if largest > 0 else 0.0
     damped = bent <= _OWN_ERROR and lost >= _MUCH * largest
-    return 0.0 if damped or (bent <= _LITTLE and lost <= _LITTLE * largest) else np.nan
+    if damped or (bent <= _LITTLE and lost <= _LITTLE * largest):
+        return 0.0
+    return np.nan if balance.internal is None or lost <= np.ptp(balance.internal[states]) else np.inf
 
 
 def _terms(balance: Balance) -> list[Samples]:

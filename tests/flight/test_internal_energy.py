@@ -201,6 +201,14 @@ def test_a_load_that_energies_cannot_tell_from_gravity_makes_a_pair_poor() -> No
     assert "by gravity or by another load" in found.quality.told
 
 
+def test_what_loses_more_energy_than_its_vibration_has_is_not_damped() -> None:
+    """A stiff body that a constant force slows down rings as one oscillator, and it pushes a weak vibration on."""
+    ringing = 1e-6 * np.sin(300 * TIME) ** 2
+    found = suggest(totals(ringing, 50 - 10 * TIME + 2 * TIME**2), 0.8, PLAIN)
+    assert known(found.quality).grade == "poor"
+    assert found.situation.flight.unknown_load
+
+
 def test_no_flight_is_certain_in_which_energies_show_a_load() -> None:
     """A stiff body that is pulled may have an energy that one oscillator describes."""
     assert not Flight(0.1, 0.9, "energy-balance", gravity=np.inf, described=True).certain

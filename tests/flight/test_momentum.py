@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 import d2rpick as d2
 from d2rpick.base.errors import FormatError
 from d2rpick.flight.momentum import (
+    _polished,
     all_flights,
     deformable_parts,
     flight_around,
@@ -210,6 +211,14 @@ def test_attached_parts_are_found_among_many() -> None:
     masses = np.array([*np.ones(15), *MASSES, *np.ones(15)])
     found = known(flight_around(Momenta(pair.time, values, parts, EXACT, chosen=(15,), masses=masses), TD))
     assert found.parts == (parts[15], parts[16])
+
+
+def test_a_part_of_next_to_no_mass_is_not_put_in_and_out_for_ever() -> None:
+    """Whether a sum becomes less by it is a matter of rounding."""
+    for seed in range(100):
+        rests = np.random.default_rng(seed).normal(size=(3, 150)) * [[1.0], [1e-20], [0.0]]
+        rests[2] = -rests[1]
+        assert 0 not in _polished(rests, {0}, [0], [0, 1, 2])
 
 
 def test_all_flights_of_a_run_are_listed_and_the_one_around_td_is_taken() -> None:
