@@ -201,6 +201,19 @@ def test_a_load_that_energies_cannot_tell_from_gravity_makes_a_pair_poor() -> No
     assert "by gravity or by another load" in found.quality.told
 
 
+def test_a_momentum_that_stays_while_a_load_works_is_prescribed() -> None:
+    """A couple winds it up, and then it stands: what held its momentum may hold it still."""
+    wound = np.minimum(TIME / 0.4, 1.0) ** 2
+    values = np.full((TIME.size, 1, 3), 2.5)
+    values[0] = 0.0
+    energies = Balance(TIME, 8e3 * wound, np.full(TIME.size, 3.75))
+    whole = Momenta(TIME, values, None, Precision(7), (0,))
+    assert not find_flights(table(TIME, 8e3 * wound, whole, balance=energies), PLAIN)
+    fallen = replace(energies, kinetic=8e3 * (1.5 - wound))
+    (flight,) = find_flights(table(TIME, 8e3 * wound, whole, balance=fallen), PLAIN)
+    assert known(flight.start) == pytest.approx(0.4, abs=0.02)  # two bodies have hit each other
+
+
 def test_what_loses_more_energy_than_its_vibration_has_is_not_damped() -> None:
     """A stiff body that a constant force slows down rings as one oscillator, and it pushes a weak vibration on."""
     ringing = 1e-6 * np.sin(300 * TIME) ** 2
