@@ -14,7 +14,7 @@ from d2rpick.base.errors import D2RPickError
 from d2rpick.choice.cost import CostModel
 from d2rpick.choice.deck_of_run import doubts_of_solver
 from d2rpick.deck import read_inventory
-from d2rpick.deck.driven import driven_deck
+from d2rpick.deck.writing import driven_deck
 from d2rpick.histories.opening import open_run
 from d2rpick.running.drive import JOURNAL, Driven, Driver
 from d2rpick.running.engine import Commands, Solver, alone

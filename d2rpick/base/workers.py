@@ -82,16 +82,12 @@ def answers(farm: Farm, function: Callable[[Item], Result], items: Iterable[Item
         suspects = []
         for future in wait(running, return_when=FIRST_COMPLETED).done:
             number, item = running.pop(future)
-            if isinstance(_error(future), BrokenProcessPool):
+            if not future.cancelled() and isinstance(future.exception(), BrokenProcessPool):
                 suspects.append((number, item))
             else:
                 yield _answer(number, future)
         for number, item in suspects:
             yield _answer(number, farm.alone(function, item))
-
-
-def _error(future: Future[Any]) -> BaseException | None:
-    return None if future.cancelled() else future.exception()
 
 
 def _answer(number: int, future: Future[Any]) -> Finished:

@@ -163,7 +163,8 @@ def _bricks(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
     corners = coordinates[eight]
     volume = np.abs(sum(_below(corners, face) for face in _FACES))
     faces = np.stack([_area(corners[:, list(face)]) for face in _FACES])
-    factor = np.where(_is_tetrahedron(eight), 3.0, 1.0)
+    is_tetrahedron = (eight[:, 3:8] == eight[:, 3:4]).all(axis=1)
+    factor = np.where(is_tetrahedron, 3.0, 1.0)
     return np.asarray(volume), factor * volume / faces.max(axis=0)
 
 
@@ -171,10 +172,6 @@ def _below(corners: Reals, face: tuple[int, int, int, int]) -> Reals:
     """Volumes between the first corner and a face, with sign: together those of the brick, also where nodes repeat."""
     a, b, c, d = face
     return _sixth(corners, (0, a, b, c)) + _sixth(corners, (0, a, c, d))
-
-
-def _is_tetrahedron(nodes: Places) -> Places:
-    return np.asarray((nodes[:, 3:8] == nodes[:, 3:4]).all(axis=1))
 
 
 def _sixth(corners: Reals, four: tuple[int, int, int, int]) -> Reals:

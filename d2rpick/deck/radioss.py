@@ -19,7 +19,7 @@ from d2rpick.deck.radioss_run import Run, find_run_windows, left_rigid
 from d2rpick.deck.reader import cuts, holds_mesh
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from d2rpick.deck.card import Card, Row
     from d2rpick.deck.mesh import Integers
@@ -66,20 +66,16 @@ def read(run: Run) -> Inventory:
     notes = (*_notes(run, cards, starter), *mesh.doubts(starter.parts.keys(), "/"))
     windows = find_run_windows(run).windows.windows if run.legs else ()
     joints = radioss_loads.joints_of(run, starter, cards)
+    switched = run.named if run.legs else {body.node.value for body in starter.bodies}  # all without an engine file
     return Inventory(
         "radioss", _parts(starter, cards, mesh, _always_rigid(windows)), mesh.elements, mesh.coordinates, notes,
         not notes, joints=placed(joints.found, mesh.table), switched=placed(joints.switched, mesh.table),
         ties=joints.unknown, watched=mesh.table.known(_watched(cards)),
         moved=any(card.words[0] == "TRANSFORM" for card in cards), files=tuple(run.deck.sources),
         history_groups=frozenset(number_of(card, -1) for card in cards if card.words[0] == "THPART"),
-        kept_off=kept_off(run.legs), flaws=flaws_of(run, _switched(run, starter)),
+        kept_off=kept_off(run.legs), flaws=flaws_of(run, switched),
         boundary=radioss_loads.read(run, starter, cards).placed(mesh.table), left_rigid=left_rigid(run, windows),
     )  # fmt: skip
-
-
-def _switched(run: Run, starter: Starter) -> Collection[int]:
-    """Main nodes that the legs switch; of all bodies where there is no engine file."""
-    return run.named if run.legs else {body.node.value for body in starter.bodies}
 
 
 def _watched(cards: Sequence[Card]) -> Integers:

@@ -212,7 +212,8 @@ def find_run_windows(run: Run) -> RunWindows:
     sets = tuple(_switches(run.legs)) if in_order(run.legs) else ()
     starter = None if run.starter and run.starter.moved else run.starter
     bodies = {body.node.value: body for body in starter.bodies} if starter else {}
-    switched = {value.value for one in sets for value in _nodes(one) if value.value}
+    lines = [line.part for one in sets for line in one.switched]
+    switched = {part.value for part in lines if part.value and not part.problem}
     sensors = {node for node, body in bodies.items() if body.sensor and node not in switched}
     groups = {node: bodies[node].group for node in (*switched, *sensors) if node in bodies}
     parts = rigid_parts(starter, groups) if starter and groups else {}
@@ -236,10 +237,6 @@ def _switches(legs: list[Leg]) -> Iterator[LegSwitch]:
             lines = tuple(Switched(node, False, rigid) for node in nodes)
             yield LegSwitch(card, "plain", None, lines, nodes, at=at, stop_field=place)
         before = leg
-
-
-def _nodes(one: LegSwitch) -> Iterator[Value[int]]:
-    return (line.part for line in one.switched if not line.part.problem)
 
 
 def _units(node: int, parts: dict[int, set[int]]) -> list[Unit]:

@@ -98,7 +98,8 @@ class Folders:
     def find(self, name: Field) -> str | None:
         """Path of the include as messages should show it, or None."""
         for folder in (self._main, *self._paths, Path(name.file).parent):
-            for spelling in (name.text, _portable(name.text), _recoded(name.text)):
+            # the last has the bytes taken as the file system takes them, not as Latin-1
+            for spelling in (name.text, _portable(name.text), os.fsdecode(name.text.encode("latin-1", "replace"))):
                 path = str(folder / spelling)
                 if spelling and os.path.isfile(path):  # noqa: PTH113 - Path.is_file raises on names too long
                     return path
@@ -107,11 +108,6 @@ class Folders:
 
 def _portable(name: str) -> str:
     return name.replace("\\", "/")
-
-
-def _recoded(name: str) -> str:
-    """Return the name with its bytes taken as the file system takes them, not as Latin-1."""
-    return os.fsdecode(name.encode("latin-1", "replace"))
 
 
 _KEPT: Final = (

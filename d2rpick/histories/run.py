@@ -196,7 +196,8 @@ class Run:
             raise FormatError(f"{self.name}: no states; did the run reach its first output?")
         if selection.parts:
             chosen = select_parts(selection.parts, self._holder().parts, self.name)
-            springs = self.springs if selection.springs is None else _numbered(selection.springs, self.parts)
+            named = selection.springs
+            springs = self.springs if named is None else tuple(part for part in self.parts if str(part.id) in named)
             return self._of_parts(chosen, springs)
         if selection.energy:
             return self._of_channels(selection.energy)
@@ -335,10 +336,6 @@ def _median_of_some(values: Samples) -> Samples:
 
 def _left_out(springs: str) -> str:
     return f"the energy of {springs} was left out: that of springs holds what their dampers take and never give back"
-
-
-def _numbered(ids: Sequence[str], parts: Sequence[Part]) -> tuple[Part, ...]:
-    return tuple(part for part in parts if str(part.id) in ids)
 
 
 def _with_terms(history: History, names: Sequence[str], energies: Samples) -> History:

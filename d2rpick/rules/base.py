@@ -142,11 +142,11 @@ class Case:
 
     @cached_property
     def end(self) -> float | None:
-        """ENDTIM [time of the deck], where it is known and positive."""
-        cards = self.deck.named("CONTROL_TERMINATION")
+        """The end of the run [time of the deck], where it is known and positive."""
         if self.end_time is None or self.end_time.problem or not self.end_time.value > 0:
             return None
-        return self.end_time.value * cards[-1].transform.time
+        factors = [card.transform.time for card in self.deck.named("CONTROL_TERMINATION")]  # none in Radioss
+        return self.end_time.value * (factors[-1] if factors else 1.0)
 
     @cached_property
     def unread(self) -> Sequence[Unread]:
@@ -209,12 +209,6 @@ class RunCase(Case):
     def end_time(self) -> Value[float] | None:
         """The end of the last leg as written."""
         return self.run.legs[-1].stop if self.run.legs else None
-
-    @cached_property
-    def end(self) -> float | None:
-        """The end of the last leg [time of the run], where it is known and positive."""
-        stop = self.end_time
-        return stop.value if stop and not stop.problem and stop.value > 0 else None
 
     @cached_property
     def unread(self) -> Sequence[Unread]:

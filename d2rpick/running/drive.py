@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.base.errors import D2RPickError
 from d2rpick.base.files import write_whole
 from d2rpick.choice.warnings import Caution
-from d2rpick.deck.driven import RESTARTS
+from d2rpick.deck.writing import RESTARTS, DrivenDeck
 from d2rpick.running.sequence import LOAD, RIGID, SEARCH, Leg, Order, Seen, control, next_order, window_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
-    from d2rpick.deck.driven import DrivenDeck
     from d2rpick.histories.run import Run
     from d2rpick.running.engine import Commands, Left, Solver
     from d2rpick.running.journal import Journal

@@ -80,7 +80,7 @@ def is_whole(field: str, above: Sequence[str]) -> bool:
     if above and _significant(field) == _LONGEST == max(_LONGEST, *map(_significant, above)):
         return re.fullmatch(_PLAIN, field, re.ASCII) is not None
     parts = [_PARTS.fullmatch(text) for text in (field, *above)]
-    shapes = {(len(part[2]), _exponent_width(part[3])) for part in parts if part}
+    shapes = {(len(part[2]), len((part[3] or "").lstrip("+-"))) for part in parts if part}
     if None in parts or len(shapes) != 1:
         return False
     decimals, width = shapes.pop()
@@ -112,10 +112,6 @@ def _is_finer_than_its_grid(decimals: int, moments: Samples) -> bool:
     steps = np.diff(moments)
     coarser = float(steps[0]) * 10.0 ** (decimals - 1)
     return bool(np.ptp(steps) <= 1e-9 * abs(steps[0])) and abs(coarser - round(coarser)) <= 1e-6 * abs(coarser)
-
-
-def _exponent_width(exponent: str | None) -> int:
-    return len(exponent.lstrip("+-")) if exponent else 0
 
 
 # A restarted run goes on with its output interval; another curve or an unsorted table has another one.
