@@ -248,4 +248,4 @@ def test_a_real_chain_of_two_modes_is_refused(channel: str) -> None:
 
 def test_a_parameter_that_changes_next_to_nothing_leaves_no_overflow() -> None:
     jacobian = np.stack([np.ones(30), np.linspace(0, 1, 30), np.full(30, 1e-155)])
-    assert np.all(np.isfinite(_covariance(jacobian, np.linspace(-1, 1, 30))))
+    assert np.all(np.isfinite(_covariance(jacobian @ jacobian.T, np.linspace(-1, 1, 30))))
