@@ -10,7 +10,6 @@ import numpy as np
 
 from d2rpick.flight.internal_energy import landing_after, moves_as_a_whole, quiet_time, settled_from
 from d2rpick.flight.window import SHORTEST, all_windows, marks, unheld
-from d2rpick.histories.samples import window
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -311,8 +310,8 @@ def _keeping_level(history: History, flight: FreeFlight | None, td: float) -> Fr
     if start is None or start > td or flight.end - start < SHORTEST * (time[-1] - time[0]):
         return None
     if whole is not None and not flight.gravity:
-        before = whole[window(time, flight.start, start)]
-        if float((before - np.minimum.accumulate(before)).max(initial=0.0)) > MOST_WORK * float(np.abs(energy).max()):
+        first, last = np.interp((flight.start, start), time, whole)
+        if last - first > MOST_WORK * float(np.abs(energy).max()):
             return None  # forces that cancel worked on it, as where it is held and moved, and they may still act
     return flight._replace(start=start)
 
