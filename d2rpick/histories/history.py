@@ -366,8 +366,9 @@ class History:
 
 
 def rows_of(record: Record, states: slice | NDArray[np.bool_]) -> Record:
-    """Give some states of a record alone: of all its arrays of as many rows as it has times."""
-    values, size = {one.name: getattr(record, one.name) for one in fields(record) if one.init}, record.time.size
+    """Give some states of a record alone: of all its arrays of as many rows as it has times, but masses of parts."""
+    names, size = {one.name for one in fields(record) if one.init} - {"masses"}, record.time.size
+    values = {name: getattr(record, name) for name in names}
     rows = {name: one[states] for name, one in values.items() if isinstance(one, np.ndarray) and len(one) == size}
     return replace(record, **rows)  # type: ignore[arg-type]
 

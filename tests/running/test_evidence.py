@@ -11,6 +11,8 @@ import pytest
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.situation import Settings
 from d2rpick.choice.windows import bounds, flights_of
+from d2rpick.histories.history import EXACT, Momenta, rows_of
+from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.running.evidence import contact_after, highest_energy, quiet_times
 from d2rpick.running.wait import InnerMotion, Wait
@@ -123,3 +125,10 @@ def test_a_flight_that_rises_says_when_it_is_level_again() -> None:
     assert one.level is not None
     assert one.level - one.start == pytest.approx(0.31, rel=0.02)
     assert all(q.level is None for q in quiet_times(record(BOX), InnerMotion(record(BOX))) if q.start < 0.6)
+
+
+def test_a_record_of_as_many_states_as_parts_keeps_the_masses_of_all() -> None:
+    """Three states of three parts: cut to two states, each part still has its mass."""
+    parts = tuple(Part(number, str(number)) for number in (1, 2, 3))
+    momenta = Momenta(np.arange(3.0), np.ones((3, 3, 3)), parts, EXACT, (0, 1, 2), masses=np.array([1.0, 2.0, 3.0]))
+    assert rows_of(momenta, slice(0, 2)).mass((0, 1, 2)) == 6.0
