@@ -323,7 +323,7 @@ class FreeFall(Law):
         super().__init__(time)
         self.momentum = momentum
         self.integral = integral(time, momentum)
-        self._both = np.hstack([momentum, self.integral])
+        self._both = np.asfortranarray(np.hstack([momentum, self.integral]))  # columns lie whole: windows are long
 
     def _misfit(self, first: int, last: int) -> float:
         if last - first < 3:  # three numbers per component fit any three states
@@ -345,6 +345,7 @@ class FreeFall(Law):
     def _fitted(self, first: int, last: int) -> tuple[Samples, Samples, float]:
         """What is not straight of momentum and impulse, and the alpha >= 0 that explains the one by the other."""
         states = slice(first, last + 1)
-        p, impulse = np.hsplit(bent(self.time[states], self._both[states]), 2)
-        power = float(np.sum(impulse**2))
-        return p, impulse, max(0.0, -float(np.sum(impulse * p)) / power) if power > 0 else 0.0
+        rest, half = bent(self.time[states], self._both[states]), self.momentum.shape[1]
+        p, impulse = rest[:, :half], rest[:, half:]
+        power = float((impulse * impulse).sum())
+        return p, impulse, max(0.0, -float((impulse * p).sum()) / power) if power > 0 else 0.0

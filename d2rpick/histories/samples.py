@@ -50,7 +50,7 @@ def bent(time: Samples, values: Samples) -> Samples:
     """
     t = time - time.sum() / time.size  # as mean(), which is slow for few
     centred = values - values.sum(axis=0) / time.size
-    centred -= t[:, np.newaxis] * (t @ centred / (t @ t))
+    centred -= np.outer(t @ centred / (t @ t), t).T
     return np.asarray(centred)
 
 

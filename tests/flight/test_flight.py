@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -35,7 +36,8 @@ def moved(force: Callable[[float], float], end: float, *, alpha: float) -> Histo
     return table(time, 330e3 * (found.y[1] - found.y[0]) ** 2)
 
 
-def loaded(*, alpha: float = 50.0, noise: float = 0.0, seed: int = 0, contact: float = np.inf) -> History:
+@cache
+def pushed(alpha: float, contact: float) -> History:
     """Under a half-sine force of 20 ms, and under another one from ``contact`` on."""
 
     def force(t: float) -> float:
@@ -43,7 +45,12 @@ def loaded(*, alpha: float = 50.0, noise: float = 0.0, seed: int = 0, contact: f
             return 5000.0 * math.sin(np.pi * min(t - contact, 0.02) / 0.02)
         return 2000.0 * math.sin(np.pi * t / 0.02) if t < 0.02 else 0.0
 
-    history = moved(force, 0.15, alpha=alpha)
+    return moved(force, 0.15, alpha=alpha)
+
+
+def loaded(*, alpha: float = 50.0, noise: float = 0.0, seed: int = 0, contact: float = np.inf) -> History:
+    """The same, with white noise."""
+    history = pushed(alpha, contact)
     return table(history.time, noisy(history.energy, noise, seed))
 
 
