@@ -42,6 +42,13 @@ def new_files(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(time, "sleep", lambda _: None)
 
 
+@pytest.fixture
+def by_level(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Judge by the energy level alone on the command line: looking for a vibration takes most of its time."""
+    for command in ("SUGGEST", "VERIFY", "PLAN", "EXPLORE", "PARTS"):
+        monkeypatch.setenv(f"D2RPICK_{command}_NO_VERIFY", "1")
+
+
 pytest_plugins = ["tests.alone"]
 
 # Looking for garbage as often as Python does by itself takes a tenth of the time of all tests.

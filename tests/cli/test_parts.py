@@ -15,6 +15,8 @@ from tests.command import OSCILLATOR, answer, codes, run
 from tests.json_schemas import check_by_schema
 from tests.records import ENERGY, TIME
 
+pytestmark = pytest.mark.usefixtures("by_level")
+
 BOX, STEP, SLED = ({"id": i, "title": title} for i, title in enumerate(("box", "step", "sled"), start=1))
 
 

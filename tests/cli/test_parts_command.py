@@ -15,6 +15,8 @@ from tests.command import ROOT, answer, run
 from tests.json_schemas import check_by_schema
 from tests.sample_deck import DECK
 
+pytestmark = pytest.mark.usefixtures("by_level")
+
 BOX = str(ROOT / "sample_data" / "rollover_box.matsum")
 ENERGY = str(ROOT / "sample_data" / "energy.csv")
 WITH_DECK = ("--deck", str(DECK), BOX)
