@@ -134,7 +134,8 @@ THREADED = ("deck", "elements")  # what is asked of one file does not depend on 
 @pytest.mark.parametrize(
     ("case", "size", "change"),
     [
-        *((case, size, change) for case in CASES for size in ("small", "big") for change in CHANGES),
+        *((case, "big", change) for case in CASES for change in CHANGES),
+        *((case, "small", cut) for case in CASES),
         *((case, "big, by threads", change) for case in THREADED for change in (cut, replace)),
     ],
 )
