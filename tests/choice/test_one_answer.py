@@ -1,6 +1,7 @@
 """One question has one answer: pairs, windows and flights that are named are those that another command finds there."""
 
 import re
+from dataclasses import replace
 from html import unescape
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ from tests.drops import drop, written
 from tests.energies import codes, of, sure
 
 PLAIN = Settings()
+LEVEL = Settings(replay=False)  # no oscillator describes the box, and none is sought
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +78,7 @@ def test_a_start_that_is_read_does_not_lie_before_the_flight() -> None:
 
 
 def test_a_td_that_is_read_keeps_the_margin(box: Reference) -> None:
-    asked = Settings(margin=0.0123456789, replay=False)
+    asked = replace(LEVEL, margin=0.0123456789)
     for row in plan_of(box, asked).flights:
         if row.window:
             assert read_again(box.history, *row.window, asked).verified
@@ -92,19 +94,20 @@ def test_every_tr_of_the_windows_that_are_read_verifies() -> None:
 
 
 def test_a_plan_begins_a_flight_where_the_load_is_said_to_end(box: Reference) -> None:
-    second = plan_of(box, PLAIN).flights[1]
+    second = plan_of(box, LEVEL).flights[1]
     after = (second.start + second.end) / 2
-    (row,) = (one for one in plan_of(box, Settings(after=after)).flights if one.number == second.number)
+    asked = replace(LEVEL, after=after)
+    (row,) = (one for one in plan_of(box, asked).flights if one.number == second.number)
     assert row.window
-    flight = verify(box.history, *row.window, Settings(after=after)).situation.flight
+    flight = verify(box.history, *row.window, asked).situation.flight
     assert (row.flight.start, row.flight.end, row.flight.source) == (after, flight.end, flight.source)
     assert row.margin.time == pytest.approx(0.03 * (second.end - after))
     assert row.window[1] <= row.end - row.margin.time
 
 
 def test_verify_and_check_name_the_same_ends_of_a_flight(box: Reference) -> None:
-    asked = Settings(margin=0.01)
-    flight = plan_of(box, PLAIN).flights[1]
+    asked = replace(LEVEL, margin=0.01)
+    flight = plan_of(box, LEVEL).flights[1]
     verdict = verify(box.history, flight.start + 0.005, flight.end - 0.005, asked)
     reasons = [reason for reason in verdict.reasons if "with the margin" in reason]
     told = [fault.message for fault in faults_of(verdict) if fault.rule == "D2R204"]
@@ -115,7 +118,7 @@ def test_verify_and_check_name_the_same_ends_of_a_flight(box: Reference) -> None
 
 @pytest.mark.parametrize("margin", [None, 0.01])
 def test_the_last_td_that_is_named_lies_in_the_flight(box: Reference, margin: float | None) -> None:
-    asked, flights = Settings(margin=margin), plan_of(box, PLAIN).flights
+    asked, flights = replace(LEVEL, margin=margin), plan_of(box, LEVEL).flights
     answer = suggest(box.history, (flights[1].end + flights[2].start) / 2, asked)
     (message,) = (one.message for one in answer.cautions if one.code == "no-free-flight")
     found = sure(re.search(r"its last td is (\S+)$" if margin else r"to (\S+); td must lie in it$", message))
@@ -200,7 +203,7 @@ def test_a_plan_keeps_the_margin_that_it_lists(tmp_path: Path) -> None:
     energy = np.sin(omega[0] * time + phase[0]) ** 2 + 0.5 * np.sin(omega[1] * time + phase[1]) ** 2 + 0.6
     file = tmp_path / "energy.csv"
     save(file, time, energy)
-    rows = [row for row in plan_of(read([str(file)]), Settings(replay=False)).flights if row.window and row.flight.end]
+    rows = [row for row in plan_of(read([str(file)]), LEVEL).flights if row.window and row.flight.end]
     assert rows
     for row in rows:
         assert sure(row.window)[1] <= row.end - row.margin.time
@@ -210,7 +213,7 @@ def test_a_crossing_at_the_start_of_the_flight_may_be_typed_as_it_is_read() -> N
     time = 0.10005206614732742 + np.linspace(0, 1, 401)
     history = of(1 + np.sin(40 * (time - time[60])) ** 2, time)
     start = float(time[60])
-    asked = Settings(after=start, replay=False)
+    asked = replace(LEVEL, after=start)
     assert as_read(start) < start
     for tr in (start, as_read(start)):
         verdict = verify(history, tr, float(time[60] + np.pi / 10), asked)

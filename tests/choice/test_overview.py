@@ -82,9 +82,7 @@ def test_info_lists_all_flights_of_the_parts_asked_for() -> None:
     [
         (str(ROOT / "sample_data/rollover_box.matsum"), "--part", "box"),
         (str(ROOT / "sample_data/rollover_box.glstat"),),
-        (str(ROOT / "sample_data/rolloverT01.gz"), "--part", "box"),
         (ENERGY,),
-        (ROLLOVER, "--energy", "stepIE_J"),
     ],
 )
 def test_info_lists_the_flights_that_plan_and_suggest_choose_from(args: tuple[str, ...]) -> None:
@@ -274,6 +272,6 @@ def test_rigid_legs_are_called_so_and_raise_no_alarm(names: tuple[str, ...], whe
     assert {flight["source"] for flight in found["flights"]} == {"momentum"}
 
 
-@pytest.mark.parametrize("name", ["tests/data/carT01.gz", "sample_data/rolloverT01.gz", "tests/data/drop2T01.gz"])
+@pytest.mark.parametrize("name", ["tests/data/carT01.gz", "tests/data/drop2T01.gz"])
 def test_deformable_legs_are_not_called_rigid(name: str) -> None:
     assert "rigid-legs" not in {one["code"] for one in info(str(ROOT / name))["warnings"]}

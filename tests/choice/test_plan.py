@@ -21,7 +21,7 @@ from tests.computed import stored
 from tests.drops import drop, written
 from tests.energies import sure
 
-PLAIN = Settings()
+PLAIN = Settings(replay=False)  # no oscillator describes these runs, and none is sought
 BOX = Selection(parts=("box",))
 
 
@@ -83,7 +83,7 @@ def test_windows_keep_their_margin_and_follow_each_other(plan: Plan) -> None:
 
 
 def test_a_margin_that_is_given_overrules(reference: Reference) -> None:
-    given = plan_of(reference, Settings(margin=0.02))
+    given = plan_of(reference, replace(PLAIN, margin=0.02))
     assert {row.margin.time for row in given.flights} == {0.02}
     assert given.flights[0].window == pytest.approx((0.02, given.flights[0].end - 0.02), abs=1e-9)
 
@@ -99,7 +99,7 @@ def test_short_windows_are_left_out_with_the_reason(reference: Reference) -> Non
 
 def test_after_counts_in_its_flight_alone(reference: Reference, plan: Plan) -> None:
     second = plan.flights[1]
-    found = plan_of(reference, Settings(after=(second.start + second.end) / 2))
+    found = plan_of(reference, replace(PLAIN, after=(second.start + second.end) / 2))
     assert found.flights[0].status == "left-out"
     assert found.flights[1].window is None or found.flights[1].window[0] >= (second.start + second.end) / 2
     assert [row.window for row in found.flights[2:]] == [row.window for row in plan.flights[2:]]
@@ -159,7 +159,7 @@ def test_where_nothing_vibrates_td_lies_as_late_as_the_margin_allows(reference: 
     flight = resting[0].flight
     cut = reference.history.between(0, 0.9 * (flight.end or 0))[0].size  # a record that ends before the landing
     short = replace(reference.history, time=reference.history.time[:cut], energy=reference.history.energy[:cut])
-    found = sure(suggest_in_window(short, (0.0, float(short.time[-1])), Settings(after=0.0)).recommended)
+    found = sure(suggest_in_window(short, (0.0, float(short.time[-1])), replace(PLAIN, after=0.0)).recommended)
     assert short.time[-3] < found.td <= short.time[-2]
 
 
@@ -219,7 +219,7 @@ def test_flights_of_the_energy_alone_end_before_the_next_begins(tmp_path: Path) 
     rows = zip(record.time.tolist(), record.internal_energy[:, 0].tolist(), strict=True)
     table = tmp_path / "energy.csv"
     table.write_text("time,internal_energy\n" + "".join(f"{t!r},{energy!r}\n" for t, energy in rows))
-    found = plan_of(read([str(table)]), Settings(replay=False))
+    found = plan_of(read([str(table)]), PLAIN)
     assert len(found.flights) == 3
     assert all(one.end < other.start for one, other in pairwise(found.flights))
     windows = found.all_windows
@@ -242,26 +242,26 @@ def bouncing(seed: int, folder: Path) -> list[str]:
     return [str(table)]
 
 
-@settings(max_examples=20)
+@settings(max_examples=8)
 @given(seed=st.integers(0, 100_000))
 @example(seed=204)  # at the end of this flight the energy shows none
 def test_a_window_of_the_energy_alone_lies_in_its_flight(seed: int, tmp_path_factory: pytest.TempPathFactory) -> None:
     """The energy shows another beginning of the flight to each td; a window began before the flight of its row."""
-    reference, asked = read(bouncing(seed, tmp_path_factory.getbasetemp())), Settings(replay=False)
-    plan = plan_of(reference, asked)
+    reference = read(bouncing(seed, tmp_path_factory.getbasetemp()))
+    plan = plan_of(reference, PLAIN)
     for row in plan.flights:
         assert row.window is None or first_as_read(row.start) <= row.window[0] < row.window[1] <= row.end
     assert all(one.end <= other.start for one, other in pairwise(plan.flights))
     if len(plan.flights) == 1 and plan.flights[0].window:
-        alone = sure(suggest_of(reference, None, asked).recommended)
+        alone = sure(suggest_of(reference, None, PLAIN).recommended)
         assert plan.flights[0].window == (alone.tr, alone.td)
 
 
-@pytest.mark.parametrize("seed", [33, 40, 72, 77])
+@pytest.mark.parametrize("seed", [33, 72])
 def test_no_other_td_of_a_flight_reaches_back_beyond_a_landing(seed: int, tmp_path: Path) -> None:
     """The page of a plan offered pairs that were rigid while the flight before had not landed."""
     reference = read(bouncing(seed, tmp_path))
-    plan = plan_of(reference, Settings(replay=False))
+    plan = plan_of(reference, PLAIN)
     landings = {row.number: row.end for row in plan.flights}
     rows = [row for row in plan.flights if row.window]
     for row, found in zip(rows, explored_flights(reference, plan), strict=True):

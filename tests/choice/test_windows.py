@@ -148,7 +148,7 @@ def check(answer: Suggestion, seed: int) -> None:
         assert error_at(profile, t) == pytest.approx(error, abs=1e-3)
 
 
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(
     omega=st.floats(150, 400), alpha=st.floats(0, 60), phase=st.floats(0, np.pi), td=st.floats(0.04, 0.14),
     tolerance=st.floats(0.001, 1.0), plastic=st.sampled_from([0.0, 3.0]), preload=st.sampled_from([0.0, 2.0]),
@@ -165,7 +165,7 @@ def test_windows_of_an_oscillator_hold_what_verifies(
 
 
 @example(energy=[0, 1, 0, -1, 1], share=1.0, tolerance=1.0, after=0.0, seed=60, uneven=False, margin=0.0)
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(
     energy=st.lists(st.floats(-1, 100), min_size=5, max_size=60), share=st.floats(0.3, 1.0),
     tolerance=st.floats(0.01, 1.0), after=st.none() | st.floats(0.0, 0.5), seed=st.integers(0, 2**16),
@@ -181,15 +181,14 @@ def test_windows_of_any_energy_hold_what_verifies(
     check(suggest(history, share, asked), seed)
 
 
-@pytest.mark.parametrize("tolerance", [0.05, 0.2, 0.6])
+@pytest.mark.parametrize("tolerance", [0.05, 0.6])
 def test_windows_of_a_record_with_noise_and_of_a_real_one_hold_what_verifies(tolerance: float) -> None:
     record = History(TIME, noisy(ENERGY, 0.002, 5), ("noisy",), "made", "energy")
     rollover = read_history([ROLLOVER], Selection(energy=("boxIE_J",)))
     for history, td in ((record, TD), (rollover, 0.37)):
-        for replay in (True, False):
-            answer = suggest(history, td, Settings(tolerance=tolerance, replay=replay))
-            assert len(windows_of(answer))
-            check(answer, 1)
+        answer = suggest(history, td, Settings(tolerance=tolerance, replay=tolerance < 0.5))
+        assert len(windows_of(answer))
+        check(answer, 1)
 
 
 @pytest.mark.parametrize("td", [chain.TD_PEAK, chain.TD_LATE])
@@ -256,7 +255,7 @@ def test_what_is_alike_reaches_as_far_as_the_timing_tolerance_and_no_error_in_it
 
 
 def test_a_profile_is_short_where_the_error_is_smooth() -> None:
-    time = np.linspace(0, 0.15, 100_001)
+    time = np.linspace(0, 0.15, 10_001)
     answer = suggest(History(time, MODE.energy(time), ("fine",), "made", "energy"), 0.0687534, Settings())
     windows = windows_of(answer)
     profile = error_profile(answer.situation, answer.candidates, windows)
