@@ -73,12 +73,12 @@ def test_the_library_and_the_command_line_say_the_same(
         ({"parts": "box"}, ("--part", "box")),
         ({"parts": [1, "2"], "flying": (1, 2)}, ("--part", "1", "--part", "2", "--flying", "1", "--flying", "2")),
         ({"parts": 1, "after": 0.1, "tolerance": 0.1}, ("--part", "1", "--after", "0.1", "--tolerance", "0.1")),
-        ({"parts": "box", "replay": False, "cost_share": 0.8}, ("--part", "1", "--no-verify", "--cost-share", "0.8")),
+        ({"parts": "box", "cost_share": 0.8}, ("--part", "1", "--cost-share", "0.8")),
     ],
 )
 def test_arguments_mean_what_options_mean(arguments: dict[str, Any], options: tuple[str, ...]) -> None:
-    found = d2.suggest(d2.read(BOX), td=0.37, **arguments)
-    same(found.to_dict(), answer("suggest", "--td", "0.37", *options, BOX))
+    found = d2.suggest(d2.read(BOX), td=0.37, replay=False, **arguments)
+    same(found.to_dict(), answer("suggest", "--td", "0.37", "--no-verify", *options, BOX))
 
 
 @pytest.mark.parametrize(
@@ -148,15 +148,15 @@ def test_the_command_of_an_answer_asks_the_same() -> None:
 def test_tables_lose_nothing_that_the_json_has(tmp_path: Path) -> None:
     """Of a part the shares in each flight, of a td what stands for itself beside the row: lists are no cells."""
     run = d2.read(BOX)
-    plan, parts = d2.plan(run, parts="box"), d2.parts(run, deck=SAMPLE_DECK)
+    plan, parts = d2.plan(run, parts="box", replay=False), d2.parts(run, deck=SAMPLE_DECK, replay=False)
     holds(plan.to_frame(), plan.to_dict()["windows"])
     holds(parts.to_frame(), parts.to_dict()["parts"], but=["flights"])
     holds(parts.sets_frame(), parts.to_dict()["sets"])
-    study = d2.study([BOX, tmp_path / "absent"], td=0.37)
+    study = d2.study([BOX, tmp_path / "absent"], td=0.37, replay=False)
     holds(study.to_frame(), study.to_dict()["runs"])
     findings = d2.check(DECK, history=d2.read(GLSTAT))
     holds(findings.to_frame(), findings.to_dict()["findings"])
-    explored = d2.explore(run, parts="box", steps=10)
+    explored = d2.explore(run, parts="box", steps=4, replay=False)
     lists = ["quality_reasons", "acceptable_windows", "expected"]
     holds(explored.to_frame(), explored.to_dict()["offers"], but=lists)
 
@@ -168,7 +168,7 @@ def test_a_table_of_a_run_holds_its_energies() -> None:
     assert every.index.name == "time"
     assert every.attrs["titles"][1] == "box"
     pd.testing.assert_series_equal(every[1], box[1])
-    assert d2.suggest(run, 0.37, parts="box").situation.history.energy == pytest.approx(box[1].to_numpy())
+    assert d2.suggest(run, 0.37, parts="box", replay=False).situation.history.energy == pytest.approx(box[1].to_numpy())
 
 
 def test_a_frame_is_the_file_it_would_be() -> None:
@@ -311,8 +311,9 @@ def test_a_run_is_shown_by_what_its_files_hold(tmp_path: Path) -> None:
 
 def test_a_notebook_shows_a_sentence_a_small_table_and_the_picture() -> None:
     run, energy = d2.read(MATSUM), d2.read(ENERGY)
-    chosen, plan, parts = d2.suggest(run, 0.37, parts=1), d2.plan(run, parts=1), d2.parts(run)
-    explored, verdict = d2.explore(energy, td_window=(0.06, 0.07), steps=30), d2.verify(energy, 0.01, 0.064)
+    of_box: Any = {"parts": 1, "replay": False}
+    chosen, plan, parts = d2.suggest(run, 0.37, **of_box), d2.plan(run, **of_box), d2.parts(run, replay=False)
+    explored, verdict = d2.explore(energy, td_window=(0.06, 0.07), steps=6), d2.verify(energy, 0.01, 0.064)
     study = d2.study([ENERGY] * 20 + ["<b>absent.csv"], 0.064)
     answers: list[Any] = [chosen, plan, parts, explored, verdict, study]
     for one in (run, *answers):
@@ -358,7 +359,7 @@ def test_cards_are_those_of_the_command_line() -> None:
 
 
 def test_no_pair_is_no_card() -> None:
-    found = d2.suggest(d2.read(MATSUM), 0.41, parts=1)
+    found = d2.suggest(d2.read(MATSUM), 0.41, parts=1, replay=False)
     assert found.recommended is None
     assert found.card() is None
 
@@ -385,7 +386,7 @@ def test_a_wrong_option_of_a_card_is_named(options: dict[str, Any], error: type[
 
 
 def test_a_figure_shows_itself() -> None:
-    figure: Any = d2.plan(d2.read(MATSUM), parts=1).plot()
+    figure: Any = d2.plan(d2.read(MATSUM), parts=1, replay=False).plot()
     assert figure._repr_png_().startswith(b"\x89PNG")
 
 

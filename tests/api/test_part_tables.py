@@ -15,21 +15,22 @@ BOX = str(ROOT / "sample_data" / "rollover_box.matsum")
 
 
 def test_the_same_as_the_command() -> None:
-    found = d2.parts(d2.read(BOX), deck=DECK, td=0.37)
+    found = d2.parts(d2.read(BOX), deck=DECK, td=0.37, replay=False)
     assert found.to_dict() == answer(*found.command) | {"command": list(found.command)}
     assert json.loads(found.to_json()) == found.to_dict()
     assert found.recommended is not None
     assert found.to_frame()["verdict"].tolist() == ["switch", "merge", "keep"]
     sets = found.sets_frame()
     assert sets["recommended"].tolist() == [one.recommended for one in found.sets]
-    planned = d2.plan(d2.read(BOX), parts=found.recommended.parts, cost_share=found.recommended.cost_share)
-    assert planned.windows
+    by_set: Any = {"parts": found.recommended.parts, "cost_share": found.recommended.cost_share}
+    assert d2.plan(d2.read(BOX), replay=False, **by_set).windows
 
 
 def test_weights_may_be_given_as_they_are(tmp_path: Path) -> None:
-    found = d2.parts(d2.read(BOX), deck=DECK, weights=Weights({"BT": 1.0, "QBAT": 1.0}, rigid_node=0.0), step_ratio=2.0)
+    weights = Weights({"BT": 1.0, "QBAT": 1.0}, rigid_node=0.0)
+    found = d2.parts(d2.read(BOX), deck=DECK, weights=weights, step_ratio=2.0, replay=False)
     assert found.rows[0].cost_share == pytest.approx(94 / 109)
-    assert d2.parts(d2.read(BOX), deck=DECK, given=2).sets[-1].parts == (2,)
+    assert d2.parts(d2.read(BOX), deck=DECK, given=2, replay=False).sets[-1].parts == (2,)
     page = found.report(tmp_path / "parts.html").read_text("utf-8")
     assert "all that may" in page
     assert "<h1>Parts to switch: rollover box</h1>" in page
@@ -42,7 +43,7 @@ def test_weights_in_memory_are_not_left_out_of_the_command_line() -> None:
     asked: Any = {"parts": "recommended", "deck": DECK, "weights": weights, "replay": False}
     read = d2.read(BOX)
     answers: list[Any] = [
-        d2.parts(read, deck=DECK, weights=weights), d2.plan(read, **asked), d2.suggest(read, **asked),
+        d2.parts(read, deck=DECK, weights=weights, replay=False), d2.plan(read, **asked), d2.suggest(read, **asked),
         d2.verify(read, 0.097, 0.37, **asked), d2.explore(read, td_window=(0.3, 0.37), steps=2, **asked),
     ]  # fmt: skip
     for one in answers:
@@ -52,9 +53,10 @@ def test_weights_in_memory_are_not_left_out_of_the_command_line() -> None:
 
 def test_explore_takes_a_deck_as_suggest_does() -> None:
     read = d2.read(BOX)
-    found = d2.explore(read, td=0.36, td_window=(0.3, 0.37), steps=5, parts="recommended", deck=DECK)
+    asked: Any = {"td_window": (0.3, 0.37), "parts": "recommended", "deck": DECK, "replay": False}
+    found = d2.explore(read, td=0.36, steps=5, **asked)
     assert found.to_dict() == answer(*found.command) | {"command": list(found.command)}
-    chosen = d2.suggest(read, td_window=(0.3, 0.37), parts="recommended", deck=DECK)
+    chosen = d2.suggest(read, **asked)
     best = next(one for one in chosen.candidates if one.recommended)
     assert found.recommended is not None
     assert (found.recommended.tr, found.recommended.td) == (best.tr, chosen.td)

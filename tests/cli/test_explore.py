@@ -11,11 +11,11 @@ import pandas as pd
 import pytest
 
 import d2rpick as d2
-from tests.command import BOX, ENERGY, ROOT, answer, run
+from tests.command import ENERGY, ROOT, answer, run
 from tests.json_schemas import check_by_schema
 
 MATSUM = str(ROOT / "sample_data" / "rollover_box.matsum")
-WINDOW = ("--td-window", "0.06", "0.07", "--steps", "20")
+WINDOW = ("--td-window", "0.06", "0.07", "--steps", "10")
 SCHEMA = json.loads((ROOT / "d2rpick/schemas/explore-1.json").read_text("utf-8"))
 
 
@@ -24,8 +24,7 @@ SCHEMA = json.loads((ROOT / "d2rpick/schemas/explore-1.json").read_text("utf-8")
     [
         (WINDOW, (), ENERGY),
         ((*WINDOW, "--td", "0.064"), ("--cost-share", "0.8"), ENERGY),
-        (("--steps", "6"), ("--part", "box"), MATSUM),
-        (("--steps", "3"), ("--part", "box", "--strict", "--max-residual", "0.1"), BOX),
+        (("--steps", "2"), ("--part", "box", "--strict", "--max-residual", "0.1"), MATSUM),
     ],
 )
 def test_the_json_keeps_its_schema_and_every_offer_is_what_suggest_says(
@@ -36,7 +35,7 @@ def test_the_json_keeps_its_schema_and_every_offer_is_what_suggest_says(
     offers = found["offers"]
     assert offers[0].keys() == SCHEMA["properties"]["offers"]["items"]["properties"].keys()
     assert all(low["td"] < high["td"] for low, high in pairwise(offers))
-    for one in offers[:: max(1, len(offers) // 5)]:
+    for one in offers[:: max(1, len(offers) // 3)]:
         alone = answer("suggest", "--td", repr(one["td"]), *options, source)
         best = next((c for c in alone["candidates"] if c["recommended"]), None)
         assert (one["tr"], one["td"]) == (best and best["tr"], alone["td"])
@@ -89,7 +88,7 @@ def test_every_form_has_the_same_offers(tmp_path: Path) -> None:
     rows = list(csv.DictReader(io.StringIO(run("explore", *WINDOW, "-f", "csv", ENERGY).stdout)))
     assert [float(row["td"]) for row in rows] == [one["td"] for one in found]
     assert [float(row["residual"]) for row in rows] == [one["residual"] for one in found]
-    frame = d2.explore(d2.read(ENERGY), td_window=(0.06, 0.07), steps=20).to_frame()
+    frame = d2.explore(d2.read(ENERGY), td_window=(0.06, 0.07), steps=10).to_frame()
     assert frame["td"].tolist() == [one["td"] for one in found]
     assert frame["unbeaten"].tolist() == [one["unbeaten"] for one in found]
     table = run("explore", *WINDOW, "--limit", "3", ENERGY).stdout

@@ -105,8 +105,7 @@ def box(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return files
 
 
-@pytest.mark.parametrize("suffix", ["csv", "h5"])
-@pytest.mark.parametrize("source", BOX)
+@pytest.mark.parametrize(("source", "suffix"), [*((source, "csv") for source in BOX), ("matsum", "h5")])
 def test_what_is_extracted_has_the_flight_and_the_choice_of_its_file(
     source: str, suffix: str, box: dict[str, str], tmp_path: Path
 ) -> None:

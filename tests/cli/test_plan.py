@@ -94,9 +94,7 @@ def test_pictures_and_pages_are_written(history: list[str], tmp_path: Path) -> N
 
 
 def test_nothing_to_recommend_is_an_objection(history: list[str]) -> None:
-    for form in ("json", "value", "card"):
-        result = run("plan", "-q", "--min-rigid", "5", "-f", form, *PART, *history)
-        assert result.exit_code == 1, form
+    assert run("plan", "-q", "--min-rigid", "5", "-f", "card", *PART, *history).exit_code == 1
     assert run("plan", "-q", "--min-rigid", "5", "--exit-zero", *PART, *history).exit_code == 0
 
 

@@ -9,7 +9,6 @@ import re
 import signal
 import time
 from collections.abc import Sequence
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -151,7 +150,7 @@ def test_options_of_suggest_hold_for_each_run() -> None:
 )
 def test_the_exit_code_does_not_depend_on_the_format(runs: list[str], extra: tuple[str, ...], code: int) -> None:
     args = (*STUDY, *runs, *extra)
-    assert [run(*args, "-f", form).exit_code for form in FORMATS] == [code] * len(FORMATS)
+    assert [run(*args, "-f", form).exit_code for form in ("table", "ndjson")] == [code] * 2
     assert run(*args, "--exit-zero").exit_code == {0: 0, 1: 0, 2: 2}[code]
 
 
@@ -247,8 +246,7 @@ def test_a_killed_study_loses_nothing_that_was_finished(runs: list[str], tmp_pat
     assert run(*args).stderr.startswith(f"note: 4 of 4 runs reused from {ledger}\n")
 
 
-@pytest.mark.parametrize("jobs", ["1", "2"])
-@pytest.mark.parametrize("everyone", [True, False])
+@pytest.mark.parametrize(("jobs", "everyone"), [("1", True), ("2", True), ("2", False)])
 def test_an_interrupted_study_ends_at_once_with_a_line(
     runs: list[str], tmp_path: Path, jobs: str, everyone: bool
 ) -> None:
@@ -381,7 +379,7 @@ def test_a_file_in_the_folder_of_a_run_is_never_written_to(tmp_path: Path, optio
 
 
 # Svg grows most with the number of curves; from eleven runs on they are drawn as many.
-@pytest.mark.parametrize(("number", "suffix"), [(3, "png"), (12, "pdf"), *product((1, 3, 12), ("svg",))])
+@pytest.mark.parametrize(("number", "suffix"), [(3, "png"), (12, "pdf"), (3, "svg"), (12, "svg")])
 def test_a_plot_shows_the_runs(runs: list[str], tmp_path: Path, number: int, suffix: str) -> None:
     figure = tmp_path / f"figure.{suffix}"
     sources = (runs * 20)[:number]
