@@ -9,6 +9,7 @@ import re
 import signal
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -201,8 +202,9 @@ def test_a_pattern_stands_for_runs_and_a_folder_for_one(tmp_path: Path, monkeypa
 def wait_for(ledger: Path, lines: int) -> None:
     """Wait until a ledger has so many lines."""
     for _ in range(1000):
-        if ledger.exists() and ledger.read_bytes().count(b"\n") >= lines:
-            return
+        with suppress(FileNotFoundError):  # it is tried whether it can be written before the first line is
+            if ledger.read_bytes().count(b"\n") >= lines:
+                return
         time.sleep(0.02)
     raise AssertionError(f"{ledger} never had {lines} lines")
 
