@@ -155,8 +155,8 @@ def _unexplained(balance: Balance, first: int, last: int) -> float:
     """What stands for gravity in a window: 0 where energies change by nothing or damping alone, else of unknown size.
 
     NaN where they are lost, by gravity, friction or damping: what damping takes falls off with the kinetic energy,
-    which shows when much of it is gone.  Infinity where they grow, or lose more than a vibration has, by gravity or
-    another load.
+    which shows when much of it is gone.  Infinity where they grow, or lose more than a vibration has and rather as a
+    constant force takes it than as damping does: by gravity or another load.
     """
     whole, kinetic = balance.kinetic_and_internal, balance.kinetic
     if whole is None or kinetic is None:
@@ -170,10 +170,13 @@ def _unexplained(balance: Balance, first: int, last: int) -> float:
     rest, _ = _least_squares(whole[states], [np.ones(last - first + 1)], [spent] if spent.any() else [])
     lost = float(whole[first] - whole[last])
     bent = float(np.ptp(rest)) / largest if largest > 0 else 0.0
-    damped = bent <= _OWN_ERROR and lost >= _MUCH * largest
-    if damped or (bent <= _LITTLE and lost <= _LITTLE * largest):
+    if (bent <= _OWN_ERROR and lost >= _MUCH * largest) or (bent <= _LITTLE and lost <= _LITTLE * largest):
         return 0.0
-    return np.nan if balance.internal is None or lost <= np.ptp(balance.internal[states]) else np.inf
+    if balance.internal is None or lost <= np.ptp(balance.internal[states]):
+        return np.nan
+    elapsed = balance.time[states] - balance.time[first]
+    pulled, _ = _least_squares(whole[states], [np.ones_like(elapsed), elapsed, elapsed**2], [])
+    return np.nan if bent <= _OWN_ERROR and np.ptp(rest) < np.ptp(pulled) else np.inf
 
 
 def _terms(balance: Balance) -> list[Samples]:

@@ -14,6 +14,7 @@ from d2rpick.flight.internal_energy import moves_as_a_whole, settled_from
 from d2rpick.flight.momentum import bodies_apart, flight_around
 from d2rpick.histories.history import EXACT, Balance, History, Momenta, Precision, Samples
 from d2rpick.histories.names import Part
+from d2rpick.histories.samples import integral
 from tests.benchmarks import flights as campaign
 from tests.records import known, printed, table
 
@@ -221,6 +222,16 @@ def test_what_loses_more_energy_than_its_vibration_has_is_not_damped() -> None:
     found = suggest(totals(ringing, 50 - 10 * TIME + 2 * TIME**2), 0.8, PLAIN)
     assert known(found.quality).grade == "poor"
     assert found.situation.flight.unknown_load
+
+
+def test_what_damping_takes_of_a_body_and_its_vibration_is_no_load() -> None:
+    """Damping that is proportional to mass takes more of the motion than the vibration has."""
+    alpha = 0.3
+    kinetic = 60 * np.exp(-2 * alpha * TIME) + 20 * np.exp(-alpha * TIME) * np.cos(60 * TIME) ** 2
+    whole = 80 - 2 * alpha * integral(TIME, kinetic)
+    flight = suggest(totals(whole - kinetic, kinetic), 0.8, PLAIN).situation.flight
+    assert np.isnan(flight.gravity)  # it is lost as damping takes it: no load, where an oscillator describes the rest
+    assert not flight._replace(described=True).unknown_load
 
 
 def test_no_flight_is_certain_in_which_energies_show_a_load() -> None:
