@@ -72,7 +72,8 @@ def _of_energy(situation: Situation) -> Iterator[Caution]:
 def _of_parts(situation: Situation) -> Iterator[Caution]:
     vibration = situation.vibration
     if vibration.estimated:
-        found = f"the kinetic share is the sum over the modes found in each part: {vibration.estimated}"
+        what = "the counted swings leave" if vibration.basis == "swings" else "the modes found in each part add up to"
+        found = f"the kinetic share is what {what}: {vibration.estimated}"
         yield Caution("kinetic-share-estimated", found)
     for part in vibration.unsigned:
         yield Caution("part-without-sign", f"{part.name} was left out: {part.reason}")

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import ChangedError, FormatError
-from d2rpick.base.files import FileState, at_rest
+from d2rpick.base.files import FileState, at_rest, settled_state
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -216,6 +216,10 @@ class OnDisk(Content):
         now = FileState.of(self._file)
         if now.is_as(self._state):
             return
+        if now.size == self._size and now.modified != self._state.modified:
+            # a write gives its time first and its size last: it may be under way
+            settled_state(self._file, may_grow=True)
+            now = FileState.of(self._file)
         if now.size < self._size:
             raise self._shortened()
         untouched = now.size > self._size or now.modified == self._state.modified  # it has grown, or got another name

@@ -147,7 +147,7 @@ MECHANICS: Final = row(
     Field("energy_td", "number"),
     Field("kinetic_share", maybe(SHARE)),
     Field("kinetic_share_estimated", "flag",
-          "kinetic_share is the sum over the modes found in each part: no oscillator describes the whole",
+          "kinetic_share is that of the modes found in each part or of the counted swings: no oscillator is better",
           lambda now: now.vibration.estimated is not None),
     Field("basis", BASIS),
     Field("flight", FLIGHT, "window of free flight"),

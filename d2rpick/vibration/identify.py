@@ -25,6 +25,7 @@ MIN_SAMPLES_PER_PERIOD: Final = 10  # of the energy, pi / omega: below, an alias
 MIN_SAMPLES_BESIDE: Final = 4  # of a mode beside one that is certain: below, cells would hide most of it
 MAX_GROWTH: Final = 0.3  # -alpha x record length: a free vibration only decays, noise hides no more than this
 MIN_PLASTIC: Final = -0.05  # of the energy range: plastic work is positive but for the scatter of its fit
+MAX_OF_SPRING: Final = 0.1  # misfit that a spring which stiffens leaves to a vibration through zero
 
 # The energy below which a rest is not held against a mode: a solver errs by 1e-5 of the maximum anywhere.
 _FLOOR: Final = 1e-4  # of the highest vibration energy
@@ -192,9 +193,23 @@ def _first_to_follow(attempts: Iterable[tuple[_Attempt, float]], record: _Record
     for attempt, least_periods in attempts:
         found, follows = _judged(attempt, least_periods, record)
         if follows:
-            return found
+            return _through_zero(found, refused)
         refused.append(found)
     return min(refused, key=lambda one: one.rms) if refused else _out_of_reach(np.array([record.start, record.end]))
+
+
+def _through_zero(found: Identification, refused: list[Identification]) -> Identification:
+    """Give for a vibration that a preload keeps off zero the one of half its rate that passes zero, if it is near.
+
+    The energy swings once in a period of the one, twice in that of the other: from one swing to the next their signs
+    differ.  What tells them apart is then as small as what a spring that stiffens adds.
+    """
+    mode = found.mode
+    if not isinstance(mode, Mode) or mode.preload**2 <= float(mode.vibration_energy(found.start)):
+        return found
+    near = (one for one in refused if one.misfit is not None and one.misfit < MAX_OF_SPRING)
+    simple = min(near, key=lambda one: one.rms, default=None)
+    return simple._replace(describes_record=True, reason=None) if simple else found
 
 
 def _out_of_reach(time: Samples) -> Identification:

@@ -159,6 +159,17 @@ def test_a_file_written_anew_is_an_error_and_never_half_of_each(tmp_path: Path, 
         run.files[0].sha256()
 
 
+def test_a_write_under_way_is_no_file_written_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The system shows the time of a write before its size."""
+    file = tmp_path / "glstat"
+    file.write_bytes(ONE)
+    there = on_disk(file)
+    os.utime(file)
+    monkeypatch.setattr(time, "sleep", lambda _: file.write_bytes(ONE + b" "))
+    there.check()
+    assert bytes(there) == ONE
+
+
 @pytest.mark.parametrize("contents", [(ONE, OTHER), TABLES], ids=["glstat", "csv"])
 @OPENERS
 def test_a_file_that_is_written_anew_all_the_time_gives_one_of_its_contents_or_an_error(
