@@ -189,7 +189,7 @@ def _first_to_follow(attempts: Iterable[tuple[_Attempt, float]], record: _Record
 
     Where one follows the samples, a richer one would follow as well, and be no more plausible.
     """
-    refused = []
+    refused: list[Identification] = []
     for attempt, least_periods in attempts:
         found, follows = _judged(attempt, least_periods, record)
         if follows:
