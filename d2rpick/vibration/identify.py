@@ -71,6 +71,8 @@ class Identification(NamedTuple):
         Root mean square of the vibration energy over the window [energy]; NaN without a mode.
     hidden_share : float
         Of the vibration energy, what a further mode may hold unseen; zero where none was looked for [-].
+    follows : bool
+        Whether the fit follows the samples, plausible or not.
     """
 
     mode: Mode | Modes | None
@@ -84,6 +86,7 @@ class Identification(NamedTuple):
     covariance: Samples
     vibration: float = np.nan
     hidden_share: float = 0.0
+    follows: bool = False
 
     def energy_deviation(self, times: Samples | float) -> Samples:
         """Return the standard deviation of the fitted energy at ``times`` [energy]; NaN without a mode.
@@ -181,7 +184,7 @@ def identify_beside(time: Samples, energy: Samples, mode: Mode, rates: Samples) 
     ]
     ends = [fitting.minimise(start, sum_and_jacobian, record.s, record.e) for _, start in starts]
     best = _sum(min(ends, key=lambda end: end[1])[0], record)
-    return _judged(best, _PERIODS_OF_SEVERAL, record, MIN_SAMPLES_BESIDE)[0]
+    return _judged(best, _PERIODS_OF_SEVERAL, record, MIN_SAMPLES_BESIDE)
 
 
 def _first_to_follow(attempts: Iterable[tuple[_Attempt, float]], record: _Record) -> Identification:
@@ -191,8 +194,8 @@ def _first_to_follow(attempts: Iterable[tuple[_Attempt, float]], record: _Record
     """
     refused: list[Identification] = []
     for attempt, least_periods in attempts:
-        found, follows = _judged(attempt, least_periods, record)
-        if follows:
+        found = _judged(attempt, least_periods, record)
+        if found.follows:
             return _through_zero(found, refused)
         refused.append(found)
     return min(refused, key=lambda one: one.rms) if refused else _out_of_reach(np.array([record.start, record.end]))
@@ -209,7 +212,7 @@ def _through_zero(found: Identification, refused: list[Identification]) -> Ident
         return found
     near = (one for one in refused if one.misfit is not None and one.misfit < MAX_OF_SPRING)
     simple = min(near, key=lambda one: one.rms, default=None)
-    return simple._replace(describes_record=True, reason=None) if simple else found
+    return simple._replace(describes_record=True, follows=True, reason=None) if simple else found
 
 
 def _out_of_reach(time: Samples) -> Identification:
@@ -232,9 +235,9 @@ def judge_given(mode: Mode, time: Samples, energy: Samples, *, quick: bool = Fal
     cosine = mode.deformation(start) - mode.preload
     sine = (mode.velocity(start) + mode.alpha / 2 * cosine) / mode.omega
     parameters = np.array([mode.omega, mode.alpha, cosine, sine, mode.energy_plastic, mode.preload])
-    held, follows = _judged(_one(parameters / record.units, fitting.WITH_PRELOAD, record), 0.0, record)
-    reason = None if follows else held.reason
-    return held._replace(mode=mode, describes_record=follows, reason=reason, covariance=np.zeros((6, 6)))
+    held = _judged(_one(parameters / record.units, fitting.WITH_PRELOAD, record), 0.0, record)
+    reason = None if held.follows else held.reason
+    return held._replace(mode=mode, describes_record=held.follows, reason=reason, covariance=np.zeros((6, 6)))
 
 
 class _Record(NamedTuple):
@@ -298,8 +301,8 @@ def _sum(parameters: Samples, record: _Record) -> _Attempt:
 
 def _judged(
     attempt: _Attempt, least_periods: float, record: _Record, density: float = MIN_SAMPLES_PER_PERIOD
-) -> tuple[Identification, bool]:
-    """Return a fit with its verdict, and whether it follows the samples; ``density`` is the least per period."""
+) -> Identification:
+    """Return a fit with its verdict; ``density`` is the least number of samples per period."""
     s, e = record.s, record.e
     rest = e - attempt.energy
     rms, spread, structure = float(np.sqrt(np.mean(rest**2))), float(np.std(e)), fitting.structure_of(rest)
@@ -309,7 +312,7 @@ def _judged(
     loose = _loose(attempt.name, rms / spread, structure / spread, local_structure)
     found_density = samples_per_period(s, attempt.scaled)
     reason = loose or _implausible(attempt.scaled, found_density, density, least_periods, record.end - record.start)
-    found = Identification(
+    return Identification(
         mode=attempt.mode,
         describes_record=reason is None,
         reason=reason,
@@ -320,8 +323,8 @@ def _judged(
         end=record.end,
         covariance=_covariance(attempt.normal, rest) * attempt.units * attempt.units[:, None],
         vibration=float(np.hypot.reduce(vibration) / np.sqrt(s.size)) * record.scale,  # squares may overflow
+        follows=loose is None,
     )
-    return found, loose is None
 
 
 def _loose(name: str, misfit: float, structure: float, local_structure: float) -> str | None:

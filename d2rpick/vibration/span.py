@@ -151,14 +151,16 @@ def _grow(
     """Fit a window, extend it while the record stays with the fit, refit, repeat until it stays."""
     fit, span = fitter(*history.between(*window)), window
     for _ in range(_MOST_REFITS):
-        if not fit.describes_record or fit.mode is None:
+        if not fit.follows or fit.mode is None:
             return None, fit
         grown = span_of(history, min(td, window.end), fit, bounds)
         least = max(_LEAST_PERIODS * 2 * np.pi / fit.mode.omega, _MOST * (window.end - window.start))
         if grown is None or grown.end - grown.start < least:
-            reason = "an oscillator fits only a part of the record"
+            reason = fit.reason or "an oscillator fits only a part of the record"
             return None, fit._replace(describes_record=False, reason=reason)
         if grown == (fit.start, fit.end):
+            if not fit.describes_record:  # too short, say
+                return None, fit
             return _cleared(history, grown, fit, bounds, fitter)
         span = grown
         fit = fitter(*history.between(*span))

@@ -9,6 +9,7 @@ from d2rpick.vibration.identify import identify, identify_several, judge_given
 from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.span import Fits, Span, described_span, span_of
 from tests import paper
+from tests.energies import sure
 from tests.records import ENERGY, MODE, TIME, noisy, table
 
 
@@ -84,3 +85,13 @@ def test_what_was_fitted_before_changes_no_answer() -> None:
         assert again.evidence.fit is not None
         assert anew.evidence.fit is not None
         assert again.evidence.fit.mode == anew.evidence.fit.mode
+
+
+def test_a_window_that_shows_too_little_of_a_vibration_grows_until_it_shows_enough() -> None:
+    """Two modes were seen at one td, and at another of the same flight, before which no window is long enough, not."""
+    time = np.linspace(0.0, 1.0, 150)
+    energy = 0.6 * np.sin(16.13 * time) ** 2 + np.sin(27.0 * time + 1) ** 2 + 3.0 * (time > 0.88)
+    for td in (0.41, 0.43, 0.48, 0.53, 0.68):
+        span, _ = described_span(table(time, energy), td, Span(0.0, 1.0), identify_several)
+        assert sure(span).start == 0.0
+        assert sure(span).end == pytest.approx(0.87, abs=0.01)
