@@ -227,8 +227,10 @@ class Driver:
     def _end(self, order: Order, left: Left) -> None:
         """Write down how a leg has ended; one that left nothing to go on from is begun again."""
         seen = self._seen(order)
-        if seen is None or (left.restart is None and not order.rigid) or (order.rigid and not left.normal):
-            if left.normal:
+        told = self.solver.file(order.number, ".ctl").exists()
+        at_once = told and (seen is None or seen.time <= order.start)  # interrupted before there was anything to see
+        if seen is None or at_once or (left.restart is None and not order.rigid) or (order.rigid and not left.normal):
+            if left.normal and not at_once:
                 raise D2RPickError(f"{self.solver.file(order.number, '.out')}: the leg left no state, or no restart")
             self.journal.add("lost", order=order)
             return

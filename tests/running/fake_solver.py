@@ -52,12 +52,13 @@ def engine(deck: Path) -> None:
     history, listing = Path(f"{name}T{number:02d}"), Path(f"{name}_{number:04d}.out")
     listing.write_text(" started\n")
     made = headed([MadePart(1, "strip of shells", CODES)], globals_=len(CODES))
-    killed, normal = False, True
+    killed, normal, last = False, True, start
     with history.open("wb") as stream:
         while True:
             now = start + (step + (start > 0)) * STEP  # a restart does not repeat a state
             if now > stop + 1e-9 or killed:
                 break
+            last = now
             made.state(now, *state(now, rigid=rigid))
             stream.write(made.data)
             stream.flush()
@@ -82,7 +83,8 @@ def engine(deck: Path) -> None:
         print(" ** ERROR: NEGATIVE VOLUME IN ELEMENT 7", flush=True)
         sys.exit(2)
     if not killed:
-        Path(f"{name}_{number:04d}_0001_{chr(ord('I') + (step // every) % many)}.rst").write_text(repr(min(now, stop)))
+        reached = max(last, min(now, stop))
+        Path(f"{name}_{number:04d}_0001_{chr(ord('I') + (step // every) % many)}.rst").write_text(repr(reached))
     listing.write_text(
         "  ** CUMULATIVE CPU TIME SUMMARY **\n ELEMENT FORCES..............: .8E+00 80 %\n"
         f" TOTAL.......................: .1E+01 100 %\n     NORMAL TERMINATION\n TOTAL NUMBER OF CYCLES  : {step}\n"
