@@ -8,6 +8,7 @@ from tests.campaign import FORMATS, case
 from tests.faults import inputs
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMATS)
 def test_whatever_the_damage_an_input_is_read_or_refused(form: str) -> None:
     found = Counter(case(form, 0, number) for number in range(inputs(1_000_000) // len(FORMATS) + 1))

@@ -64,6 +64,7 @@ def cluster(folder: Path, names: tuple[str, ...]) -> Iterator[tuple[str, dict[st
         yield json.loads(listed.read_text())["address"], workers
 
 
+@pytest.mark.slow
 def test_a_study_on_a_cluster_outlives_the_death_of_a_worker(tmp_path: Path) -> None:
     sources = variants.variants(tmp_path)
     expected = json.loads(run(*variants.STUDY, "-f", "json", *sources, sources[0]).stdout)
@@ -93,6 +94,7 @@ def test_a_study_on_a_cluster_outlives_the_death_of_a_worker(tmp_path: Path) -> 
     assert {key: found[key] for key in same} == {key: expected[key] for key in same}
 
 
+@pytest.mark.slow
 def test_what_cannot_be_read_on_a_cluster_is_a_row_and_no_scheduler_an_error(tmp_path: Path) -> None:
     with cluster(tmp_path, ("one",)) as (address, _):
         args = ("study", "--td", str(variants.TD), "--scheduler", address)

@@ -53,7 +53,9 @@ def links(page: str) -> Iterator[tuple[Path, str]]:
             yield (PAGES[page].parent / name if name else PAGES[page]), anchor
 
 
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize(
+    "page", [page if page == "README.md" else pytest.param(page, marks=pytest.mark.slow) for page in PAGES]
+)
 def test_the_sessions_on_a_page_show_what_the_commands_print(page: str) -> None:
     with folder_of_a_reader():
         for command, shown in sessions(text_of(page)):  # in order and in one folder, as a reader would type them

@@ -30,6 +30,7 @@ def history(path: Path) -> History:
     return run.history(Selection(parts=("box",) if run.parts else ()))
 
 
+@pytest.mark.slow
 def test_every_format_has_its_sample(fresh: Mapping[str, bytes]) -> None:
     assert {*fresh} == {*NAMES}
     assert {answer("info", str(KEPT / name))["format"] for name in NAMES} == {*READERS}

@@ -49,6 +49,7 @@ def records(draw: st.DrawFn) -> tuple[np.ndarray, np.ndarray]:
     return time, energy + noise * np.random.default_rng(draw(st.integers(0, 99))).uniform(size=states)
 
 
+@pytest.mark.slow
 @settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(record=records(), td=st.floats(0.3, 1.0), tr=st.floats(0.0, 0.29))
 def test_the_library_and_the_command_line_say_the_same(
@@ -81,6 +82,7 @@ def test_arguments_mean_what_options_mean(arguments: dict[str, Any], options: tu
     same(found.to_dict(), answer("suggest", "--td", "0.37", "--no-verify", *options, BOX))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "options"),
     [
@@ -309,6 +311,7 @@ def test_a_run_is_shown_by_what_its_files_hold(tmp_path: Path) -> None:
     assert loose.read(damaged)._repr_html_() is None  # the notebook shows that instead
 
 
+@pytest.mark.slow
 def test_a_notebook_shows_a_sentence_a_small_table_and_the_picture() -> None:
     run, energy = d2.read(MATSUM), d2.read(ENERGY)
     of_box: Any = {"parts": 1, "replay": False}

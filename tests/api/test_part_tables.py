@@ -37,6 +37,7 @@ def test_weights_may_be_given_as_they_are(tmp_path: Path) -> None:
     assert "<span>signature</span>" in page
 
 
+@pytest.mark.slow
 def test_weights_in_memory_are_not_left_out_of_the_command_line() -> None:
     """Typed without them it would give another run time; as it stands it is refused."""
     weights = Weights({"BT": 1.0, "QBAT": 1.0}, rigid_node=0.0)

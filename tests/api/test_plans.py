@@ -12,6 +12,7 @@ from tests.command import ENERGY, answer, run
 MATSUM = "sample_data/rollover_box.matsum"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "options"),
     [

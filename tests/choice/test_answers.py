@@ -98,6 +98,7 @@ def test_a_vibration_that_has_died_down_to_nothing_at_td_has_no_sign_there() -> 
     assert answer.recommended is None
 
 
+@pytest.mark.slow
 def test_without_a_known_flight_the_verdict_is_unknown() -> None:
     history = rollover()
     flying = history.time > 0.1
@@ -132,6 +133,7 @@ def ringing() -> History:
     return of(energy + 0.01 * np.abs(np.random.default_rng(5).standard_normal(time.size)), time)
 
 
+@pytest.mark.slow
 def test_verify_remarks_what_suggest_remarks_on_every_tr() -> None:
     history, asked = ringing(), Settings(after=0.05)
     found = suggest(history, 0.4, asked).candidates

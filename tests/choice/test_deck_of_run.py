@@ -152,6 +152,7 @@ def told(found: dict[str, Any]) -> dict[str, Any]:
     return {**found, "command": None, "warnings": None}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ASKED)
 def test_the_answer_is_that_without_a_deck(command: str, foreign: str) -> None:
     args = command, *ASKED[command], "--deck", foreign, BOX
@@ -161,6 +162,7 @@ def test_the_answer_is_that_without_a_deck(command: str, foreign: str) -> None:
     assert codes(found) == codes(plain) | {"deck-of-another-model"}
 
 
+@pytest.mark.slow
 def test_pages_and_cards_are_those_without_a_deck(foreign: str, tmp_path: Path) -> None:
     asked = ("suggest", *ASKED["suggest"], BOX)
     assert run(*asked, "--deck", foreign, "-f", "card").stdout == run(*asked, "-f", "card").stdout
@@ -294,6 +296,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("asked", [("MADET01", "--part", "1"), ("totals.csv",), ("momenta.csv",)])
 def test_a_support_refuses_the_flight_in_any_form_of_input(
     folder: Path, tmp_path: Path, asked: tuple[str, ...]
@@ -313,6 +316,7 @@ def test_a_support_refuses_the_flight_in_any_form_of_input(
     d2.suggest(reference, 0.12, parts=options[1:] or None, replay=False)  # the run that was read is as it was
 
 
+@pytest.mark.slow
 def test_parts_that_nothing_holds_fly(folder: Path, tmp_path: Path) -> None:
     history, deck = str(folder / "MADET01"), made_car.starter(tmp_path, HELD)
     assert answer("suggest", "--no-verify", "--part", "8,9", "--td", "0.05", "--deck", deck, history)["recommended"]

@@ -52,6 +52,7 @@ def read_again(history: History, tr: float, td: float, asked: Settings) -> Verdi
     return verify(history, as_read(tr), as_read(td), asked)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("td", [0.7, 0.8])
 def test_the_better_pair_is_what_is_said_of_its_td(td: float) -> None:
     history = made("five modes")
@@ -77,6 +78,7 @@ def test_a_start_that_is_read_does_not_lie_before_the_flight() -> None:
     assert read_again(history, *sure(answer.recommended)[:2], asked).verified
 
 
+@pytest.mark.slow
 def test_a_td_that_is_read_keeps_the_margin(box: Reference) -> None:
     asked = replace(LEVEL, margin=0.0123456789)
     for row in plan_of(box, asked).flights:
@@ -145,6 +147,7 @@ def test_an_error_that_is_refused_reads_as_too_large() -> None:
     assert value > limit
 
 
+@pytest.mark.slow
 def test_a_plan_knows_a_flight_as_surely_as_the_td_in_it(tmp_path: Path) -> None:
     """An oscillator is seen around some td of the flight, but not around the one that is chosen."""
     rng, time = np.random.default_rng(0), np.linspace(0, 1, 1500)

@@ -77,6 +77,7 @@ def test_info_lists_all_flights_of_the_parts_asked_for() -> None:
     assert "rotation_energy" in found["channels"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "args",
     [

@@ -43,6 +43,7 @@ def statuses(plan: Plan) -> list[str]:
     return [row.status for row in plan.flights]
 
 
+@pytest.mark.slow
 def test_every_flight_of_the_box_is_listed_where_it_lies(plan: Plan) -> None:
     touched = drop().landings
     assert len(plan.flights) >= 3
@@ -129,6 +130,7 @@ def test_a_switched_run_is_recognised_and_the_next_window_planned(
     assert plan_of(switched, PLAIN, done=done, min_rigid=1.0).next_run == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("window", [(0.31, 0.5), (0.281, 0.75)])
 def test_a_contact_at_the_beginning_of_a_rigid_time_is_told(
     plan: Plan, window: tuple[float, float], tmp_path: Path
@@ -163,6 +165,7 @@ def test_where_nothing_vibrates_td_lies_as_late_as_the_margin_allows(reference: 
     assert short.time[-3] < found.td <= short.time[-2]
 
 
+@pytest.mark.slow
 def test_a_window_that_is_done_where_nothing_flies_is_told(tmp_path: Path) -> None:
     window = (0.31, 0.36)  # on the ground all the time
     found = plan_of(read(written(drop(window), tmp_path), BOX), PLAIN, done=[window])
@@ -213,6 +216,7 @@ def test_the_switched_car_landed_as_computed() -> None:
     assert moved == pytest.approx(0.5e-3, abs=1.5e-4)
 
 
+@pytest.mark.slow
 def test_flights_of_the_energy_alone_end_before_the_next_begins(tmp_path: Path) -> None:
     """One window was offered for two flights that lay in each other, as the energy before and after a load tells."""
     record = drop(tilt=35.0, interval=1e-4)
@@ -242,6 +246,7 @@ def bouncing(seed: int, folder: Path) -> list[str]:
     return [str(table)]
 
 
+@pytest.mark.slow
 @settings(max_examples=8)
 @given(seed=st.integers(0, 100_000))
 @example(seed=204)  # at the end of this flight the energy shows none
@@ -257,6 +262,7 @@ def test_a_window_of_the_energy_alone_lies_in_its_flight(seed: int, tmp_path_fac
         assert plan.flights[0].window == (alone.tr, alone.td)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [33, 72])
 def test_no_other_td_of_a_flight_reaches_back_beyond_a_landing(seed: int, tmp_path: Path) -> None:
     """The page of a plan offered pairs that were rigid while the flight before had not landed."""
@@ -278,6 +284,7 @@ def car() -> Reference:
     return read([stored("carT01.gz")], Selection(parts=("1-14",)))
 
 
+@pytest.mark.slow
 def test_a_short_window_that_locks_in_energy_is_left_out_for_a_much_longer_one(car: Reference) -> None:
     """Between two pushes the car is rigid for 17 ms, after them for 108: the window that `parts` compares sets in."""
     found = plan_of(car, PLAIN)
@@ -287,6 +294,7 @@ def test_a_short_window_that_locks_in_energy_is_left_out_for_a_much_longer_one(c
     assert found.windows == ((longest.tr, longest.td),)
 
 
+@pytest.mark.slow
 def test_a_window_that_is_left_out_says_what_it_would_cost_the_longer_one_even_where_that_waits(tmp_path: Path) -> None:
     """Flight 2 is left out for flight 4, which waits for flight 3: with flight 2 it would wait for one run more."""
     box = read(written(drop(height=0.15, tilt=80.0), tmp_path), BOX)

@@ -9,6 +9,7 @@ from tests.benchmarks.promise_parts import CLASSES, Motion, Record, history, rec
 from tests.energies import sure
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", CLASSES)
 def test_what_is_stated_of_random_records_holds(kind: str) -> None:
     asked = [record._replace(window=record.window[:1] * 2) for record in records(kind, 1, 2)]  # one td is cheap
@@ -18,6 +19,7 @@ def test_what_is_stated_of_random_records_holds(kind: str) -> None:
     assert not any(one.true > BAD for one in found if one.grade == "good")
 
 
+@pytest.mark.slow
 def test_two_planes_turn_no_pair_upside_down() -> None:
     """97 and 3 % of the energy of one part: its minima stay at some per cent of its maxima."""
     forms = np.array([np.diag([0.97, 0.03, 0.0]), np.diag([0.0, 0.0, 0.5])])

@@ -165,6 +165,7 @@ OLD: list[tuple[str, float | tuple[float, float], dict[str, float | bool], str]]
 # fmt: on
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "td", "asked", "old"), OLD)
 def test_an_old_answer_is_given_again(
     name: str, td: float | tuple[float, float], asked: dict[str, float | bool], old: str

@@ -286,6 +286,7 @@ def warned(found: dict[str, Any], code: str) -> list[str]:
     return [one["message"] for one in found["warnings"] if one["code"] == code]
 
 
+@pytest.mark.slow
 def test_the_car_without_its_wheels_is_recommended_in_its_own_flight(folder: Path) -> None:
     """All parts fly until the wheels land, and the car flies on: a set that saves a third of that was recommended."""
     run, deck = d2.read(folder / "MADET01"), folder / "MADE_0000.rad"
@@ -298,6 +299,7 @@ def test_the_car_without_its_wheels_is_recommended_in_its_own_flight(folder: Pat
     assert {sure(one.window)[1] for one in d2.parts(run, replay=False, deck=deck, td=0.05).sets} == {0.05}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("deck", "bodies"), [("MADE_0000.rad", 2), ("made.k", 3)])
 def test_a_set_without_what_moves_is_offered_where_wheels_hang_loose(
     folder: Path, tmp_path: Path, deck: str, bodies: int
@@ -310,6 +312,7 @@ def test_a_set_without_what_moves_is_offered_where_wheels_hang_loose(
     assert [one.name for one in d2.parts(run, **asked, given=CAR).sets] == [*sets]  # no set twice
 
 
+@pytest.mark.slow
 def test_ls_dyna_is_not_offered_one_body_of_loose_pieces(folder: Path) -> None:
     found = answer("parts", "--no-verify", "--deck", str(folder / "made.k"), str(folder / "MADET01"))
     (hubs,) = [row for row in found["parts"] if row["title"] == "hubs"]
@@ -338,6 +341,7 @@ def test_cards_keep_the_wheels_apart_from_the_car(folder: Path) -> None:
     assert "merged-apart" not in whole.stderr
 
 
+@pytest.mark.slow
 def test_without_a_deck_parts_that_fly_away_are_no_body(folder: Path) -> None:
     """Momenta show it: a hub with a tyre each, and the car, change their velocities by nothing against each other."""
     asked = ("verify", "--tr", TR, "--td", "0.05", "--no-verify", str(folder / "MADET01"))
@@ -363,6 +367,7 @@ def test_a_body_of_the_deck_that_holds_what_flies_away_is_not_recommended(folder
     assert found["recommended"]["parts"] == list(made_car.BODY)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("periods", "bound", "deck"), [(0.8, True, False), (0.8, True, True), (2.0, False, True)])
 def test_a_slow_swing_makes_the_error_a_lower_bound(tmp_path: Path, periods: float, bound: bool, deck: bool) -> None:
     run, known = d2.read(made_car.t01(tmp_path, periods)), made_car.starter(tmp_path) if deck else None
@@ -381,6 +386,7 @@ def test_a_slow_swing_makes_the_error_a_lower_bound(tmp_path: Path, periods: flo
         assert row.count(">= ") == (2 if bound else 0)  # position and angle
 
 
+@pytest.mark.slow
 def test_parts_of_one_title_are_told_apart_by_number(folder: Path) -> None:
     asked = ("suggest", "--no-verify", "--td", TD, "--part", CAR, str(folder / "MADET01"))
     found = answer(*asked)

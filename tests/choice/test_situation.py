@@ -27,6 +27,7 @@ def test_the_basis_is_the_best_that_can_be_relied_on() -> None:
     assert examine(chain.history(), chain.TD_LATE, PLAIN).basis == "parts"
 
 
+@pytest.mark.slow
 def test_every_model_answers_alike() -> None:
     for situation in (
         examine(paper.history(), paper.TD, PLAIN),
@@ -81,6 +82,7 @@ def test_two_states_are_too_few_and_td_must_lie_in_the_record() -> None:
         suggest(paper.history(), 0.2, PLAIN)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("history", "td"), [(paper.history(), paper.TD), (chain.history(), chain.TD_LATE)])
 def test_what_was_found_with_another_end_of_the_load_changes_nothing(history: History, td: float) -> None:
     """A plan keeps what it finds for all flights, and only one of them has the end of the load that was given."""
@@ -98,6 +100,7 @@ def three_modes() -> History:
     return of(energy + 0.003 * np.random.default_rng(3).standard_normal(time.size), time)
 
 
+@pytest.mark.slow
 def test_an_oscillator_that_describes_most_of_a_record_is_not_sought_again_at_another_td() -> None:
     history, fits = three_modes(), CountedFits()
     first = examine(history, 0.6, PLAIN, fits, quick=True)

@@ -111,6 +111,7 @@ def test_one_tr_for_all_verifies_in_each_run_and_so_do_the_ends_of_its_window(tm
     assert not answer.objection
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("energies", [("IE_spring1_J", "IE_spring2_J"), ("IE_spring1_J",)])
 def test_real_runs_share_a_tr_that_verifies_whatever_the_basis(energies: tuple[str, ...]) -> None:
     name = stored("chain_ref.csv.gz")
@@ -297,6 +298,7 @@ def test_every_match_of_a_pattern_is_a_run_and_what_matches_nothing_stays(
     assert find_runs(["odd[1].csv", "no*", "a"]) == ("odd[1].csv", "no*", "a")
 
 
+@pytest.mark.slow
 def test_files_of_all_formats_are_rows_of_one_study() -> None:
     """One ends before td."""
     samples = sorted(str(path) for path in Path(BOX).parent.iterdir() if path.is_file())

@@ -86,6 +86,7 @@ def test_on_energy_alone_of_levels_alike_the_longest_rigid_window_wins() -> None
     assert found.expected.kinetic_share == pytest.approx(1 - situation.energy_td / (2 * mean))
 
 
+@pytest.mark.slow
 def test_td_is_not_taken_early_for_a_level_that_is_hardly_better() -> None:
     """The planar box, whose highest peak in flight is the third: 0.0989 to 0.1478 would be rigid for 0.049 s."""
     found = suggest_in_window(history_of(simulate(Parameters(), 0.42)), (0.09, 0.379), PLAIN)

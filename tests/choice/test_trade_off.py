@@ -92,6 +92,7 @@ def histories(draw: st.DrawFn) -> History:
     return History(time, energy + share * noise, ("made",), "made", "E")
 
 
+@pytest.mark.slow
 @settings(max_examples=2, deadline=None)
 @given(histories(), st.floats(0.3, 0.7), st.sampled_from([None, 0.1]))
 def test_every_td_of_any_record_is_answered_as_suggest_answers_it(
@@ -104,6 +105,7 @@ def test_every_td_of_any_record_is_answered_as_suggest_answers_it(
     check(found, history, asked, [found.asked, *found.offers[::6]])
 
 
+@pytest.mark.slow
 @settings(max_examples=10, deadline=None)
 @given(histories(), st.floats(0.5, 0.9), st.floats(0.1, 0.45), st.booleans())
 def test_candidates_before_the_flight_never_change_what_is_best(
@@ -137,6 +139,7 @@ def test_the_basis_is_that_of_the_recommended_pair() -> None:
     assert all("deviates systematically" in sure(why) for why in refused)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "selection", "window", "steps"),
     [
@@ -157,6 +160,7 @@ def test_no_offer_beats_the_one_that_is_recommended(
         assert (found.recommended.tr, found.recommended.td) == sure(alone.recommended)[:2]
 
 
+@pytest.mark.slow
 def test_a_level_that_stays_the_same_is_graded_alike_at_each_td() -> None:
     """Plastic energy with a vibration of a ten-thousandth: about half of it is kinetic, whichever side of it td is."""
     time = np.linspace(0, 1, 2001)

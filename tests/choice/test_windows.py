@@ -181,6 +181,7 @@ def test_windows_of_any_energy_hold_what_verifies(
     check(suggest(history, share, asked), seed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tolerance", [0.05, 0.6])
 def test_windows_of_a_record_with_noise_and_of_a_real_one_hold_what_verifies(tolerance: float) -> None:
     record = History(TIME, noisy(ENERGY, 0.002, 5), ("noisy",), "made", "energy")
@@ -191,6 +192,7 @@ def test_windows_of_a_record_with_noise_and_of_a_real_one_hold_what_verifies(tol
         check(answer, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("td", [chain.TD_PEAK, chain.TD_LATE])
 def test_windows_of_several_parts_and_modes_hold_what_verifies(td: float) -> None:
     two = Modes((Mode(100.0, 4.0, 2.0, 3.0, 0.0), Mode(261.0, 4.0, -1.5, 1.0, 0.0)))

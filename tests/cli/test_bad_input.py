@@ -223,6 +223,7 @@ OBJECTIONS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", OBJECTIONS)
 def test_a_record_without_an_answer_is_an_objection_and_says_why(
     case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -399,6 +399,7 @@ def test_the_check_objects_where_verify_does(td: float, asked: dict[str, Any]) -
         assert ("D2R204" in told) == any("end of the load" in reason for reason in judged["reasons"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tr", [0.05, 0.0886, 0.15])
 def test_parts_that_share_a_window_are_judged_together_as_verify_judges_them(tr: float) -> None:
     parts = {str(part["id"]): part["energy_max"] for part in answer("info", BOX)["parts"]}

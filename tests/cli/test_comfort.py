@@ -198,6 +198,7 @@ def test_the_number_is_the_first_line_whatever_its_quality() -> None:
     assert float(found.stdout.splitlines()[0]) == pytest.approx(0.0128853, abs=1e-7)
 
 
+@pytest.mark.slow
 def test_the_command_on_a_page_can_be_pasted(tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     assert run("study", "--td", "0.064", "-q", "--report", str(page), ENERGY).exit_code == 0

@@ -20,6 +20,8 @@ from tests.command import ENERGY, GLSTAT, MATSUM, OSCILLATOR, ROLLOVER, ROOT, TI
 from tests.reading import read_history
 
 SUGGEST = ("suggest", "--td", "0.064")
+# Of these commands the examples compute runs, or plan and compare many.
+SLOW = ("rollover", "reproduce", "plan", "study", "follow", "explore")
 ROLLING = ("suggest", "--td", "0.37", "--energy", "boxIE_J", ROLLOVER)
 
 
@@ -260,6 +262,7 @@ def test_options_come_from_the_environment_too() -> None:
 GIVEN = {"stiffness": "660e3", "mass": "31.4", "beta": "2", "alpha": "50", "v0": "6"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "args", "env"),
     [
@@ -337,7 +340,10 @@ def examples(command: str) -> list[list[str]]:
 
 
 @pytest.mark.usefixtures("by_level")
-@pytest.mark.parametrize("command", ["", *COMMANDS])
+@pytest.mark.parametrize(
+    "command",
+    [pytest.param(one, marks=pytest.mark.slow) if one in SLOW else one for one in ("", *COMMANDS)],
+)
 def test_every_help_ends_with_examples_that_run(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("D2RPICK_EXPLORE_STEPS", "4")

@@ -19,6 +19,7 @@ WINDOW = ("--td-window", "0.06", "0.07", "--steps", "10")
 SCHEMA = json.loads((ROOT / "d2rpick/schemas/explore-1.json").read_text("utf-8"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("explored", "options", "source"),
     [
@@ -121,6 +122,7 @@ def test_nothing_to_recommend_is_an_objection() -> None:
     assert "no-candidate" in result.stderr
 
 
+@pytest.mark.slow
 def test_a_td_where_nothing_flies_is_answered_as_suggest_answers_it(tmp_path: Path) -> None:
     ramp = tmp_path / "ramp.csv"
     ramp.write_text("time,internal_energy\n" + "".join(f"{i / 100},{i * i}\n" for i in range(101)))

@@ -105,6 +105,7 @@ def box(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return files
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("source", "suffix"), [*((source, "csv") for source in BOX), ("matsum", "h5")])
 def test_what_is_extracted_has_the_flight_and_the_choice_of_its_file(
     source: str, suffix: str, box: dict[str, str], tmp_path: Path
@@ -129,6 +130,7 @@ def test_what_is_extracted_is_as_healthy_as_its_file(name: str, tmp_path: Path) 
         assert found[key] == pytest.approx(expected[key], rel=1e-5, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_the_box_has_one_flight_in_every_format_that_tells_its_momentum(box: dict[str, str]) -> None:
     asked = ("suggest", "--no-verify", "--td", "0.37")
     answers = [answer(*asked, *BOX[form], box[form]) for form in ("csv", "h5", "matsum")]

@@ -147,6 +147,7 @@ BEYOND: dict[str, tuple[Callable[[], bytes], str, str]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BEYOND)
 def test_what_is_beyond_a_bound_is_told_unless_the_environment_raises_it(name: str, tmp_path: Path) -> None:
     make, bound, said = BEYOND[name]

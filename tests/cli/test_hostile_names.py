@@ -85,6 +85,7 @@ def test_a_name_stays_in_its_cell_of_a_markdown_table(one: str, other: str) -> N
     assert re.sub(r"\\([\\|<*\[~&_])", r"\1", in_markdown(one)) == printable(one)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", FORMS, ids=lambda command: command[0])
 def test_answers_name_a_file_without_control_codes(command: tuple[str, ...], folder: Path) -> None:
     shutil.copy(ENERGY, folder / NAME)
@@ -164,6 +165,7 @@ def test_cards_settings_and_messages_are_text(name: str, folder: Path) -> None:
         assert not unseen(result.stdout + result.stderr)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [command for command in FORMS if command[0] != "info"], ids=lambda one: one[0])
 def test_pages_show_a_name_as_text_and_repeat_it_for_a_shell(command: tuple[str, ...], folder: Path) -> None:
     names = {"hostile": NAME, "plain": "-plain.csv"}

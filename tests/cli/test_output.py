@@ -286,6 +286,7 @@ def test_a_named_pipe_is_written_to_and_stays_one(tmp_path: Path) -> None:
 FIRST_BYTES = {"png": b"\x89PNG\r\n", "svg": b"<?xml", "pdf": b"%PDF-"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("suffix", "args"),
     [
@@ -418,6 +419,7 @@ def test_a_program_that_waits_for_its_input_says_so_on_the_terminal() -> None:
     assert result.startswith(b"source,format,")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quiet", [False, True])
 def test_the_runs_of_a_scan_are_counted_until_it_is_interrupted(quiet: bool) -> None:
     master, slave = pty.openpty()

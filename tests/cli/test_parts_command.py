@@ -121,6 +121,7 @@ def test_where_nothing_can_be_recommended_the_answer_is_an_objection(tmp_path: P
     assert run("parts", "--deck", str(other), "--weights", str(weights), BOX).exit_code == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command", [("suggest", "--td", "0.37"), ("plan",), ("verify", "--tr", "0.0960392", "--td", "0.37")]
 )
@@ -184,6 +185,7 @@ def test_calibrate_writes_what_weights_reads(tmp_path: Path) -> None:
     assert run("calibrate", str(tmp_path / "empty")).exit_code == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "asked",
     [

@@ -21,6 +21,7 @@ def history(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     return written(drop(interval=FINE), tmp_path_factory.mktemp("run"))
 
 
+@pytest.mark.slow
 def test_all_forms_hold_the_same_windows(history: list[str]) -> None:
     plan = d2.plan(d2.read(history), parts="box", replay=False)
     found = plan.to_dict()
@@ -52,6 +53,7 @@ def csv_rows(text: str) -> list[dict[str, object]]:
     ]
 
 
+@pytest.mark.slow
 def test_a_poor_window_is_called_poor() -> None:
     """A level that matches is not all: most of the vibration may be kinetic at td."""
     box = stored("drop2T01.gz")
@@ -84,6 +86,7 @@ def test_radioss_gets_a_leg_for_each_switch(history: list[str]) -> None:
     assert card.count("/RBODY/OFF") >= len(lines)
 
 
+@pytest.mark.slow
 def test_pictures_and_pages_are_written(history: list[str], tmp_path: Path) -> None:
     plot, page = tmp_path / "plan.svg", tmp_path / "plan.html"
     assert run("plan", "-q", *PART, "--plot", str(plot), "--report", str(page), *history).exit_code == 0
@@ -122,6 +125,7 @@ def test_one_oscillator_is_one_flight() -> None:
     assert row["residual"] < 1e-3
 
 
+@pytest.mark.slow
 def test_where_nothing_vibrates_no_level_is_held_against_another() -> None:
     file = stored("drop2T01.gz")
     asked = ("--part", "flying", "--tr", "0", "--td", "0.27")
@@ -134,6 +138,7 @@ def test_where_nothing_vibrates_no_level_is_held_against_another() -> None:
     assert "evel error" not in card
 
 
+@pytest.mark.slow
 def test_the_next_window_is_planned_from_the_switched_run(history: list[str], tmp_path: Path) -> None:
     done = tmp_path / "switches.txt"
     run("plan", "-q", "-f", "value", *PART, "-o", str(done), *history)
@@ -156,6 +161,7 @@ def test_the_next_window_is_planned_from_the_switched_run(history: list[str], tm
     assert "said to be done" in wrong.stderr
 
 
+@pytest.mark.slow
 def test_the_cards_of_the_next_run_hold_the_windows_that_are_done(history: list[str], tmp_path: Path) -> None:
     """It is computed from the start; what is done cannot be judged by a run that was rigid there."""
     done, main, folder = tmp_path / "done.txt", tmp_path / "main.k", tmp_path / "next"
@@ -179,6 +185,7 @@ def test_the_cards_of_the_next_run_hold_the_windows_that_are_done(history: list[
     assert (nothing.exit_code, nothing.stdout) == (1, "")
 
 
+@pytest.mark.slow
 def test_a_radioss_run_gets_its_starter_and_a_leg_for_each_switch(tmp_path: Path) -> None:
     """Of the falling box; its first fall is free, so that the run itself stands for one that is switched there."""
     name, node = "DROP2", "535"
@@ -225,6 +232,7 @@ step
 """
 
 
+@pytest.mark.slow
 def test_a_copy_of_the_deck_holds_the_cards_and_passes_the_check(history: list[str], tmp_path: Path) -> None:
     main, folder = tmp_path / "main.k", tmp_path / "next"
     main.write_text(DECK)

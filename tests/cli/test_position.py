@@ -72,6 +72,7 @@ def test_verify_warns_where_it_is_large() -> None:
     assert (alone["position_error"], alone["position_error_part"]) == (None, None)
 
 
+@pytest.mark.slow
 def test_plan_gives_it_for_every_window() -> None:
     found = answer("plan", "--part", "1-17", car())
     check_by_schema(found)
@@ -90,6 +91,7 @@ def deck(tmp_path_factory: pytest.TempPathFactory) -> str:
     return str(file)
 
 
+@pytest.mark.slow
 def test_of_several_bodies_each_counts_for_itself(deck: str) -> None:
     asked = ("verify", "--tr", "0.0496", "--td", "0.1464", "--part", "12-14", car())
     taken = answer(*asked)
@@ -130,6 +132,7 @@ def test_the_deck_of_another_model_leaves_the_run_time_open() -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_deck_that_does_not_tell_leaves_the_assumption_without_asking_for_a_deck() -> None:
     asked = ("--td", "0.1464", "--no-verify", "--part", "12-14", "--deck", str(DECK), car())
     found = answer("suggest", *asked)
@@ -139,6 +142,7 @@ def test_a_deck_that_does_not_tell_leaves_the_assumption_without_asking_for_a_de
     assert "at td if the parts become one rigid body: engine is frozen elsewhere" in told
 
 
+@pytest.mark.slow
 def test_a_lead_part_makes_one_body_with_a_deck_and_without(deck: str, tmp_path: Path) -> None:
     """What the card merges is the body whose error is given: engine, battery and wheels as one are 2 mm off."""
     page = ("--report", str(tmp_path / "page.html"), "--overwrite")
@@ -150,6 +154,7 @@ def test_a_lead_part_makes_one_body_with_a_deck_and_without(deck: str, tmp_path:
         assert best["position_error_assumes"] is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("lead", "known"), [("1", False), ("99", False), ("1", True)])
 def test_a_lead_part_does_not_tell_whether_the_part_hangs_together(tmp_path: Path, lead: str, known: bool) -> None:
     """Nor how a lead that is not among the parts moves against them."""
@@ -159,6 +164,7 @@ def test_a_lead_part_does_not_tell_whether_the_part_hangs_together(tmp_path: Pat
     assert {one["position_error"] for one in found["candidates"] if one["tr"] > 0.1} == {0.0 if known else None}
 
 
+@pytest.mark.slow
 def test_cards_merge_the_bodies_of_the_deck(deck: str) -> None:
     card = ("--no-verify", "-f", "card", "--solver", "ls-dyna")
     asked = ("suggest", "-q", "--td", "0.1464", *card, "--deck", deck, car())

@@ -29,6 +29,7 @@ COLUMNS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["run.csv", "run.h5", "run.glstat", "run.matsum"])
 def test_every_format_is_read_back_with_the_energies_of_the_run(name: str, tmp_path: Path) -> None:
     table = np.genfromtxt(io.StringIO(run("rollover", *SHORT).stdout), delimiter=",", names=True)
@@ -50,6 +51,7 @@ def test_the_parts_of_a_matsum_tell_when_they_fly(tmp_path: Path) -> None:
     assert flight["start"] == pytest.approx(0.086, abs=0.003)
 
 
+@pytest.mark.slow
 def test_a_switched_run_is_rigid_in_between_and_differs_after_it(tmp_path: Path) -> None:
     texts = [run("rollover", *SMALL, *window).stdout for window in ((), ("--tr", "0.1", "--td", "0.2"))]
     whole, switched = (np.genfromtxt(io.StringIO(text), delimiter=",", names=True) for text in texts)
@@ -107,6 +109,7 @@ def points(line: Line2D) -> np.ndarray:
     return np.asarray(line.get_xydata(), dtype=np.float64)
 
 
+@pytest.mark.slow
 def test_a_scan_gives_one_answer_in_every_form(tmp_path: Path) -> None:
     plot = tmp_path / "scan.png"
     found = json.loads(run(*SCAN, "--td", "0.1", "-q", "-f", "json", "--plot", str(plot)).stdout)
@@ -125,6 +128,7 @@ def test_a_scan_gives_one_answer_in_every_form(tmp_path: Path) -> None:
     assert f"recommended  tr = {found['recommended']:.6g}" in text
 
 
+@pytest.mark.slow
 def test_a_scan_whose_td_lies_in_the_load_says_so() -> None:
     result = run(*SCAN, "--td", "0.06", "-f", "json")
     told = {line.split(": ")[1] for line in result.stderr.splitlines()}
@@ -132,6 +136,7 @@ def test_a_scan_whose_td_lies_in_the_load_says_so() -> None:
     assert codes(json.loads(result.stdout)) == told
 
 
+@pytest.mark.slow
 def test_a_scan_at_whose_td_nothing_can_be_recommended_says_so() -> None:
     asked = (*SCAN, "--td", "0.04")
     table, plain = run(*asked, "-q", "--exit-zero"), run(*asked, "-f", "json")
@@ -147,6 +152,7 @@ def test_a_run_that_does_not_balance_its_energy_says_so() -> None:
     assert run("rollover", *SHORT).stderr == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("args", "complaint"),
     [

@@ -94,6 +94,7 @@ def test_the_common_tr_verifies_in_each_run(runs: list[str]) -> None:
     assert all(f"{one['common_error']:.3f}" in text for one in found["runs"])
 
 
+@pytest.mark.slow
 def test_a_window_for_td_lets_each_run_choose_its_own(runs: list[str]) -> None:
     found = answer("study", "--td-window", "0.06", "0.07", *runs)
     check_by_schema(found)
@@ -133,6 +134,7 @@ def test_options_of_suggest_hold_for_each_run() -> None:
 # Exit codes.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("extra", "code"),
     [
@@ -226,6 +228,7 @@ def test_rows_come_in_order_as_soon_as_they_can(runs: list[str], tmp_path: Path)
     assert [line.get("source") for line in lines_of(rest)] == ["slow.csv", "run2.csv", None]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_a_killed_study_loses_nothing_that_was_finished(runs: list[str], tmp_path: Path, jobs: str) -> None:
     slow, ledger = tmp_path / "slow.csv", tmp_path / "ledger.ndjson"
@@ -248,6 +251,7 @@ def test_a_killed_study_loses_nothing_that_was_finished(runs: list[str], tmp_pat
     assert run(*args).stderr.startswith(f"note: 4 of 4 runs reused from {ledger}\n")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("jobs", "everyone"), [("1", True), ("2", True), ("2", False)])
 def test_an_interrupted_study_ends_at_once_with_a_line(
     runs: list[str], tmp_path: Path, jobs: str, everyone: bool
@@ -263,6 +267,7 @@ def test_an_interrupted_study_ends_at_once_with_a_line(
     assert (process.returncode, text, said.strip()) == (2, "", "d2rpick: interrupted")
 
 
+@pytest.mark.slow
 def test_a_run_that_kills_its_process_is_a_row(
     runs: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -285,6 +290,7 @@ def test_a_run_that_kills_its_process_is_a_row(
     assert process.returncode == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jobs", ["1", "2"])
 def test_an_unforeseen_error_is_the_row_of_its_run(
     runs: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, jobs: str
@@ -361,6 +367,7 @@ def test_a_ledger_is_not_the_standard_output(runs: list[str], tmp_path: Path) ->
 # Files.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMATS)
 def test_a_file_gets_what_stdout_would_have_got(runs: list[str], tmp_path: Path, form: str) -> None:
     file = tmp_path / "result"
@@ -381,6 +388,7 @@ def test_a_file_in_the_folder_of_a_run_is_never_written_to(tmp_path: Path, optio
 
 
 # Svg grows most with the number of curves; from eleven runs on they are drawn as many.
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "suffix"), [(3, "png"), (12, "pdf"), (3, "svg"), (12, "svg")])
 def test_a_plot_shows_the_runs(runs: list[str], tmp_path: Path, number: int, suffix: str) -> None:
     figure = tmp_path / f"figure.{suffix}"

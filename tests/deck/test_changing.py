@@ -131,6 +131,7 @@ CASES = {
 THREADED = ("deck", "elements")  # what is asked of one file does not depend on how many there are
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("case", "size", "change"),
     [

@@ -106,6 +106,7 @@ def test_other_kinds(tmp_path: Path, elements: str, expected: dict[int, dict[str
     assert found.notes == ()
 
 
+@pytest.mark.slow
 def test_two_line_solids_go_on_over_the_pieces_that_are_read_together(tmp_path: Path) -> None:
     text = "".join(row(n, 7) + row(*range(1, 9)) for n in range(1, 60_001))
     assert len(text) > 4 << 20  # a piece ends in it

@@ -215,6 +215,7 @@ def test_a_chain_of_includes_ends(tmp_path: Path) -> None:
     assert "deeper" in unread.reason
 
 
+@pytest.mark.slow
 def test_includes_that_multiply_are_an_error(tmp_path: Path) -> None:
     files = {f"{n}.k": f"*INCLUDE\n{n + 1}.k\n{n + 1}.k\n" for n in range(20)} | {"20.k": ""}
     with pytest.raises(DeckError, match="more than"):

@@ -58,6 +58,7 @@ def rolled(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     return Rolled(files, record.released, record.landed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["csv", "hdf5", "glstat", "matsum", "T01"])
 def test_every_format_of_a_run_tells_its_flight_within_a_millisecond(rolled: Rolled, form: str) -> None:
     part = ["--part", "box"] if form in ("matsum", "T01") else []
@@ -72,6 +73,7 @@ def test_every_format_of_a_run_tells_its_flight_within_a_millisecond(rolled: Rol
     assert not codes(found) & {"contact-in-window", "work-in-window", "flight-sources-disagree"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("names", "options"),
     [
@@ -97,6 +99,7 @@ def test_a_table_with_velocities_tells_the_flight_as_one_with_momenta(
     assert found["source"] == "momentum"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["csv", "hdf5", "glstat", "matsum", "T01"])
 def test_td_after_the_contact_is_refused(rolled: Rolled, form: str) -> None:
     part = ["--part", "box"] if form in ("matsum", "T01") else []
@@ -108,6 +111,7 @@ def test_td_after_the_contact_is_refused(rolled: Rolled, form: str) -> None:
     assert window_as_read(flight["start"], flight["end"]) in result.stderr
 
 
+@pytest.mark.slow
 def test_td_after_the_contact_is_refused_by_every_command(rolled: Rolled, tmp_path: Path) -> None:
     file, td = str(rolled.files["glstat"]), rolled.end + 0.02
     judged = answer("verify", "--tr", "0.2", "--td", str(td), file)
@@ -179,6 +183,7 @@ def test_the_last_weak_pushes_of_a_load_belong_to_it() -> None:
     assert 0.0385 <= known(examine(history, 0.146, Settings(replay=False)).flight.start) <= 0.0390
 
 
+@pytest.mark.slow
 def test_in_a_free_fall_there_is_nothing_to_match() -> None:
     history = history_of(DROP)
     found = suggest(history, 0.2838, Settings())
@@ -283,6 +288,7 @@ def test_windows_of_acceptable_tr_hold_the_recommended_one_and_verify_throughout
     assert answer("suggest", "--td", "0.064", ENERGY)["acceptable_windows"] is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["glstat", "matsum"])
 def test_a_flight_is_the_same_from_any_td_in_it_and_what_was_seen_before_changes_nothing(
     rolled: Rolled, form: str

@@ -99,6 +99,7 @@ def test_loads_computed_by_a_solver(name: str, end_of_load: float, td: float) ->
     assert flight.start == pytest.approx(end_of_load + PERIOD / 4, abs=PERIOD / 10)
 
 
+@pytest.mark.slow
 def test_many_modes_are_no_oscillator_and_the_energy_tells_the_end_of_the_load() -> None:
     situation = examine(table(*columns(ROLLOVER, "boxIE_J")), 0.37, Settings())
     assert (situation.basis, situation.flight.source) == ("energy", "energy")
@@ -179,6 +180,7 @@ def test_the_whole_flight_is_found_wherever_td_lies_in_it(td: float) -> None:
     assert situation.flight.end == pytest.approx(0.150, abs=PERIOD / 10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("td", [0.153, 0.157, 0.162, 0.17, 0.178])
 @pytest.mark.parametrize("after", [None, 0.03])
 def test_td_in_the_next_contact_is_after_the_end_of_the_flight(td: float, after: float | None) -> None:
@@ -207,6 +209,7 @@ def test_a_rising_energy_shows_no_end_of_a_load() -> None:
     assert end_of_load(fed, 0.85) == pytest.approx(0.13, abs=0.05)
 
 
+@pytest.mark.slow
 def test_a_small_second_mode_makes_no_short_flights() -> None:
     mode, time = to_mode(paper.OSCILLATOR, 6.0), paper.history().time
     energy = mode.energy(time) + 0.02 * 140 * np.exp(-30 * time) * np.sin(571 * time + 0.3) ** 2

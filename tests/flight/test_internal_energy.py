@@ -36,6 +36,7 @@ def totals(internal: Samples, kinetic: Samples, **terms: Samples) -> History:
     return table(TIME, internal, balance=Balance(TIME, internal, kinetic, **terms))  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("load", campaign.CLASSES)
 def test_under_random_loads_no_flight_is_claimed_in_which_the_momentum_still_changes(load: str) -> None:
     random = np.random.default_rng(5)

@@ -125,6 +125,7 @@ def smooth(seed: int, waves: int, digits: int) -> Momenta:
 # Motions made up of pieces.
 
 
+@pytest.mark.slow
 @settings(max_examples=20, deadline=None)
 @given(
     start=st.floats(0.04, 0.16),
@@ -177,6 +178,7 @@ def test_a_part_alone_does_not_fly_while_another_is_attached(
     assert flight_around(alone(momenta), td) is None
 
 
+@pytest.mark.slow
 def test_a_load_that_never_ends_has_hardly_ever_a_moment_that_passes_for_flight() -> None:
     tried = [
         flight_around(smooth(seed, waves, digits), td)

@@ -58,6 +58,7 @@ def drift(found: Momenta, masses: Samples = MASSES) -> Drift:
     return known(drift_of(Flying(found, masses, range(masses.size), *FLIGHT)))
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(vectors, vectors, st.floats(0.0, 0.09))
 def test_a_body_that_turns_is_off_by_the_mass_share_of_what_slides_in_it(
@@ -121,6 +122,7 @@ def test_parts_that_are_no_body_at_all_tell_nothing() -> None:
     assert drift_of(Flying(momenta(np.zeros(3), slides), MASSES, range(5), *FLIGHT)) is None
 
 
+@pytest.mark.slow
 @settings(max_examples=20, deadline=None)
 @given(st.floats(0.25, 4.0).filter(lambda periods: abs(periods - 1) > 0.2), vectors, st.floats(0.0, 6.0))
 def test_a_swing_of_less_than_a_period_makes_the_error_a_lower_bound(
@@ -158,6 +160,7 @@ def errors(name: str, parts: str, flight: tuple[float, float], tr: list[float], 
     return 1e3 * found.errors(np.array(tr), td)
 
 
+@pytest.mark.slow
 def test_the_car_is_as_far_off_as_computed() -> None:
     """All switched runs in flight: centre of twelve nodes of the body, within 30 % or 1 mm, seen over 1 to 7.5 mm."""
     with results("car_runs.csv").open() as table:

@@ -84,6 +84,7 @@ def drift(where: Samples, deck: Placement | None, members: Collection[int] = ran
     return drift_of(Flying(momenta, MASSES, list(members), 0.01, 0.1, range(5)), deck)
 
 
+@pytest.mark.slow
 @settings(max_examples=5, deadline=None)
 @given(vectors, vectors, st.floats(0.012, 0.08))
 def test_angle_and_place_are_those_of_the_two_motions(momentum: Samples, way: Samples, tr: float) -> None:
@@ -152,6 +153,7 @@ def test_what_flies_with_a_body_holds_it() -> None:
     assert without.errors(np.array([0.05]), 0.08)[0] == pytest.approx(expected, rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("bends", "bound"), [(0.0, False), (0.0005, False), (0.02, True)])
 def test_a_body_that_bends_more_than_it_is_said_to_turn_makes_the_angle_a_lower_bound(
     bends: float, bound: bool
@@ -162,6 +164,7 @@ def test_a_body_that_bends_more_than_it_is_said_to_turn_makes_the_angle_a_lower_
     assert found.at_least is bound
 
 
+@pytest.mark.slow
 def test_every_switched_run_of_the_car_is_as_far_off_and_turned_as_computed(tmp_path: Path) -> None:
     """Centre and orientation of twelve nodes of the body: within 30 % or 1 mm, and 30 % or 0.1 degrees."""
     deck = tmp_path / "CAR_0000.rad"

@@ -82,6 +82,7 @@ def test_energy_is_balanced_within_one_percent_through_trip_flight_and_landing(
 FALLING = Parameters(mesh=4, speed=0.5, drop=0.4, tilt=40.0, ground_stiffness=2e6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("windows", [(), (RigidWindow(0.0, 0.28),), (RigidWindow(0.0, 0.28), RigidWindow(0.45, 0.5))])
 def test_a_box_that_falls_bounces_and_its_energy_is_balanced_however_often_it_is_switched(
     windows: tuple[RigidWindow, ...],
@@ -300,6 +301,7 @@ def test_contact_sleeps_in_the_flight_and_misses_nothing() -> None:
     np.testing.assert_array_equal(motion.places, awake.places)
 
 
+@pytest.mark.slow
 def test_the_mean_energy_of_a_scan_and_its_errors_are_those_of_single_runs() -> None:
     reference, times, td = run_of(COARSE), [0.02, 0.15], 0.36
     alone = [compare(reference, run_of(COARSE, RigidWindow(tr, td)), tr, td) for tr in times]
@@ -336,6 +338,7 @@ def test_what_is_no_model_or_no_window_is_refused() -> None:
         comparison_end(simulate(COARSE, 0.05), 0.06)
 
 
+@pytest.mark.slow
 def test_the_strength_of_the_roof_acts_after_the_landing_alone() -> None:
     """It yields when it hits the ground; up to there the run is the same to the last digit."""
     base, weak = (simulate(Parameters(mesh=8, roof_strength=share), 0.42) for share in (1.0, 0.7))

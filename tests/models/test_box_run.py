@@ -15,6 +15,7 @@ from tests.rehearsals import SETS, rehearse
 MESH, INTERVAL, EVERY = 4, 3e-4, 18
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", some(range(len(SETS)), 14))
 def test_the_recommended_tr_rolls_right_and_brings_the_energy_back_that_is_announced(
     number: int, tmp_path: Path

@@ -107,6 +107,7 @@ def check(browser: Browser) -> float:
     return td
 
 
+@pytest.mark.slow
 @NEEDS_BROWSER
 def test_td_typed_at_some_places_shows_the_digits_of_suggest(paper: Path, browser: Browser) -> None:
     browser.open(paper)
@@ -120,6 +121,7 @@ def test_td_typed_at_some_places_shows_the_digits_of_suggest(paper: Path, browse
     assert browser.complaints() == []
 
 
+@pytest.mark.slow
 @NEEDS_BROWSER
 def test_td_dragged_to_some_places_shows_the_digits_of_suggest(paper: Path, browser: Browser) -> None:
     browser.open(paper)
@@ -154,6 +156,7 @@ def test_a_finger_moves_td_too(paper: Path, browser: Browser) -> None:
     assert browser.complaints() == []
 
 
+@pytest.mark.slow
 @NEEDS_BROWSER
 def test_keys_and_buttons_move_td(paper: Path, browser: Browser) -> None:
     browser.open(paper)
@@ -223,6 +226,7 @@ def test_who_listens_can_use_it(paper: Path, browser: Browser) -> None:
         assert handle.get_attribute("aria-valuetext") == words(suggested(browser.value("command")))
 
 
+@pytest.mark.slow
 @NEEDS_BROWSER
 @pytest.mark.parametrize("width", WIDTHS)
 def test_nothing_is_cut_with_and_without_scripts(paper: Path, box: Path, browser: Browser, width: int) -> None:
@@ -250,6 +254,7 @@ def test_it_prints_as_the_static_page_also_where_it_is_dark(paper: Path, browser
     assert browser.shown(".sign")
 
 
+@pytest.mark.slow
 @NEEDS_BROWSER
 def test_windows_of_acceptable_tr_follow_td(box: Path, browser: Browser) -> None:
     browser.open(box)
@@ -263,6 +268,7 @@ def test_windows_of_acceptable_tr_follow_td(box: Path, browser: Browser) -> None
     assert browser.complaints() == []
 
 
+@pytest.mark.slow
 @NEEDS_BROWSER
 def test_each_flight_of_a_plan_can_be_explored(tmp_path: Path, browser: Browser) -> None:
     motion = str(tmp_path / "tumbling.matsum")

@@ -110,6 +110,7 @@ def test_what_rests_is_drawn_flat_beside_what_the_run_has() -> None:
     assert draw_study(study(resting)).axes[0].get_ylim()[1] == pytest.approx(43.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", [False, True])
 def test_the_first_and_the_last_td_of_a_trade_off_stand_clear_of_the_edge(page: bool) -> None:
     found = d2.explore(d2.read(ENERGY), td_window=(0.06, 0.0687534), replay=False)

@@ -35,6 +35,7 @@ def deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Path("site.toml").write_text(WEIGHTS, "utf-8")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ASKED)
 def test_a_deck_and_weights_that_took_part_are_named(command: str) -> None:
     args = (command, *ASKED[command], "--deck", "main.k", BOX)

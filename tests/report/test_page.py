@@ -94,6 +94,7 @@ def test_the_method_is_folded_and_how_to_repeat_it_stands_there_once(paper: Page
     assert paper.text.count("To repeat this") == 1
 
 
+@pytest.mark.slow
 def test_of_a_flight_at_rest_no_error_of_round_off_is_told(tmp_path: Path) -> None:
     asked = ("--tr", "0.1", "--td", "0.2838", stored("drop2T01.gz"))
     page = page_of(tmp_path, *asked, command="verify")
@@ -184,6 +185,7 @@ TOLD = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("asked", "code", "said", "unsaid"), TOLD.values(), ids=TOLD)
 def test_it_tells_what_is_known_and_nothing_else(
     asked: tuple[str, ...], code: int, said: tuple[str, ...], unsaid: tuple[str, ...], tmp_path: Path
@@ -203,6 +205,7 @@ def test_a_title_of_html_stays_text(tmp_path: Path) -> None:
     assert "alert" not in "".join(page.scripts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [NASTY, r"IE $\foo$", "_energy", "$"])
 def test_a_column_of_any_name_stays_text(tmp_path: Path, name: str) -> None:
     head, *rows = Path(ENERGY).read_text("utf-8").splitlines(keepends=True)
@@ -217,6 +220,7 @@ def test_a_column_of_any_name_stays_text(tmp_path: Path, name: str) -> None:
     assert json.loads(page.data[0])["command"][1].endswith("<i>.csv'")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [f"IE{'x' * 300}", "énergie_内部_🙂", "IE\x01\x1b[31m"])
 def test_a_long_or_strange_name_spoils_no_figure_and_says_nothing(tmp_path: Path, name: str) -> None:
     (tmp_path / "energy.csv").write_text(Path(ENERGY).read_text("utf-8").replace("internal_energy", name), "utf-8")
@@ -233,6 +237,7 @@ def test_a_file_name_that_is_no_text_is_shown_as_far_as_it_is(tmp_path: Path) ->
     assert "energy\ufffd.csv" in page_of(tmp_path, "--td", "0.064", name).text
 
 
+@pytest.mark.slow
 def test_the_command_for_the_card_reads_and_judges_as_the_choice_was(tmp_path: Path) -> None:
     head, *rows = unpacked(stored("chain_ref.csv.gz")).splitlines(keepends=True)
     source = str(tmp_path / "chain.csv")
@@ -244,6 +249,7 @@ def test_the_command_for_the_card_reads_and_judges_as_the_choice_was(tmp_path: P
     assert run(*("7" if word == "IDS" else word for word in words)).exit_code == 0
 
 
+@pytest.mark.slow
 def test_the_command_for_radioss_names_the_parts(tmp_path: Path) -> None:
     words = page_of(tmp_path, "--td", "0.37", "--part", "box", "--flying", "box,step", ROLLOVER_T01).last_command()
     assert words[-6:] == ["--history", ROLLOVER_T01, "--flying", "box,step", "--part", "box"]
@@ -303,6 +309,7 @@ def test_a_verdict_has_a_page_too(tmp_path: Path) -> None:
     assert not page.unnamed
 
 
+@pytest.mark.slow
 def test_a_verdict_tells_health_parts_and_the_switched_run(tmp_path: Path) -> None:
     reference, *legs = (ROLLOVER_T01, *(stored(f"rollover_r100_T0{leg}.gz") for leg in (1, 2, 3)))
     asked = ("--tr", "0.1", "--td", "0.37", "--no-verify", "--part", "box")

@@ -93,6 +93,7 @@ def test_a_run_is_rigid_in_its_flight_and_comes_to_its_end(tmp_path: Path) -> No
     assert json.loads(run(*asked(tmp_path, "--resume", "-q")).stdout)["windows"] == found["windows"]
 
 
+@pytest.mark.slow
 def test_what_a_solver_says_when_it_fails_is_told_and_the_run_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -105,6 +106,7 @@ def test_what_a_solver_says_when_it_fails_is_told_and_the_run_goes_on(
     check(json.loads(run(*asked(tmp_path, "--resume", "-q")).stdout), tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ended", [signal.SIGKILL, signal.SIGINT], ids=["killed", "interrupted"])
 def test_a_driver_that_is_ended_loses_no_leg(tmp_path: Path, ended: signal.Signals) -> None:
     words = [sys.executable, "-m", "d2rpick", *asked(tmp_path)]

@@ -119,6 +119,7 @@ def test_the_saving_is_predicted_beside_what_was_measured() -> None:
     assert sorted(saving.RUNS, key=lambda run_: run_.by_cost) == sorted(saving.RUNS, key=lambda run_: run_.measured)
 
 
+@pytest.mark.slow
 def test_the_figures_of_the_box_say_what_a_coarse_box_does() -> None:
     coarse = Parameters(mesh=4)
     every = tuple(box.variants_of(coarse))
@@ -143,6 +144,7 @@ def test_the_figures_of_the_box_say_what_a_coarse_box_does() -> None:
         assert len(figure.axes) == sum(map(len, exhibit.panels))
 
 
+@pytest.mark.slow
 def test_the_command_writes_figures_and_tables(tmp_path: Path) -> None:
     place, page = tmp_path / "new" / "paper", tmp_path / "paper.html"
     sections = ("--section", "2", "--section", "3", "--section", "5", "--report", str(page))
@@ -176,6 +178,7 @@ def test_every_form_is_written(form: str, tmp_path: Path) -> None:
     assert written.stdout.strip()
 
 
+@pytest.mark.slow
 def test_its_files_are_the_same_every_time_and_replaced_only_when_told(tmp_path: Path) -> None:
     whole = ("reproduce", "--output-dir", str(tmp_path), "--section", "5")
     first = answer(*whole)

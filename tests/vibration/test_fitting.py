@@ -34,6 +34,7 @@ def test_a_vibration_is_structure_and_white_noise_is_none() -> None:
     assert not any(surely_structured(noise(2000, seed), 1.0) for seed in range(200))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scatter", [0.0, 0.05, 0.3])
 def test_a_part_of_the_samples_refuses_only_what_all_of_them_refuse(scatter: float) -> None:
     one = np.exp(-S) * np.sin(20 * S) ** 2 + scatter * noise(S.size) / 4

@@ -39,6 +39,7 @@ def test_the_published_pair_loses_nearly_all_vibration() -> None:
     ) == (pytest.approx(0.957444, abs=1e-6))
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(MODES, st.floats(0, 3), st.floats(0, 3))
 def test_the_timing_tolerance_is_where_the_error_has_grown(mode: Mode, tr: float, window: float) -> None:

@@ -40,6 +40,7 @@ def written(motion: Motion, noise: float = 0.0) -> History:
     return history(TIME, np.maximum(np.stack([noisy(row, noise, seed=2) for row in energies.T], axis=1), 0.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("share", "noise"), [(0.003, 0.0), (0.03, 0.0), (0.03, 2e-3), (0.45, 2e-3)])
 def test_of_a_part_that_bends_in_two_planes_the_residual_is_in_its_range(share: float, noise: float) -> None:
     truth, td = planes(share), 0.31

@@ -129,6 +129,7 @@ def predicted(situation: Situation, tr: float) -> float:
     return candidate.residual
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("estimated", [False, True], ids=["oscillator", "parts alone"])
 def test_the_residual_of_switched_runs_is_predicted(estimated: bool) -> None:
     errors, some = [], chain.scan()[::3]

@@ -61,6 +61,7 @@ def test_noise_and_too_few_swings_are_not_counted() -> None:
     assert count_swings(TIME, 0.0 * TIME) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lifted", [0.0 * TIME, 5.0 + 0.01 * TIME])
 def test_the_pair_of_a_spring_that_stiffens_has_the_sign_of_td(lifted: Samples) -> None:
     x, energy = stiffening(1.0, 0.02)

@@ -53,6 +53,7 @@ def covered(samples_per_period: int, digits: int, *, jitter: float, runs: int) -
 WIDEST = {8: np.inf, 12: 1.2, 20: 0.66, 50: 0.204, 200: 0.042}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("digits", "jitter"), [(5, 0.0), (6, 0.4)])
 @pytest.mark.parametrize("samples_per_period", WIDEST)
 def test_intervals_from_samples_hold_the_true_crossing(samples_per_period: int, digits: int, jitter: float) -> None:
@@ -194,6 +195,7 @@ def test_candidates_state_how_large_their_residual_may_be() -> None:
         assert noted == (one.residual_high > one.residual + 0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["one", "small", "large"])
 def test_of_random_records_95_percent_are_within_their_bounds(kind: str) -> None:
     found = small_second_modes(kind, range(3))

@@ -145,6 +145,7 @@ def test_a_time_history_cut_at_any_byte_keeps_its_whole_states() -> None:
         assert true_t01(data[:cut]) == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flip", [0x01, 0x04, 0x80, 0xFF])
 def test_any_byte_of_a_binouts_structure_may_be_wrong(flip: int) -> None:
     data = bytearray(BINOUT.data)
