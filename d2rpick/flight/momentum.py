@@ -101,16 +101,19 @@ def _apart(momenta: Momenta, members: Sequence[int]) -> Iterator[int]:
         return
     velocity = momenta.of(members) / mass
     room = _OF_ITS_OWN * float(np.abs(velocity).max())
+    least, spans = _BY_ITSELF * float(momenta.time[-1] - momenta.time[0]), np.gradient(momenta.time)
     for part in members:
         if not masses[part] > 0:
             continue
         relative = np.linalg.norm(momenta.values[:, part] / masses[part] - velocity, axis=1)
+        if float(spans[relative > room].sum()) <= least:
+            continue  # whatever flights it has
         apart = (
             flight.end - flight.start
             for flight in _alone(momenta, part)
             if float(relative[window(momenta.time, flight.start, flight.end)].min()) > room
         )
-        if sum(apart) > _BY_ITSELF * float(momenta.time[-1] - momenta.time[0]):
+        if sum(apart) > least:
             yield part
 
 
