@@ -147,6 +147,7 @@ def test_the_command_of_an_answer_asks_the_same() -> None:
     assert found.to_dict()["command"] == list(found.command)
 
 
+@pytest.mark.slow
 def test_tables_lose_nothing_that_the_json_has(tmp_path: Path) -> None:
     """Of a part the shares in each flight, of a td what stands for itself beside the row: lists are no cells."""
     run = d2.read(BOX)
@@ -245,6 +246,7 @@ def test_pictures_and_pages(tmp_path: Path) -> None:
     assert "Verified" in verdict.report(str(tmp_path / "verdict.html")).read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_a_study_and_a_check_say_what_the_command_line_says(tmp_path: Path) -> None:
     copy = tmp_path / "second.csv"
     copy.write_bytes(Path(ENERGY).read_bytes())
@@ -276,6 +278,7 @@ def test_channels_of_unusual_names_tell_the_flight_as_on_the_command_line(tmp_pa
     assert found.to_frame()["tr"].tolist() == d2.suggest(d2.from_frame(table), td=0.37).to_frame()["tr"].tolist()
 
 
+@pytest.mark.slow
 def test_the_format_that_was_named_is_in_the_command_that_repeats_it(tmp_path: Path) -> None:
     file = tmp_path / "run.csv"
     file.write_text(f"*Time{Path(ENERGY).read_text()[4:]}")  # by its content this may be a deck

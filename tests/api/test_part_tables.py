@@ -52,6 +52,7 @@ def test_weights_in_memory_are_not_left_out_of_the_command_line() -> None:
     assert run(*answers[2].command).exit_code == 2
 
 
+@pytest.mark.slow
 def test_explore_takes_a_deck_as_suggest_does() -> None:
     read = d2.read(BOX)
     asked: Any = {"td_window": (0.3, 0.37), "parts": "recommended", "deck": DECK, "replay": False}

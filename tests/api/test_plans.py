@@ -32,6 +32,7 @@ def test_arguments_mean_what_options_mean(arguments: dict[str, Any], options: tu
     assert [(row["tr"], row["td"]) for row in theirs["windows"] if row["status"] == "supported"] == list(found.windows)
 
 
+@pytest.mark.slow
 def test_a_table_a_figure_and_a_page(tmp_path: Path) -> None:
     found = d2.plan(d2.read(MATSUM), parts="box", replay=False)
     frame = found.to_frame()

@@ -46,6 +46,7 @@ def test_a_given_oscillator_answers_as_the_identified_one() -> None:
 # ---- the computed rollover
 
 
+@pytest.mark.slow
 def test_the_rollover_is_switched_after_the_trip() -> None:
     answer = suggest(rollover(), 0.37, PLAIN)
     assert answer.situation.basis == "energy"
@@ -78,6 +79,7 @@ def test_no_peak_of_noise_that_is_nearer_than_the_better_pair_saves_anything(see
         assert there is None or there.same_swing
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.floats(-50, 50), st.sampled_from([1e-3, 1.0, 1e3]), st.sampled_from([1e-6, 1.0, 1e6]))
 def test_units_do_not_matter(shift: float, unit: float, joule: float) -> None:

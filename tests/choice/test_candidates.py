@@ -61,6 +61,7 @@ def test_td_on_the_highest_peak_of_an_undamped_record_has_extrema_for_candidates
     assert answer.recommended.residual == pytest.approx(0.0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_crossings_during_the_trip_are_not_acceptable() -> None:
     answer = suggest(rollover(), 0.37, PLAIN)
     start = sure(answer.situation.flight.start)

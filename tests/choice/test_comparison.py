@@ -91,6 +91,7 @@ def test_the_times_are_read_off_the_switched_run() -> None:
     assert "give the time of the switch as --td" in run("verify", "--tr", "0.1", "--part", "box", BOX).stderr
 
 
+@pytest.mark.slow
 def test_of_a_fall_the_times_are_not_guessed_and_given_ones_verify(tmp_path: Path) -> None:
     """Nothing vibrates before the ground: the energies of both runs are round-off until then."""
     box = ("rollover", "--drop", "0.1", "--mesh", "4", "--t-end", "0.18")
@@ -216,6 +217,7 @@ def test_a_right_switched_run_verifies_and_shows_what_was_locked_in(replayed: Ca
     assert found["verified"]
 
 
+@pytest.mark.slow
 def test_another_motion_of_the_switched_run_is_an_objection(replayed: Callable[..., str]) -> None:
     reference, slower = replayed("reference"), replayed("slower", *SWITCHES, v0="5")
     args = ("verify", *SWITCHES, reference, "--switched", slower)
@@ -235,6 +237,7 @@ def test_rigid_parts_that_report_no_motion_are_no_finding(replayed: Callable[...
     assert found["switched"]["momentum_error"] < 5e-4
 
 
+@pytest.mark.slow
 def test_a_wrong_energy_while_rigid_is_a_note_and_not_what_came_back(replayed: Callable[..., str]) -> None:
     right = replayed("right", *SWITCHES)
     wrong = replayed("wrong", *SWITCHES, change=lambda text: while_rigid(text, "inten", 55.5))
@@ -255,6 +258,7 @@ def test_what_a_reader_has_to_say_of_the_switched_run_is_not_lost(replayed: Call
     assert found["history"]["notes"] == []
 
 
+@pytest.mark.slow
 def test_csv_and_markdown_hold_the_comparison_too(replayed: Callable[..., str]) -> None:
     args = ("verify", *SWITCHES, replayed("reference"), "--switched", replayed("switched", *SWITCHES))
     switched = answer(*args)["switched"]
@@ -457,6 +461,7 @@ def test_energies_that_are_reported_wrongly_do_not_enter_the_comparison() -> Non
     assert any(note.startswith("left out of the comparison: engine, battery, wheels,") for note in found.notes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("parts", [("12-14",), ()])
 def test_where_all_energies_are_reported_wrongly_only_the_motion_is_judged(parts: tuple[str, ...]) -> None:
     found = sure(compared("car_heavy", *parts).switched)

@@ -43,6 +43,7 @@ def doubts(deck: str, *parts: int) -> dict[str, Caution]:
     return {one.code: one for one in doubts_of_solver(parts, read_inventory(deck))}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("rule", "code"), [("D2R406", "body-through-wall"), ("D2R407", "body-without-velocity")])
 def test_what_ruins_a_run_is_told_in_the_words_of_the_check(tmp_path: Path, rule: str, code: str) -> None:
     deck = placed(tmp_path, RULES[rule].failing[0])
@@ -333,6 +334,7 @@ def test_the_flight_begins_where_the_deck_lets_go(folder: Path, tmp_path: Path) 
     assert answer(*asked, "--deck", deck)["flight"]["start"] == 0.04
 
 
+@pytest.mark.slow
 def test_flying_is_the_heaviest_of_the_bodies_of_the_deck(folder: Path, tmp_path: Path) -> None:
     asked = ("suggest", "--no-verify", "--part", "flying", "--td", "0.05", str(folder / "MADET01"), "--deck")
     for deck in (made_car.starter(tmp_path), made_car.keywords(tmp_path)):
@@ -354,6 +356,7 @@ def test_no_pair_is_better_than_poor_where_the_deck_ruins_the_run(tmp_path: Path
     assert "'quality': 'good'" not in told
 
 
+@pytest.mark.slow
 def test_parts_that_a_deck_keeps_rigid_although_they_deform_make_a_pair_poor(folder: Path, tmp_path: Path) -> None:
     bodies = "".join(
         f"/GRNOD/PART/{number}\nparts\n{parts}\n/RBODY/{number}\nbody\n{node:10d}{'':50}{number:10d}\n"

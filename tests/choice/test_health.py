@@ -193,6 +193,7 @@ def test_a_window_that_reaches_into_the_next_contact_is_warned_of() -> None:
     assert "contact-in-window" in codes(found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("swing", [0.0, 3.0])
 def test_hourglass_is_an_alarm_only_where_a_level_is_matched(swing: float, tmp_path: Path) -> None:
     time = np.linspace(0, 1, 401)

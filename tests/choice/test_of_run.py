@@ -23,6 +23,7 @@ BOX = Selection(parts=("box",))
 PLAIN = Settings()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("file", "selection", "td"), [(ENERGY, Selection(), 0.064), (T01, BOX, 0.37)])
 def test_the_command_line_and_a_study_answer_as_the_library_does(file: str, selection: Selection, td: float) -> None:
     parts = [text for part in selection.parts for text in ("--part", part)]

@@ -95,6 +95,7 @@ def test_every_tr_of_the_windows_that_are_read_verifies() -> None:
     assert all(verify_at(answer.situation, float(one)).verified for window in windows for one in window)
 
 
+@pytest.mark.slow
 def test_a_plan_begins_a_flight_where_the_load_is_said_to_end(box: Reference) -> None:
     second = plan_of(box, LEVEL).flights[1]
     after = (second.start + second.end) / 2

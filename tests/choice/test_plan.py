@@ -109,6 +109,7 @@ def test_after_counts_in_its_flight_alone(reference: Reference, plan: Plan) -> N
 # ---- switched runs
 
 
+@pytest.mark.slow
 def test_a_switched_run_is_recognised_and_the_next_window_planned(
     reference: Reference, plan: Plan, tmp_path: Path
 ) -> None:
@@ -183,6 +184,7 @@ def test_a_run_that_was_not_switched_is_not_taken_for_one(reference: Reference, 
 # ---- a real solver
 
 
+@pytest.mark.slow
 def test_the_flights_and_windows_of_the_computed_box() -> None:
     """Contacts as the solver wrote them, openradioss/car_drop/drop2_runs.csv."""
     found = plan_of(real("drop2T01.gz"), PLAIN)
@@ -307,6 +309,7 @@ def test_a_window_that_is_left_out_says_what_it_would_cost_the_longer_one_even_w
     assert statuses(every)[:4] == ["supported", "supported", "re-plan", "re-plan"]
 
 
+@pytest.mark.slow
 def test_a_minimal_rigid_time_that_is_given_plans_both_one_after_the_other(car: Reference) -> None:
     found = plan_of(car, PLAIN, min_rigid=0.013)
     assert statuses(found) == ["supported", "re-plan"]
@@ -314,6 +317,7 @@ def test_a_minimal_rigid_time_that_is_given_plans_both_one_after_the_other(car: 
     assert [one.code for one in found.cautions][-1] == "longer-window-later"
 
 
+@pytest.mark.slow
 def test_a_window_of_more_than_half_the_longest_comes_first() -> None:
     """One after the other both are had with one more run; DROP2: 0.071 and then 0.091."""
     found = plan_of(real("drop2T01.gz"), PLAIN)

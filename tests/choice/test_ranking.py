@@ -85,6 +85,7 @@ def car(parts: str) -> History:
     return read([stored("carT01.gz")], Selection(parts=(parts,))).history
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("parts", ["1-17", "1-14"])
 def test_tr_does_not_jump_when_td_moves_a_little(parts: str) -> None:
     """From 49.6 to 82.4 ms it did, as td moved by 3 ms, and gained nothing: the mean energy after td hardly differs."""
@@ -248,6 +249,7 @@ def test_plastic_work_hides_no_vibration(vibration: float) -> None:
     assert still.situation.at_rest
 
 
+@pytest.mark.slow
 def test_a_vibration_that_was_damped_out_is_rest() -> None:
     time = np.linspace(0, 1, 2001)
     energy = 100 + 2.6 * np.exp(-40 * time) * (1 + np.cos(150 * time) * np.cos(97 * time))

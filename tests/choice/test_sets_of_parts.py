@@ -146,6 +146,7 @@ def car(tmp_path_factory: pytest.TempPathFactory) -> Parts:
     return asked(stored("carT01.gz"), str(deck), given=[12, 13, 14], times=(0.0496, 0.1464))
 
 
+@pytest.mark.slow
 def test_verdicts_on_the_car(car: Parts) -> None:
     rows = {row.title: row for row in car.rows}
     assert {name for name, row in rows.items() if not row.movable} == {"mounts", "suspension", "latches", "ground"}
@@ -327,6 +328,7 @@ def test_ls_dyna_is_not_offered_one_body_of_loose_pieces(folder: Path) -> None:
     assert warned(radioss, "loose-pieces")[0].endswith("each of them needs a rigid body of its own")
 
 
+@pytest.mark.slow
 def test_cards_keep_the_wheels_apart_from_the_car(folder: Path) -> None:
     deck, history = str(folder / "made.k"), str(folder / "MADET01")
     asked = ("--td", "0.05", "--no-verify", "--solver", "ls-dyna", "--deck", deck, history)
@@ -356,6 +358,7 @@ def test_without_a_deck_parts_that_fly_away_are_no_body(folder: Path) -> None:
     assert warned(joined, "moves-apart") == [told]
 
 
+@pytest.mark.slow
 def test_a_body_of_the_deck_that_holds_what_flies_away_is_not_recommended(folder: Path, tmp_path: Path) -> None:
     nodes = "".join(f"{node:10d}" + "\n" * (n % 10 == 9) for n, node in enumerate(made_car.places()))
     body = f"/RBODY/1\nall\n{99:10d}{0:10d}{0:10d}{0:10d}{'0':>20}{5:10d}\n/GRNOD/NODE/5\nall\n{nodes}\n"

@@ -63,6 +63,7 @@ def test_without_a_peak_in_the_window_one_of_its_ends_is_taken() -> None:
     assert found.recommended.residual == min(end.residual or 1 for end in ends if end)
 
 
+@pytest.mark.slow
 def test_several_parts_choose_the_peak_by_their_residual() -> None:
     found = suggest_in_window(chain.history(), (0.12, 0.14), PLAIN)
     assert found.situation.basis == "parts"
@@ -106,6 +107,7 @@ def test_what_is_given_up_for_a_higher_level_is_told() -> None:
     assert "is given up for quality" in lines["longer"]
 
 
+@pytest.mark.slow
 def test_without_a_window_the_longest_flight_is_searched_up_to_its_margin() -> None:
     found = answer("suggest", "--part", "box", T01)
     start, end = found["td_window"]

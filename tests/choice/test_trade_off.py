@@ -131,6 +131,7 @@ def test_the_flight_beside_a_td_is_the_one_that_suggest_names() -> None:
     assert explore_of(reference(history), asked, (0.27, 1.0), steps=4).situation.flight != alone
 
 
+@pytest.mark.slow
 def test_the_basis_is_that_of_the_recommended_pair() -> None:
     """The first td of the flight has a single state before it, which is no reason why a basis is refused."""
     reference = read(["sample_data/rollover_box.matsum"], Selection(parts=("box",)))

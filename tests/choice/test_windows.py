@@ -266,6 +266,7 @@ def test_a_profile_is_short_where_the_error_is_smooth() -> None:
     assert error_profile(answer.situation, answer.candidates, windows[:0]).shape == (2, 0)
 
 
+@pytest.mark.slow
 def test_two_oscillators_of_different_rate_share_what_both_verify() -> None:
     other = Mode(1.004 * OMEGA_2, MODE.alpha, MODE.cosine, MODE.sine, MODE.origin)
     histories = [PAPER, History(TIME, other.energy(TIME), ("other",), "made", "energy")]

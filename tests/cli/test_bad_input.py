@@ -244,6 +244,7 @@ def test_a_record_without_an_answer_is_an_objection_and_says_why(
         assert told == [warning["code"] for warning in found["warnings"] if warning["code"] not in in_table]
 
 
+@pytest.mark.slow
 def test_where_nothing_flies_a_td_is_asked_for_and_a_plan_is_an_objection(tmp_path: Path) -> None:
     file = tmp_path / "input"
     file.write_bytes(table(lambda t: t * t))
@@ -282,6 +283,7 @@ def test_of_a_time_behind_a_cut_the_cut_is_said_before_a_unit(tmp_path: Path) ->
     assert "meant" not in said or said.index("cut") < said.index("meant")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("source", [ENERGY, GLSTAT])
 def test_a_history_cut_anywhere_is_refused_or_answered_from_what_is_left(source: str, tmp_path: Path) -> None:
     data, file = Path(source).read_bytes(), tmp_path / "cut"

@@ -444,6 +444,7 @@ def test_parts_of_one_card_with_the_same_fault_are_one_finding() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_a_history_that_tells_no_flight_is_an_objection() -> None:
     time = np.linspace(0, 1, 60)
     rising = "\n".join(f"{t:.6f},{1 + t**2:.6f}" for t in time)

@@ -47,6 +47,7 @@ def test_the_published_record_gets_the_published_answer(source: str, digits: flo
     assert [(w["code"], "92%" in w["message"]) for w in found["warnings"]] == [("poor-td", True)]
 
 
+@pytest.mark.slow
 def test_a_rollover_without_an_oscillator_is_judged_by_energy_after_the_trip() -> None:
     found = answer(*ROLLING)
     assert found["basis"] == "energy"

@@ -84,6 +84,7 @@ def test_a_td_that_saves_little_is_no_step_and_the_sentence_says_so(tmp_path: Pa
     assert found["answer"].endswith("; no other td in the window has half of it and keeps half of the rigid time")
 
 
+@pytest.mark.slow
 def test_every_form_has_the_same_offers(tmp_path: Path) -> None:
     found = answer("explore", *WINDOW, ENERGY)["offers"]
     rows = list(csv.DictReader(io.StringIO(run("explore", *WINDOW, "-f", "csv", ENERGY).stdout)))

@@ -52,6 +52,7 @@ def test_from_csv_to_hdf5_and_back_the_file_is_the_same(tmp_path: Path) -> None:
     assert Path(names[0]).read_bytes() == Path(names[2]).read_bytes()
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(
     times=st.lists(NUMBERS, min_size=2, max_size=20, unique=True),
@@ -140,6 +141,7 @@ def test_the_box_has_one_flight_in_every_format_that_tells_its_momentum(box: dic
     assert np.ptp([one["recommended"]["tr"] for one in answers]) < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["csv", "h5"])
 def test_quantities_of_the_whole_model_are_extracted_under_one_name(
     suffix: str, box: dict[str, str], tmp_path: Path
@@ -184,6 +186,7 @@ def test_a_channel_that_is_none_is_refused(given: tuple[str, ...], reason: str, 
     assert reason in result.stderr
 
 
+@pytest.mark.slow
 def test_without_a_file_csv_goes_to_standard_output_and_notes_do_not(tmp_path: Path) -> None:
     file = tmp_path / "matsum"
     run(*REPLAY, "-o", str(file))

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 CAR = str(ROOT / "tests/data/carT01.gz")
 
 
+@pytest.mark.slow
 def test_once_says_what_there_is_and_whether_it_flies() -> None:
     result = run("follow", "--once", CAR)
     assert result.exit_code == 1

@@ -118,6 +118,7 @@ def test_the_table_names_what_it_rests_on_and_marks_the_recommended_row() -> Non
     assert next(line for line in lines if line.startswith("*")).endswith("best of a bad td")
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(
     energy=st.lists(st.floats(-1e3, 1e6, allow_subnormal=False), min_size=3, max_size=40),
@@ -406,6 +407,7 @@ def test_an_error_is_shown_on_a_clean_line(monkeypatch: pytest.MonkeyPatch) -> N
     assert stream.getvalue().endswith(" \r")
 
 
+@pytest.mark.slow
 def test_a_program_that_waits_for_its_input_says_so_on_the_terminal() -> None:
     master, slave = pty.openpty()
     with started("info", "-f", "csv", "-", stdin=subprocess.PIPE, stderr=slave) as process:

@@ -26,6 +26,7 @@ def car() -> str:
     return stored("carT01.gz")
 
 
+@pytest.mark.slow
 def test_the_deck_tells_which_parts_are_springs_where_energies_do_not(tmp_path: Path) -> None:
     deck = tmp_path / "CAR_0000.rad"
     deck.write_bytes(starter("CAR"))

@@ -337,6 +337,7 @@ def test_what_ndjson_gave_can_be_taken_up(runs: list[str], tmp_path: Path) -> No
     assert third["source"] == runs[2]
 
 
+@pytest.mark.slow
 def test_a_figure_of_runs_that_were_kept_without_outline_reads_them_again(runs: list[str], tmp_path: Path) -> None:
     ledger, figure = str(tmp_path / "ledger.ndjson"), str(tmp_path / "figure.svg")
     run(*STUDY, *runs, "--resume", ledger)

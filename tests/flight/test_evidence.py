@@ -125,6 +125,7 @@ def test_td_after_the_contact_is_refused_by_every_command(rolled: Rolled, tmp_pa
     assert "D2R204" in {finding["rule"] for finding in found["findings"]}
 
 
+@pytest.mark.slow
 def test_the_contact_energy_tells_the_flight_where_no_momentum_is_written(rolled: Rolled) -> None:
     whole = history_of(str(rolled.files["glstat"]))
     written = {name: getattr(whole.balance, name) for name in ("sliding", "external_work")}

@@ -142,6 +142,7 @@ def test_td_dragged_to_some_places_shows_the_digits_of_suggest(paper: Path, brow
     assert browser.complaints() == []
 
 
+@pytest.mark.slow
 @NEEDS_BROWSER
 def test_a_finger_moves_td_too(paper: Path, browser: Browser) -> None:
     browser.open(paper, width=390)
@@ -209,6 +210,7 @@ def words(found: dict[str, Any]) -> str:
     return f"td {short(found['td'])}, tr {short(best['tr'])}, residual {measure(best['residual'])}"
 
 
+@pytest.mark.slow
 @NEEDS_BROWSER
 def test_who_listens_can_use_it(paper: Path, browser: Browser) -> None:
     browser.open(paper)

@@ -67,12 +67,14 @@ def test_what_took_no_part_is_not_named() -> None:
     assert given["weights"] is None
 
 
+@pytest.mark.slow
 def test_the_library_names_them_too() -> None:
     found = d2.suggest(d2.read(BOX), td=0.37, parts="all", replay=False, deck="main.k", weights="site.toml")
     assert found.to_dict()["weights"]["sha256"] == digest("site.toml")
     assert digest("note.k") in found.report("page.html").read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_of_a_deck_of_many_files_a_page_names_the_first() -> None:
     names = [f"part{number}.k" for number in range(30)]
     for name in names:

@@ -256,6 +256,7 @@ def test_the_command_for_radioss_names_the_parts(tmp_path: Path) -> None:
     assert run(*("1001" if word == "IDS" else word for word in words)).exit_code == 0
 
 
+@pytest.mark.slow
 def test_the_command_for_another_td_holds_every_option_that_it_is_judged_by(tmp_path: Path) -> None:
     choosing = [
         "--after",

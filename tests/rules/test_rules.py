@@ -233,6 +233,7 @@ def test_a_file_with_nothing_but_its_end_says_what_is_missing(tmp_path: Path) ->
         check_deck(write(tmp_path, "$ title\n*END\n"))
 
 
+@pytest.mark.slow
 def test_a_deck_cut_within_a_line_or_its_mesh_is_never_passed_in_silence(tmp_path: Path) -> None:
     """Wherever it is cut, unless at the end of a line of a card that holds no mesh."""
     whole = GOOD.removesuffix(END) + "*NODE\n       1             0.0\n*ELEMENT_SHELL\n       1       1       1\n"

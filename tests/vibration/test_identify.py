@@ -99,6 +99,7 @@ def test_random_valid_records_are_accepted_with_the_right_parameters() -> None:
         assert abs(mode.omega - truth.omega) < margin, seed
 
 
+@pytest.mark.slow
 def test_two_modes_are_taken_for_one_in_at_most_5_percent() -> None:
     records = (random_record(seed, second=0.2)[:2] for seed in range(40))
     assert sum(identify(*record).describes_record for record in records) <= 2

@@ -173,6 +173,7 @@ def read_t01() -> History:
     return open_run([stored("chain_referenceT01.gz")], selection).history(selection)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("source", ["csv", "T01"])
 def test_the_closest_match_is_recommended_although_the_total_energy_is_off(source: str) -> None:
     answer = suggest(chain.history() if source == "csv" else read_t01(), chain.TD_PEAK, PLAIN)
@@ -186,6 +187,7 @@ def test_the_closest_match_is_recommended_although_the_total_energy_is_off(sourc
     assert [c.same_swing for c in answer.candidates if c.tr > 0.13] == [True, True]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("source", ["csv", "T01"])
 def test_the_recommended_run_is_among_the_best_of_the_scan(source: str) -> None:
     answer = suggest(chain.history() if source == "csv" else read_t01(), chain.TD_LATE, PLAIN)

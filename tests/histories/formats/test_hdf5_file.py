@@ -168,6 +168,7 @@ def check(layout: str, faults: list[Fault]) -> None:
         return
 
 
+@pytest.mark.slow
 @cases(10)
 @given(FAULTS)
 def test_damaged_files(faults: list[Fault]) -> None:

@@ -185,6 +185,7 @@ def test_something_else_is_no_matsum(text: bytes) -> None:
         read(text)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("lines", "legend"), [(3, True), (4, False)])
 def test_cut_anywhere_gives_whole_states_only(lines: int, legend: bool) -> None:
     text = matsum_text(TIMES[:3], IDS, ENERGIES[:3], lines)
