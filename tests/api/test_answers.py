@@ -118,6 +118,7 @@ def test_weights_in_memory_count_as_those_of_a_file() -> None:
     assert found[0] < found[1]  # the other part keeps what it costs
 
 
+@pytest.mark.slow
 def test_weights_of_a_site_are_those_of_the_command_line_and_of_the_file_they_are_saved_in(tmp_path: Path) -> None:
     found = d2.calibrate("sample_data/flying_box")
     assert found.to_dict() == answer(*found.command) | {"command": list(found.command)}
@@ -346,6 +347,7 @@ def test_a_table_that_no_energy_is_known_of_is_shown_without_a_picture(tmp_path:
     assert "<svg" not in d2.parts(loose.read(file))._repr_html_()
 
 
+@pytest.mark.slow
 def test_cards_are_those_of_the_command_line() -> None:
     ids: Any = {"merge": 1, "swset": (11, 12), "step_cap": 1e-6}
     run = d2.read(MATSUM)

@@ -195,6 +195,7 @@ def test_what_is_chosen_for_a_td_is_verified(history: History, td: float, asked:
     assert holds(history, answer.better_pair, asked)
 
 
+@pytest.mark.slow
 @settings(max_examples=5)
 @given(histories(), st.floats(3.0, 8.0), OPTIONS)
 def test_what_is_chosen_in_a_window_is_verified(history: History, low: float, asked: Settings) -> None:

@@ -89,6 +89,7 @@ def test_energies_that_do_not_vibrate_give_no_candidate(energy: np.ndarray) -> N
     assert "no-candidate" in codes(answer)
 
 
+@pytest.mark.slow
 def test_a_negative_level_is_never_acceptable() -> None:
     time = np.arange(0, 4, 0.01)
     answer = suggest(of(np.sin(2 * np.pi * time) - 0.5, time), 3.5, Settings(after=0.0))

@@ -91,6 +91,7 @@ def test_a_deck_is_written_and_what_ruins_it_is_an_objection(tmp_path: Path) -> 
 # An engine that reports wrong energies.
 
 
+@pytest.mark.slow
 def test_an_engine_with_wrong_energies_is_told_with_every_answer(tmp_path: Path) -> None:
     history = str(tmp_path / "CART02.csv")
     shutil.copy(ENERGY, history)
@@ -327,6 +328,7 @@ def test_parts_that_nothing_holds_fly(folder: Path, tmp_path: Path) -> None:
     assert "/BCS/7" not in str(rows[8]["reasons"])
 
 
+@pytest.mark.slow
 def test_the_flight_begins_where_the_deck_lets_go(folder: Path, tmp_path: Path) -> None:
     history, deck = str(folder / "MADET01"), made_car.starter(tmp_path, MOVED.format(stop=0.04))
     asked = ("suggest", "--no-verify", "--part", "1-6", "--td", "0.12", history)
@@ -376,6 +378,7 @@ def test_parts_that_a_deck_keeps_rigid_although_they_deform_make_a_pair_poor(fol
     assert error["message"] in told
 
 
+@pytest.mark.slow
 def test_check_and_suggest_agree_on_what_is_held(folder: Path, tmp_path: Path) -> None:
     cards = "".join(
         f"*DEFORMABLE_TO_RIGID_AUTOMATIC\n{number:10d}{0:10d}{time:10g}\n{'':40}{rigid:10d}{1 - rigid:10d}\n"

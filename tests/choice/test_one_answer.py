@@ -86,6 +86,7 @@ def test_a_td_that_is_read_keeps_the_margin(box: Reference) -> None:
             assert read_again(box.history, *row.window, asked).verified
 
 
+@pytest.mark.slow
 def test_every_tr_of_the_windows_that_are_read_verifies() -> None:
     history, asked = made("five modes"), Settings(after=0.1)
     answer = suggest(history, 0.8, asked)
@@ -180,6 +181,7 @@ def test_a_flight_whose_start_is_given_ends_where_the_oscillator_does(tmp_path: 
     assert suggest_in_window(reference.history, None, asked).td_window == (0.1, row.end)
 
 
+@pytest.mark.slow
 def test_a_card_says_the_same_of_a_pair_whoever_prints_it(tmp_path: Path) -> None:
     """Also of the health of the run, and of a td that is not printed as it was chosen."""
     time = np.linspace(0, 1, 1500) / 7

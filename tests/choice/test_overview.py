@@ -273,6 +273,7 @@ def test_rigid_legs_are_called_so_and_raise_no_alarm(names: tuple[str, ...], whe
     assert {flight["source"] for flight in found["flights"]} == {"momentum"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["tests/data/carT01.gz", "tests/data/drop2T01.gz"])
 def test_deformable_legs_are_not_called_rigid(name: str) -> None:
     assert "rigid-legs" not in {one["code"] for one in info(str(ROOT / name))["warnings"]}

@@ -277,6 +277,7 @@ def rigid_time(situation: Situation) -> float:
     return best.rigid_time if best and not best.same_swing else 0.0
 
 
+@pytest.mark.slow
 @given(
     st.integers(0, 2**32 - 1),
     st.floats(0.0, 0.05),

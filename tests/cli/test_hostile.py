@@ -78,6 +78,7 @@ def test_a_pipe_in_place_of_a_file_is_read_once_and_signed() -> None:
     assert digests[0] == digests[1]
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_told_of_the_file_that_it_holds(tmp_path: Path) -> None:
     ledger = tmp_path / "ledger"
     message = one_line(child('ulimit -f 0; d2rpick study --td 0.064 --resume "$1" "$2"', ledger, ENERGY))
@@ -161,6 +162,7 @@ def test_what_is_beyond_a_bound_is_told_unless_the_environment_raises_it(name: s
     assert "D2RPICK_MAX" not in raised.stderr
 
 
+@pytest.mark.slow
 def test_the_bounds_themselves_are_kept(tmp_path: Path) -> None:
     small = b"time,internal_energy\n" + b"".join(b"%d,0\n" % state for state in range(1000))
     for name, content in {
@@ -227,6 +229,7 @@ def test_a_damaged_line_of_a_resume_file_is_passed_over(damage: str, tmp_path: P
     assert "damaged or without a checksum: 1" in again.stderr
 
 
+@pytest.mark.slow
 def test_no_changed_byte_of_a_resume_file_gives_another_row(tmp_path: Path) -> None:
     from d2rpick.api.studies import Ledger
     from d2rpick.choice.situation import Settings

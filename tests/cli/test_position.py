@@ -39,6 +39,7 @@ def test_the_deck_tells_which_parts_are_springs_where_energies_do_not(tmp_path: 
     assert alone["history"]["channel"] == told["history"]["channel"] == "internal energy of engine, battery, wheels"
 
 
+@pytest.mark.slow
 def test_suggest_gives_it_for_every_candidate_and_says_it() -> None:
     chosen = d2.suggest(d2.read(car()), 0.1464, parts="1-17", replay=False)
     found = chosen.to_dict()
@@ -60,6 +61,7 @@ def test_suggest_gives_it_for_every_candidate_and_says_it() -> None:
     assert "engine,,the parts become one rigid body" in first
 
 
+@pytest.mark.slow
 def test_verify_warns_where_it_is_large() -> None:
     found = answer("verify", "--tr", "0.0826", "--td", "0.1464", "--part", "1-17", car())
     check_by_schema(found)

@@ -62,6 +62,7 @@ def test_the_schema_asks_for_what_scripts_rely_on(runs: list[str], key: str) -> 
         check_by_schema(found)
 
 
+@pytest.mark.slow
 def test_every_format_says_the_same(runs: list[str]) -> None:
     sources = [*runs, "absent.csv"]
     found = answer(*STUDY, *sources)
@@ -211,12 +212,14 @@ def wait_for(ledger: Path, lines: int) -> None:
     raise AssertionError(f"{ledger} never had {lines} lines")
 
 
+@pytest.mark.slow
 def test_all_processes_give_the_answer_of_one(runs: list[str]) -> None:
     sources = [*runs, "absent.csv", *runs]
     expected = run(*STUDY, *sources).stdout
     assert run("study", "--td", str(variants.TD), "--jobs", "3", *sources).stdout == expected
 
 
+@pytest.mark.slow
 def test_rows_come_in_order_as_soon_as_they_can(runs: list[str], tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "slow.csv")  # whoever reads it waits
     args = (*STUDY[:-1], "2", "-f", "ndjson", "run1.csv", "slow.csv", "run2.csv")

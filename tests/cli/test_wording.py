@@ -32,6 +32,7 @@ def test_messages_name_arguments_and_no_options(folder: str) -> None:
     assert [name for text in texts for name in re.findall(r"`(\w+)`", text) if not option_of(name)] == []
 
 
+@pytest.mark.slow
 def test_every_argument_has_an_option_that_exists() -> None:
     shown = "".join(run(command, "--help").stdout for command in COMMANDS)
     assert {name for name in ARGUMENTS if f"{option_of(name)} " not in shown} == set()

@@ -88,6 +88,7 @@ def test_heavy_parts_each_for_itself_stay_where_they_should_as_computed() -> Non
     assert together.errors(tr, td)[0] > 1.5e-3
 
 
+@pytest.mark.slow
 def test_of_the_bodies_of_the_car_that_of_many_parts_is_off() -> None:
     frame = (*range(1, 12), 13)
     found = bodies_in_flight(*car("1-14"), told(frame, (12,), (14,)))

@@ -190,6 +190,7 @@ def test_keys_and_buttons_move_td(paper: Path, browser: Browser) -> None:
     assert browser.complaints() == []
 
 
+@pytest.mark.slow
 @NEEDS_BROWSER
 def test_a_click_on_a_point_of_the_trade_off_selects_it(paper: Path, browser: Browser) -> None:
     browser.open(paper)
@@ -245,6 +246,7 @@ def test_nothing_is_cut_with_and_without_scripts(paper: Path, box: Path, browser
     assert browser.complaints() == []
 
 
+@pytest.mark.slow
 @NEEDS_BROWSER
 def test_it_prints_as_the_static_page_also_where_it_is_dark(paper: Path, browser: Browser) -> None:
     browser.open(paper, prefers_color_scheme="dark")

@@ -103,6 +103,7 @@ def test_paths_outside_are_absolute(results: list[Checked], tmp_path: Path) -> N
     assert f"file://{tmp_path}/main.k" in report.as_sarif(report.Checks(results, elsewhere), Shown())
 
 
+@pytest.mark.slow
 @given(st.text(), st.text(st.characters(exclude_characters="\0"), min_size=1))
 def test_any_text_makes_a_valid_report(message: str, name: str) -> None:
     name = name.encode("utf-8", "replace").decode()

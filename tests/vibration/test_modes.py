@@ -243,6 +243,7 @@ def test_records_without_several_modes_say_so(time: np.ndarray, energy: np.ndarr
 # ---- the choice
 
 
+@pytest.mark.slow
 def test_several_modes_are_chosen_by_and_replayed() -> None:
     answer = suggest(table(TIME, TWO.energy(TIME)), TWO.peaks(4.0, 5.0)[0], Settings(tolerance=0.5))
     situation = answer.situation
@@ -255,6 +256,7 @@ def test_several_modes_are_chosen_by_and_replayed() -> None:
     assert all(c.rigid_time > 0 for c in answer.candidates)
 
 
+@pytest.mark.slow
 def test_the_total_energy_of_the_chain_tells_its_two_modes() -> None:
     situation = examine(chain.history("IE_total_J"), chain.TD_PEAK, Settings())
     assert isinstance(situation.vibration.whole.mode, Modes)

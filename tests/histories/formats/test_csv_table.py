@@ -396,6 +396,7 @@ def test_what_is_written_is_read_back_bit_for_bit(
     assert history.energy.tolist() == [float(b) for _, _, b in rows]
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=20)
 @given(
     st.lists(st.floats(-1e20, 1e20), min_size=1, max_size=4),

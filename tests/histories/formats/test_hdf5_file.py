@@ -283,6 +283,7 @@ def test_a_crash_of_the_library_is_survived() -> None:
         check_file(Fatal(written(plain).getvalue()), "run.h5")
 
 
+@pytest.mark.slow
 def test_a_library_that_comes_to_no_end_is_ended() -> None:
     with pytest.raises(FormatError, match=r"run\.h5: the HDF5 library did not finish reading it; the file is damaged"):
         check_file(Endless(written(plain).getvalue()), "run.h5", seconds=1)
