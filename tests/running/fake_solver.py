@@ -2,7 +2,7 @@
 
 ``python fake_solver.py starter|engine DECK`` in the folder of a run.  The engine obeys its control file, writes
 restarts, and goes on from them; what it prints is what OpenRadioss prints there.  D2RPICK_FAKE names what goes wrong:
-``fail`` ends leg 2 with an error.
+``fail`` ends leg 2 with an error, ``slow`` has no state of it before it is told to stop.
 """
 
 from __future__ import annotations
@@ -53,6 +53,10 @@ def engine(deck: Path) -> None:
     listing.write_text(" started\n")
     made = headed([MadePart(1, "strip of shells", CODES)], globals_=len(CODES))
     killed, normal, last = False, True, start
+    if number == 2 and os.environ.get("D2RPICK_FAKE") == "slow":
+        while not Path(f"{name}_{number:04d}.ctl").exists():
+            time.sleep(PACE)
+        stop = start
     with history.open("wb") as stream:
         while True:
             now = start + (step + (start > 0)) * STEP  # a restart does not repeat a state

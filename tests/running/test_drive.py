@@ -119,6 +119,19 @@ def test_a_driver_that_is_ended_loses_no_leg(tmp_path: Path, ended: signal.Signa
     check(json.loads(found.stdout), tmp_path)
 
 
+@pytest.mark.slow
+def test_a_leg_that_was_stopped_before_its_first_state_is_begun_again(tmp_path: Path) -> None:
+    words, slow = [sys.executable, "-m", "d2rpick", *asked(tmp_path)], {**os.environ, "D2RPICK_FAKE": "slow"}
+    begun = tmp_path / "run" / "strip_0002.out"
+    with subprocess.Popen(words, cwd=ROOT, env=slow, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        while not begun.exists():
+            time.sleep(0.05)
+        process.send_signal(signal.SIGINT)
+    found = run(*asked(tmp_path, "--resume", "-q"))
+    assert not found.stderr
+    check(json.loads(found.stdout), tmp_path)
+
+
 def test_a_second_driver_is_kept_out(tmp_path: Path) -> None:
     with engine.alone(tmp_path), pytest.raises(D2RPickError, match="another d2rpick drives"), engine.alone(tmp_path):
         pass
