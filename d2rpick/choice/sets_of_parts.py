@@ -186,7 +186,9 @@ def recommended_parts(run: Run, settings: Settings, model: CostModel) -> tuple[i
     """Give the parts of the recommended set; FormatError where none can be recommended."""
     found = parts_of(run, settings, model)
     if found.recommended is None:
-        absent = [one.message for one in found.cautions if one.code in ("no-part-history", "parts-not-in-deck")]
+        if found.facts.reason:
+            raise FormatError(found.facts.reason)
+        absent = [one.message for one in found.cautions if one.code == "parts-not-in-deck"]
         why = "; ".join(dict.fromkeys([*absent, *(reason for one in found.sets for reason in one.reasons)]))
         raise FormatError(
             f"{run.name}: no set of parts can be recommended ({why or 'no part may be switched'}); name the parts"

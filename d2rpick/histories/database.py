@@ -65,7 +65,7 @@ class Database:
     parts: tuple[Part, ...] = ()
     digits = DIGITS[8]
     no_channels = ""
-    no_parts = "a table has no parts; choose its columns with `energy`, or give the matsum, binout or T01 of the run"
+    no_parts = "this table has no parts; give the matsum, binout or T01 instead, or one of its columns by `energy`"
 
     @cached_property
     def time(self) -> Samples:

@@ -444,7 +444,7 @@ def test_a_figure_shows_itself() -> None:
         (lambda: loose.check(DECK, history=ENERGY), TypeError, r"history is .*; give what d2rpick.read"),
         (lambda: loose.check(DECK, select=5), TypeError, "select is 5; ids of rules were expected"),
         (lambda: loose.suggest(d2.read(ENERGY), 9), d2.RangeError, "lies outside the record"),
-        (lambda: loose.suggest(d2.read(ENERGY), 0.06, parts=1), d2.D2RPickError, "a table has no parts"),
+        (lambda: loose.suggest(d2.read(ENERGY), 0.06, parts=1), d2.D2RPickError, "this table has no parts"),
         (lambda: loose.check("absent.k"), d2.DeckError, "absent.k"),
     ],
 )

@@ -19,7 +19,7 @@ from d2rpick.histories.opening import open_run
 from d2rpick.report.formats import Shown
 from d2rpick.vibration.measures import run_time_share
 from tests import made_car
-from tests.command import ROOT, answer, run
+from tests.command import ENERGY, ROOT, answer, run
 from tests.computed import starter, stored
 from tests.energies import sure
 from tests.json_schemas import check_by_schema
@@ -117,6 +117,11 @@ def test_a_deck_of_another_run_is_noticed(tmp_path: Path) -> None:
     assert found.recommended is None  # elements of a part that no *PART defines: the cost is not known
     with pytest.raises(FormatError, match="no set of parts can be recommended"):
         recommended_parts(open_run([BOX]), Settings(), CostModel(read_inventory(str(tmp_path / "main.k"))))
+
+
+def test_none_is_recommended_of_a_table_which_says_what_to_give_instead() -> None:
+    with pytest.raises(FormatError, match=r"^[^:]+: this table has no parts; give the matsum, .* instead"):
+        recommended_parts(open_run([ENERGY]), Settings(), CostModel(read_inventory(str(DECK))))
 
 
 def test_parts_of_a_run_in_which_nothing_deforms_are_listed(tmp_path: Path) -> None:

@@ -211,7 +211,7 @@ def test_chosen_parts_are_added_and_named() -> None:
     [
         ({"glstat": GLSTAT}, Selection(parts=("7",)), "glstat: a glstat has no parts; add the matsum of the run"),
         ({"matsum": MATSUM}, Selection(energy=("internal energy",)), "a matsum has parts only; choose with `parts`"),
-        ({"csv": b"time,IE\n0,1\n"}, Selection(parts=("7",)), "a table has no parts; choose its columns with `energy`"),
+        ({"csv": b"time,IE\n0,1\n"}, Selection(parts=("7",)), "csv: this table has no parts; give the matsum"),
         ({"radioss-th": bytes(t01(2, []).data)}, Selection(parts=("7",)), "no parts with histories of their own"),
         ({"glstat": GLSTAT, "matsum": MATSUM}, Selection(energy=("inernal energy",)), "did you mean 'internal energy'"),
         ({"glstat": GLSTAT}, Selection(energy=("time step", "Time Step")), "an energy is given twice"),
