@@ -34,6 +34,8 @@ _NARROWEST: Final = 40
 _NAMED: Final = {".json": "json", ".ndjson": "ndjson", ".csv": "csv", ".md": "markdown"}
 # What a report is often expected to be, and is not.
 _PRINTED: Final = (".pdf", ".doc", ".docx")
+# Lines of a result that stand out: what is recommended or judged, and what a deck is to be changed for.
+_ANSWER: Final = r"\* |(recommended|best of|make rigid|verdict|common tr) |  .*:\d+:\d+: (error|warning) D2R"
 
 
 # Arguments that messages name in backticks, and which options set them where these have other names.
@@ -161,14 +163,14 @@ class Output:
             raise D2RPickError(f"{name}: the file exists; give another one or --overwrite")
 
     def result(self, text: str) -> None:
-        """Give out the result; on a terminal the line of the recommended candidate stands out."""
+        """Give out the result; on a terminal the lines of the answer stand out."""
         content = text_bytes(text and f"{text}\n")
         if self.file is not None:
             self.write(self.file, content)
             return
         text = content.decode()
         colour = False if os.environ.get("NO_COLOR") else True if os.environ.get("FORCE_COLOR") else None
-        lines = (click.style(line, bold=True) if line.startswith("*") else line for line in text.split("\n"))
+        lines = (click.style(line, bold=True) if re.match(_ANSWER, line) else line for line in text.split("\n"))
         click.echo("\n".join(lines), nl=False, color=colour)
 
     def content(self, content: bytes) -> None:

@@ -195,6 +195,18 @@ def test_colour_is_for_terminals_unless_asked_for(env: dict[str, str], coloured:
     assert (STAR in run(*SUGGEST, ENERGY, env=env).stdout) == coloured
 
 
+@pytest.mark.parametrize(
+    ("args", "line"),
+    [
+        ((*VERIFY, "--no-verify", ENERGY), "verdict  "),
+        (("check", DECK, "--history", ENERGY), r"  \S+:43:21: error"),
+    ],
+)
+def test_what_is_judged_stands_out_too(args: tuple[str, ...], line: str) -> None:
+    assert re.search(rf"\x1b\[1m{line}", run(*args, env={"FORCE_COLOR": "1"}).stdout)
+    assert "\x1b" not in run(*args, color=True, env={"FORCE_COLOR": "1", "NO_COLOR": "1"}).stdout
+
+
 def test_a_terminal_has_colour_unless_refused_and_files_never_do(tmp_path: Path) -> None:
     # CliRunner's color stands for a terminal
     assert STAR in run(*SUGGEST, ENERGY, color=True).stdout
