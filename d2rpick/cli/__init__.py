@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn, TypeVar
 import click
 
 from d2rpick.base import __version__
-from d2rpick.base.errors import one_line, printable
+from d2rpick.base.errors import one_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -62,7 +62,18 @@ class _PipeClosed(Exception):  # noqa: N818  not an error: the reader of the pip
     """Carries BrokenPipeError past click, which would exit with 1: an objection."""
 
 
-class _Group(click.Group):
+class Documented(click.Command):
+    """A command whose help ends with examples."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+        """Write the examples no wider than the help."""
+        from d2rpick.report.tables import continued  # not above: most of what is typed does without it
+
+        lines = [continued(f"  {line}", formatter.width) for line in (self.epilog or "").split("\n")]
+        formatter.write("\n" + "\n".join(lines) + "\n")
+
+
+class _Group(Documented, click.Group):
     """Loads commands on demand; the one place where errors become messages and exit codes."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002  click's signature
@@ -128,7 +139,9 @@ class _Group(click.Group):
 
 
 def _fail(message: str) -> NoReturn:
-    click.echo(f"d2rpick: {printable(message)}", err=True)
+    from d2rpick.cli.output import tell
+
+    tell(f"d2rpick: {message}")
     sys.exit(COULD_NOT_RUN)
 
 
@@ -157,7 +170,8 @@ def documented(cls: type[_Made], **settings: Any) -> Callable[[Any], _Made]:
 
     def made(function: Any) -> _Made:
         told, _, examples = cleandoc(function.__doc__).partition("\n\nExamples\n--------\n")
-        epilog = "\n".join(["\b", "Examples:", *(f"  {line}" for line in examples.split("\n"))])
+        lines = examples.replace("\\\n    ", "").split("\n")  # each command in one line
+        epilog = "\n".join(["Examples:", *(f"  {line}" for line in lines)])
         return click.command(function.__name__, cls=cls, help=told, epilog=epilog, **settings)(function)
 
     return made

@@ -130,7 +130,7 @@ def check(
     if results or form != "table":
         history = judge.run.sources if judge else None
         checks = Checks(results, failed=failed, cautions=cautions, fail_on=limit, history=history)
-        output.result(in_words(write("findings", form, checks, output.shown()), form))
+        output.result(in_words(write("findings", form, checks, output.shown()), form, output.columns))
     if not results or any(one.code == INTERNAL_ERROR for one in failed):
         click.get_current_context().exit(2)
     heavy = any(finding.severity.rank <= limit.rank for result in results for finding in result.findings)
@@ -232,4 +232,5 @@ def rule(id: tuple[str, ...], output: Output) -> None:  # noqa: A002  the name i
 
     output = output.beside()
     rules = [rule for name in id for rule in find_rules(name)]
-    output.result("\n\n\n".join(map(report.as_text, rules)) if rules else report.as_list())
+    text = "\n\n\n".join(report.as_text(rule, output.shown().width) for rule in rules)
+    output.result(text or in_words(report.as_list(), "table", output.columns))

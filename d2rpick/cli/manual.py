@@ -45,7 +45,7 @@ def _described(command: click.Command, context: click.Context) -> Iterator[str]:
         if record:
             yield from _item(*record)
     if command.epilog:
-        examples = [line.strip() for line in command.epilog.replace("\b", "").splitlines() if line.strip()]
+        examples = [line.strip() for line in command.epilog.splitlines()]
         yield from (".PP", _text(examples[0]), ".PP", ".nf", *map(_text, examples[1:]), ".fi")
 
 

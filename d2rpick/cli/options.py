@@ -13,7 +13,7 @@ from click.core import ParameterSource
 from d2rpick.api.cards import Cards
 from d2rpick.api.request import CHOOSING, JUDGING, OSCILLATOR, READING, TIME, Option, Request, dashed, options_of
 from d2rpick.base.errors import ArgumentError
-from d2rpick.cli import documented
+from d2rpick.cli import Documented, documented
 from d2rpick.cli.output import Output, tell, text_bytes, with_options
 from d2rpick.cli.values import CARDS, click_type, settings_of, spelled, words_of
 
@@ -60,7 +60,7 @@ _SOURCES: Final = {
 }
 
 
-class Command(click.Command):
+class Command(Documented):
     """A command that can show its settings instead of running, and names options where arguments make no sense."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:

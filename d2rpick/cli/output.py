@@ -80,6 +80,11 @@ class Output:
         """Where the result goes; None for stdout."""
         return None if self.output_file == "-" else self.output_file
 
+    @property
+    def columns(self) -> int:
+        """Columns of the terminal that the result goes to; 0 where it goes to none."""
+        return 0 if self.file else columns_of(sys.stdout) or 0
+
     def beside(self, *inputs: str | None) -> Output:
         """Give what writes beside these inputs; D2RPickError when a file to be written may not be."""
         output = replace(self, inputs=tuple(name for name in inputs if name not in (None, "-")))
@@ -110,9 +115,8 @@ class Output:
         from d2rpick.report.formats import Shown
 
         meta = click.get_current_context().meta
-        width = None if self.file else columns_of(sys.stdout)
         shown = Shown(meta["d2rpick.command"], self.limit, verbose=meta.get("d2rpick.verbose", False), **more)
-        return shown if width is None else shown._replace(width=width)
+        return shown._replace(width=self.columns or shown.width)
 
     def answer(self, answer: Answer, below: str = "", **shown: Any) -> None:
         """Give out an answer in the form that is asked for."""

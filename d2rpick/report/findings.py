@@ -300,28 +300,26 @@ def _xml(text: str) -> str:
     return re.sub(_NOT_XML, "?", printable(text))
 
 
-_WIDTH = 100
-
-
 def as_list() -> str:
     """Id, severity and summary of every rule."""
     return "\n".join(f"{rule.id}  {rule.severity:<7}  {rule.summary}" for rule in RULES.values())
 
 
-def as_text(rule: Rule) -> str:
-    """One rule: what it finds, why that matters, and decks that pass and fail."""
-    lines = [f"{rule.id} ({rule.severity}): {rule.summary}", "", *textwrap.wrap(rule.explanation, _WIDTH)]
+def as_text(rule: Rule, width: int) -> str:
+    """One rule: what it finds, why that matters, and decks that pass and fail, which are as wide as their cards."""
+    title = f"{rule.id} ({rule.severity}): {rule.summary}"
+    lines = [tables.wrapped(title, width), "", *textwrap.wrap(rule.explanation, width)]
     for title, examples in (("Passes", rule.passing), ("Fails", rule.failing)):
         for example in examples:
-            lines += ["", *_example(title, example)]
+            lines += ["", *_example(title, example, width)]
     return "\n".join(lines)
 
 
-def _example(title: str, example: Example) -> Iterator[str]:
+def _example(title: str, example: Example, width: int) -> Iterator[str]:
     """A deck as it stands in its file, with what it includes and what it is checked against."""
     if example.history:
         yield f"{title}, with the history of"
-        yield f"  d2rpick replay {example.history} -o energy.csv"
+        yield tables.continued(f"  d2rpick replay {example.history} -o energy.csv", width)
         yield f"checked by d2rpick check {example.name} --history energy.csv {example.options}".rstrip() + ":"
     elif example.stdin:
         yield f"{title}, read by d2rpick check -:"
@@ -330,11 +328,6 @@ def _example(title: str, example: Example) -> Iterator[str]:
     else:
         yield f"{title}:"
     yield ""
-    yield from _indented(example.deck)
+    yield example.deck.rstrip("\n")
     for name, text in example.files.items():
-        yield from ("", f"with {name}:", "")
-        yield from _indented(text)
-
-
-def _indented(text: str) -> Iterator[str]:
-    return (f"    {line}".rstrip() for line in text.rstrip("\n").split("\n"))
+        yield from ("", f"with {name}:", "", text.rstrip("\n"))

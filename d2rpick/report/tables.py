@@ -148,6 +148,25 @@ def wrapped(text: str, width: int) -> str:
     return "\n".join(line if len(line) <= width else _below(line, width) for line in text.split("\n"))
 
 
+def continued(line: str, width: int) -> str:
+    r"""Break a command line that is longer than ``width`` before options, where a shell joins it again.
+
+    Examples
+    --------
+    >>> print(continued("d2rpick drive --engine 'engine -i {deck}' -o driven", 44))
+    d2rpick drive --engine 'engine -i {deck}' \
+        -o driven
+    """
+    from textwrap import TextWrapper
+
+    if len(line) <= width:
+        return line
+    indent = " " * (len(line) - len(line.lstrip()) + 4)
+    wrapper = TextWrapper(width - 2, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+    wrapper.wordsep_simple_re = re.compile(r"(\s+)(?=--?[a-z][^']*(?:'[^']*'[^']*)*$)")
+    return " \\\n".join(wrapper.wrap(line))
+
+
 def _below(line: str, width: int) -> str:
     """Break a line behind the blanks that follow its name, or those that it begins with."""
     from textwrap import fill

@@ -23,7 +23,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from d2rpick import __version__
-from d2rpick.cli import progress
+from d2rpick.cli import COMMANDS, progress
 from tests.command import DECK, ENERGY, GLSTAT, MATSUM, OSCILLATOR, ROLLOVER, ROOT, answer, run, started
 from tests.json_schemas import check_by_schema
 
@@ -485,6 +485,10 @@ def test_runs_are_counted_with_the_time_that_is_left(monkeypatch: pytest.MonkeyP
         ("plan", "--no-verify", "--energy", "boxIE_J", ROLLOVER),
         (*VERIFY, "--no-verify", ENERGY),
         ("info", ENERGY),
+        ("rule",),
+        ("rule", "D2R001", "D2R206", "D2R409"),
+        ("check", DECK, "--history", ENERGY),
+        *((command, "--help") for command in COMMANDS),
     ],
 )
 def test_nothing_on_stdout_is_wider_than_the_terminal(args: tuple[str, ...], columns: int) -> None:
@@ -492,6 +496,12 @@ def test_nothing_on_stdout_is_wider_than_the_terminal(args: tuple[str, ...], col
     assert max(map(len, result.stdout.replace(str(ROOT), "").splitlines())) <= min(columns, 100)
     if columns == 80:
         assert max(map(len, result.stderr.splitlines()), default=0) <= 80
+
+
+def test_an_error_ends_where_the_terminal_does() -> None:
+    args = ("suggest", "--td", "0.06", "--part", "1", ENERGY)
+    assert max(map(len, run(*args, env={"COLUMNS": "80"}).stderr.replace(str(ROOT), "").splitlines())) <= 80
+    assert run(*args).stderr.count("\n") == 1
 
 
 def test_columns_without_a_value_are_left_out_and_three_rows_are_shown() -> None:
