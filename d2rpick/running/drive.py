@@ -130,7 +130,7 @@ class Driver:
         if not left.normal and (alive or not resumed):
             words = self.solver.last_lines(order.number)
             raise D2RPickError(f"{self.solver.file(order.number, '.out')}: the solver failed: {words}")
-        self._end(order, left)
+        self._end(order, left, again=resumed)
 
     def _under_way(self, order: Order) -> bool:
         """Whether an earlier driver has begun this leg, and nobody has said how it ended."""
@@ -221,14 +221,16 @@ class Driver:
             self._wait_for_end()
             left = self.solver.left(order.number)
             if left.normal:
-                self._end(order, left)
+                self._end(order, left, again=True)
             raise
 
-    def _end(self, order: Order, left: Left) -> None:
-        """Write down how a leg has ended; one that left nothing to go on from is begun again."""
+    def _end(self, order: Order, left: Left, *, again: bool) -> None:
+        """Write down how a leg has ended; one that left nothing to go on from is begun again.
+
+        ``again``: also one that ended as it should, but before its first state, since an earlier driver stopped it.
+        """
         seen = self._seen(order)
-        told = self.solver.file(order.number, ".ctl").exists()
-        at_once = told and (seen is None or seen.time <= order.start)  # interrupted before there was anything to see
+        at_once = again and (seen is None or seen.time <= order.start)
         if seen is None or at_once or (left.restart is None and not order.rigid) or (order.rigid and not left.normal):
             if left.normal and not at_once:
                 raise D2RPickError(f"{self.solver.file(order.number, '.out')}: the leg left no state, or no restart")

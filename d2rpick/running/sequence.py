@@ -255,6 +255,8 @@ def windows(legs: Sequence[Leg], limits: Limits) -> list[Window]:
 
 def control(order: Order, seen: Seen, limits: Limits) -> str:
     """Say what the engine is to be told by what is seen of a leg that is being computed; nothing where it goes on."""
+    if seen.time <= order.start:
+        return ""  # its first state is still to come
     if order.rigid:
         return "/KILL\n" if seen.contact is not None else ""
     if order.kind == SEARCH:

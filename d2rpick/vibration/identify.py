@@ -26,6 +26,7 @@ MIN_SAMPLES_BESIDE: Final = 4  # of a mode beside one that is certain: below, ce
 MAX_GROWTH: Final = 0.3  # -alpha x record length: a free vibration only decays, noise hides no more than this
 MIN_PLASTIC: Final = -0.05  # of the energy range: plastic work is positive but for the scatter of its fit
 MAX_OF_SPRING: Final = 0.1  # misfit that a spring which stiffens leaves to a vibration through zero
+_OF_A_PRELOAD: Final = 0.03  # of the vibration energy: lifts a residual of 0.2, near the limit of a good one, to 0.4
 
 # The energy below which a rest is not held against a mode: a solver errs by 1e-5 of the maximum anywhere.
 _FLOOR: Final = 1e-4  # of the highest vibration energy
@@ -73,6 +74,8 @@ class Identification(NamedTuple):
         Of the vibration energy, what a further mode may hold unseen; zero where none was looked for [-].
     follows : bool
         Whether the fit follows the samples, plausible or not.
+    plausible : bool
+        Whether it would be one free vibration, if it followed them.
     """
 
     mode: Mode | Modes | None
@@ -87,6 +90,7 @@ class Identification(NamedTuple):
     vibration: float = np.nan
     hidden_share: float = 0.0
     follows: bool = False
+    plausible: bool = False
 
     def energy_deviation(self, times: Samples | float) -> Samples:
         """Return the standard deviation of the fitted energy at ``times`` [energy]; NaN without a mode.
@@ -196,23 +200,26 @@ def _first_to_follow(attempts: Iterable[tuple[_Attempt, float]], record: _Record
     for attempt, least_periods in attempts:
         found = _judged(attempt, least_periods, record)
         if found.follows:
-            return _through_zero(found, refused)
+            return _through_zero(found, [one for one in refused if one.plausible])
         refused.append(found)
     return min(refused, key=lambda one: one.rms) if refused else _out_of_reach(np.array([record.start, record.end]))
 
 
-def _through_zero(found: Identification, refused: list[Identification]) -> Identification:
+def _through_zero(found: Identification, simple: list[Identification]) -> Identification:
     """Give for a vibration that a preload keeps off zero the one of half its rate that passes zero, if it is near.
 
     The energy swings once in a period of the one, twice in that of the other: from one swing to the next their signs
-    differ.  What tells them apart is then as small as what a spring that stiffens adds.
+    differ.  What tells them apart is then as small as what a spring that stiffens adds.  If it is a preload after all,
+    residuals are twice as large, which counts like a hidden mode.
     """
     mode = found.mode
     if not isinstance(mode, Mode) or mode.preload**2 <= float(mode.vibration_energy(found.start)):
         return found
-    near = (one for one in refused if one.misfit is not None and one.misfit < MAX_OF_SPRING)
-    simple = min(near, key=lambda one: one.rms, default=None)
-    return simple._replace(describes_record=True, follows=True, reason=None) if simple else found
+    near = [one for one in simple if one.misfit is not None and one.misfit < MAX_OF_SPRING]
+    if not near:
+        return found
+    best = min(near, key=lambda one: one.rms)
+    return best._replace(describes_record=True, follows=True, reason=None, hidden_share=_OF_A_PRELOAD)
 
 
 def _out_of_reach(time: Samples) -> Identification:
@@ -311,7 +318,8 @@ def _judged(
     local_structure = fitting.structure_of(rest / np.maximum(vibration, max(rms, _FLOOR * np.max(vibration))))
     loose = _loose(attempt.name, rms / spread, structure / spread, local_structure)
     found_density = samples_per_period(s, attempt.scaled)
-    reason = loose or _implausible(attempt.scaled, found_density, density, least_periods, record.end - record.start)
+    wrong = _implausible(attempt.scaled, found_density, density, least_periods, record.end - record.start)
+    reason = loose or wrong
     return Identification(
         mode=attempt.mode,
         describes_record=reason is None,
@@ -324,6 +332,7 @@ def _judged(
         covariance=_covariance(attempt.normal, rest) * attempt.units * attempt.units[:, None],
         vibration=float(np.hypot.reduce(vibration) / np.sqrt(s.size)) * record.scale,  # squares may overflow
         follows=loose is None,
+        plausible=wrong is None,
     )
 
 

@@ -192,7 +192,7 @@ def resolved(time: Samples, energy: Samples, fit: Identification) -> Identificat
         Accepted; returned as it is but for its ``hidden_share`` where no second mode can be told.
     """
     assert fit.mode is not None
-    spectrum = _spectrum(time, energy, fit.mode)
+    least, spectrum = fit.hidden_share, _spectrum(time, energy, fit.mode)
     large = _share(spectrum) > SMALLEST * _LEFT_OVER
     if isinstance(fit.mode, Mode) and large and float(np.max(spectrum.chance)) > _certain(time.size):
         two = identify_beside(time, energy, fit.mode, _strongest(spectrum) / 2 / (fit.end - fit.start))
@@ -200,7 +200,7 @@ def resolved(time: Samples, energy: Samples, fit: Identification) -> Identificat
             assert two.mode is not None
             fit, spectrum = two, _spectrum(time, energy, two.mode)
     assert fit.mode is not None
-    hidden = _share(spectrum)
+    hidden = max(least, _share(spectrum))
     if len(fit.mode.modes) > 1 and samples_per_period(time, fit.mode) < MIN_SAMPLES_PER_PERIOD:
         fastest = fit.mode.modes[-1].vibration_energy(time[0])  # its rate may be an alias
         hidden += float(fastest / fit.mode.vibration_energy(time[0]))

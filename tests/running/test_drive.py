@@ -19,7 +19,7 @@ from d2rpick.base.errors import D2RPickError
 from d2rpick.histories.formats.radioss_th import TimeHistory
 from d2rpick.histories.opening import open_run
 from d2rpick.running import engine
-from d2rpick.running.sequence import LOAD, PROBE, Leg, Limits, Order, Seen, window_of
+from d2rpick.running.sequence import LOAD, PROBE, SEARCH, Leg, Limits, Order, Seen, control, window_of
 from tests.command import ROOT, run
 from tests.deck.test_openradioss import ENGINE, starter
 from tests.decks import wide
@@ -130,6 +130,13 @@ def test_a_leg_that_was_stopped_before_its_first_state_is_begun_again(tmp_path: 
     found = run(*asked(tmp_path, "--resume", "-q"))
     assert not found.stderr
     check(json.loads(found.stdout), tmp_path)
+
+
+def test_a_leg_is_not_told_to_stop_before_its_first_state() -> None:
+    """A short search was over by the highest energy of the leg before it, and stopped where it began."""
+    order, limits = Order(SEARCH, 2, 0.1, 0.104), Limits(1.0, 1e-3, 0.0, None)
+    assert not control(order, Seen(0.1, peak=0.1), limits)
+    assert control(order, Seen(0.103, peak=0.1), limits) == "/STOP\n"
 
 
 def test_a_second_driver_is_kept_out(tmp_path: Path) -> None:

@@ -250,3 +250,23 @@ def test_a_real_chain_of_two_modes_is_refused(channel: str) -> None:
 def test_a_parameter_that_changes_next_to_nothing_leaves_no_overflow() -> None:
     jacobian = np.stack([np.ones(30), np.linspace(0, 1, 30), np.full(30, 1e-155)])
     assert np.all(np.isfinite(_covariance(jacobian @ jacobian.T, np.linspace(-1, 1, 30))))
+
+
+def about_a_preload(time: Samples, omega: float, phase: float) -> tuple[Samples, Samples]:
+    """Deformation about a preload that it never passes zero with, and its velocity over omega."""
+    return 1 + 0.2 * np.cos(omega * time + phase), -0.2 * np.sin(omega * time + phase)
+
+
+def test_a_preload_that_hardly_shows_is_a_vibration_of_half_the_rate_with_room_for_it() -> None:
+    time = np.arange(0.0, 6.7, 1 / 40)
+    found, mode = accepted(time, about_a_preload(time, 2 * np.pi, 3.4484)[0] ** 2)
+    assert mode.omega == pytest.approx(np.pi, rel=1e-2)
+    assert mode.preload == 0.0
+    assert found.hidden_share >= 0.03
+
+
+def test_what_has_too_few_samples_is_not_taken_for_a_vibration_of_half_its_rate() -> None:
+    """The refused fit of a fast vibration about a preload, aliased, was accepted without a look at its samples."""
+    for rate in np.linspace(4.1, 4.6, 6).tolist():
+        time = np.arange(0.0, 6.0, 1 / rate)
+        assert not identify(time, about_a_preload(time, 2 * np.pi * (1 + rate), 1.0)[0] ** 2).describes_record
