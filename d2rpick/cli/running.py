@@ -10,7 +10,7 @@ import click
 from d2rpick.api.request import NOT_NEGATIVE, POSITIVE, Option, Request
 from d2rpick.base.errors import printable
 from d2rpick.cli import options
-from d2rpick.cli.output import Output, tell, text_bytes, with_options
+from d2rpick.cli.output import Output, in_words, tell, text_bytes
 from d2rpick.cli.progress import telling
 from d2rpick.cli.values import click_type
 from d2rpick.report.formats import FORMATS
@@ -169,8 +169,8 @@ def follow(run: str, wait: float | None, once: bool, lasting: float | None, requ
                 text = json.dumps(one._asdict(), allow_nan=False)
             else:
                 seen = "-" if one.seen is None else f"{one.seen:.6g}"
-                text = f"{seen:>10}  {one.event:<10}  {with_options(one.message)}"
-            click.echo(text_bytes(f"{text}\n"), nl=False)
+                text = f"{seen:>10}  {one.event:<10}  {one.message}"
+            click.echo(text_bytes(f"{in_words(text, output.output_format, output.columns)}\n"), nl=False)
     except KeyboardInterrupt:
         return
     output.finish(objection=failed or (seconds is not None and since is None))

@@ -24,7 +24,7 @@ from hypothesis import strategies as st
 
 from d2rpick import __version__
 from d2rpick.cli import COMMANDS, progress
-from tests.command import DECK, ENERGY, GLSTAT, MATSUM, OSCILLATOR, ROLLOVER, ROOT, answer, run, started
+from tests.command import BOX, DECK, ENERGY, GLSTAT, MATSUM, OSCILLATOR, ROLLOVER, ROOT, answer, run, started
 from tests.json_schemas import check_by_schema
 
 SUGGEST = ("suggest", "--td", "0.064")
@@ -485,6 +485,7 @@ def test_runs_are_counted_with_the_time_that_is_left(monkeypatch: pytest.MonkeyP
         ("plan", "--no-verify", "--energy", "boxIE_J", ROLLOVER),
         (*VERIFY, "--no-verify", ENERGY),
         ("info", ENERGY),
+        ("follow", "--once", "--part", "box", BOX),
         ("rule",),
         ("rule", "D2R001", "D2R206", "D2R409"),
         ("check", DECK, "--history", ENERGY),

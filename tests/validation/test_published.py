@@ -11,7 +11,7 @@ from d2rpick.models.box_model import Parameters
 from d2rpick.report.formats import PLAIN
 from d2rpick.vibration.oscillator import Oscillator, Replay, State
 from tests import paper
-from tests.command import ENERGY, ROOT, answer, run
+from tests.command import ENERGY, ROOT, answer, run, unwrapped
 from tests.json_schemas import check_by_schema
 from validation.published import box, exhibits, saving, values
 from validation.published.drawing import draw_exhibit
@@ -154,7 +154,7 @@ def test_the_command_writes_figures_and_tables(tmp_path: Path) -> None:
     drawn = ("masses", "response", "elements", "motion", "saving")
     expected = {f"{name}.{form}" for name in drawn for form in ("svg", "png", "csv")} - {"masses.csv", "elements.csv"}
     assert names == expected | {"README.md", "table.csv"}
-    assert all(misprint in result.stdout for misprint in MISPRINTS)
+    assert all(misprint in unwrapped(result.stdout) for misprint in MISPRINTS)
     index = (place / "README.md").read_text("utf-8")
     assert all(f"{name}.svg" in index for name in drawn)
     assert page.read_text("utf-8").count("<figure>") == len(drawn)
@@ -173,9 +173,10 @@ def test_without_the_repository_a_line_says_what_is_missing(tmp_path: Path, monk
 
 @pytest.mark.parametrize("form", PLAIN)
 def test_every_form_is_written(form: str, tmp_path: Path) -> None:
-    written = run("reproduce", "--section", "5", "--output-dir", str(tmp_path), "-f", form)
+    written = run("reproduce", "--section", "5", "--output-dir", str(tmp_path), "-f", form, env={"COLUMNS": "80"})
     assert written.exit_code == 0, written.stderr
     assert written.stdout.strip()
+    assert form != "table" or max(map(len, written.stdout.splitlines())) <= 80
 
 
 @pytest.mark.slow

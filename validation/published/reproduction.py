@@ -69,13 +69,14 @@ DOCUMENT: Final = Document(
 )
 
 
-def as_table(answer: Reproduction, _: Shown) -> str:
+def as_table(answer: Reproduction, shown: Shown) -> str:
     """Published numbers and reference values beside those here, the pairs, the figures, the misprints."""
     rows, exhibits = answer[:2]
-    lines = [tables.as_text(HEAD, [cells(row) for row in rows]), "", *pairs_of(), ""]
+    lines = [tables.as_text(HEAD, [cells(row) for row in rows], shown.width), "", *pairs_of(), ""]
     for one in exhibits:
         lines += [f"{heading(one)}: {verdict(one)}", f"  paper  {one.paper}", f"  here   {one.found}"]
-    return "\n".join([*lines, "", "misprints in the paper", *(f"  {misprint}" for misprint in MISPRINTS)])
+    lines += ["", "misprints in the paper", *(f"  {misprint}" for misprint in MISPRINTS)]
+    return tables.wrapped("\n".join(lines), shown.width)
 
 
 def as_markdown(answer: Reproduction, _: Shown, *, pictures: bool = False) -> str:
