@@ -15,7 +15,7 @@ from d2rpick.api.cards import Cards, JudgedCard
 from d2rpick.api.request import OPTIONS, UNLIMITED, Request, dashed, option, options_of
 from d2rpick.base.errors import FORESEEN, ArgumentError, D2RPickError, listing, one_line, printable
 from d2rpick.base.files import write_whole
-from d2rpick.cli.progress import reading
+from d2rpick.cli.progress import on_terminal, reading
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -248,10 +248,10 @@ def columns_of(stream: TextIO) -> int | None:
 def tell(message: str) -> None:
     """Print a message to stderr, with the options of the command line and without control codes.
 
-    It is one line, on a terminal broken where that ends.
+    It is one line, on a terminal broken where that ends; never in a log, where ``COLUMNS`` may be set as well.
     """
-    text, width = printable(with_options(message)), columns_of(sys.stderr)
-    if width:
+    text = printable(with_options(message))
+    if on_terminal() and (width := columns_of(sys.stderr)):
         from d2rpick.report.tables import wrapped  # not above: --help does without it
 
         text = wrapped(text, width)

@@ -73,10 +73,15 @@ def _clock(seconds: float) -> str:
     return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
 
 
+def on_terminal() -> bool:
+    """Whether somebody at a terminal reads what is told."""
+    return sys.stderr is not None and sys.stderr.isatty()
+
+
 @contextmanager
 def telling(say: Callable[[float], str], *, quiet: bool, period: float = _PERIOD) -> Iterator[None]:
     """Show what ``say`` gives for the seconds that have gone by, unless ``quiet`` or where no terminal is."""
-    if quiet or sys.stderr is None or not sys.stderr.isatty():
+    if quiet or not on_terminal():
         yield
         return
     from threading import Event, Thread  # --help does without

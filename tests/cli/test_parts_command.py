@@ -62,7 +62,7 @@ def test_without_a_set_to_take_every_form_is_an_objection() -> None:
     assert run("parts", "-q", "-f", "json", BOX).exit_code == 1
     no_parts = run("parts", ENERGY)
     assert no_parts.exit_code == 1
-    assert "give the matsum, binout or T01 of the run" in no_parts.stderr
+    assert "give the matsum, binout or T01" in no_parts.stderr
 
 
 def test_a_set_of_ones_own_is_compared() -> None:
