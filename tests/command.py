@@ -62,7 +62,8 @@ def _files(args: Sequence[str]) -> frozenset[tuple[str, int, int, int]]:
     named = (Path(os.path.abspath(arg)).parent for arg in args if "/" in arg and "\0" not in arg)  # noqa: PTH100
     found = set()
     for folder in {Path.cwd(), *named}:
-        for place, _, names in os.walk(folder) if _TEMPORARY in folder.parents else ():
+        changes = _TEMPORARY in folder.parents and not folder.is_relative_to(ROOT)  # the clone may be temporary, too
+        for place, _, names in os.walk(folder) if changes else ():
             for path in (os.path.join(place, name) for name in names):  # noqa: PTH118  fast
                 state = os.lstat(path)
                 found.add((path, state.st_ino, state.st_size, state.st_mtime_ns))
