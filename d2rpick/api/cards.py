@@ -297,6 +297,7 @@ def card_of(windows: Sequence[Times], run: Run | None, request: Request, cards: 
     from d2rpick.deck.printing import cards as print_cards
 
     if run is None:
+        request.without_history()
         solver = cards.solver or DEFAULT
         return JudgedCard(print_cards(windows, _alone(request, cards, solver), solver))
     from d2rpick.api.asked import ask  # not above: a card alone does without numpy

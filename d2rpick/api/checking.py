@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Unpack
+import os
+import sys
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Unpack
 
 from d2rpick.api import arguments
 from d2rpick.api.answer import Answer, frame_of
-from d2rpick.api.asked import request_of
 from d2rpick.api.cards import SETTINGS
+from d2rpick.base.errors import ConfigurationError, D2RPickError, DeckError
+from d2rpick.deck import main_decks
+from d2rpick.deck.radioss_run import run_files
+from d2rpick.deck.source import STDIN
 from d2rpick.report.findings import FINDING, Checks
 from d2rpick.report.tables import positional
-from d2rpick.rules import Configuration, check_deck, configuration_for
+from d2rpick.rules import RULES, Checked, Configuration, check_deck, configuration_for
+from d2rpick.rules.base import Unreadable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator, Sequence
 
     import pandas as pd
 
     from d2rpick.api.arguments import Choosing
+    from d2rpick.api.request import Request
     from d2rpick.api.runs import Run
     from d2rpick.deck.switching import Window
     from d2rpick.rules.base import Finding
+    from d2rpick.rules.judgement import HistoryJudge
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -29,12 +37,18 @@ class Findings(Answer, Checks):
     """Answer of `check`; nothing of it changes.
 
     ``findings`` have ``rule``, ``severity``, ``message``, ``file``, ``line`` and ``column``; ``windows`` are those in
-    which parts are rigid.
+    which parts are rigid; ``notes`` say what the readers of the history left out or assumed.
     """
 
-    command: tuple[str, ...]
+    command: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     kind = "findings"
     said = ("decks", "findings")
+
+    @property
+    def passed(self) -> bool:
+        """Whether all decks were checked, and nothing weighs as much as ``fail_on``."""
+        return not self.failed and all(one.severity.rank > self.fail_on.rank for one in self.findings)
 
     @property
     def decks(self) -> tuple[str, ...]:
@@ -77,7 +91,7 @@ def check(
     Parameters
     ----------
     decks : path or several
-        Main decks; their includes are read with them.
+        Main decks, read with their includes; a folder stands for its main decks, ``-`` for standard input.
     history : Run, optional
         By which the windows are judged: a run without switching.
     select, ignore : string or several
@@ -96,7 +110,7 @@ def check(
     ConfigurationError
         If a rule does not exist.
     TypeError, ValueError
-        If an argument is not of its kind.
+        If an argument is not of its kind, or says how to judge where there is no history.
 
     Examples
     --------
@@ -105,27 +119,78 @@ def check(
     >>> [(window.part, window.td) for window in found.windows]
     [(11, 0.0687534), (12, 0.064)]
     """
+    from d2rpick.api.asked import request_of  # not above: without a history nothing is computed
+
     names = arguments.paths("decks", decks)
     if history is not None:
         arguments.check_run("history", history)
     request = request_of(history, None, None, None, None, choosing)
-    judge = None
-    if history is not None:
-        from d2rpick.rules.judgement import HistoryJudge
+    rules = Configuration(arguments.rule_ids("select", select), arguments.rule_ids("ignore", ignore))
+    named = [text for name in ("select", "ignore") for one in getattr(rules, name) for text in (f"--{name}", one)]
+    files = [text for name in request.history for text in ("--history", name)]
+    command = ("check", *files, *request.asking(), *named, *positional(names))
+    found = findings_of(names, rules, judge_by(history, request), command=command)
+    for one in found.failed:
+        raise one.error
+    return found
 
-        judge = HistoryJudge(history.files, history.chosen, request.settings)
-    asked = Configuration(arguments.rule_ids("select", select), arguments.rule_ids("ignore", ignore))
-    checked = []
-    for name in names:
-        if judge:
-            judge.beside(name)
-        checked.append(check_deck(name, configuration_for(name, asked, SETTINGS), judge))
-    files = [text for name in (history.sources if history else ()) for text in ("--history", name)]
-    rules = [text for name in ("select", "ignore") for one in getattr(asked, name) for text in (f"--{name}", one)]
-    judging = request.asking() if history else ()
+
+def judge_by(run: Run | None, request: Request) -> HistoryJudge | None:
+    """Judge windows by a run; without one ArgumentError where the request says how to."""
+    if run is None:
+        request.without_history()
+        return None
+    from d2rpick.rules.judgement import HistoryJudge  # it loads numpy
+
+    return HistoryJudge(run.files, request.selection(), request.settings)
+
+
+def findings_of(decks: Sequence[str], rules: Configuration, judge: HistoryJudge | None = None, **more: Any) -> Findings:
+    """Check decks as they are named, and tell what could not be read; ``more`` are fields of the answer."""
+    from d2rpick.choice.warnings import Caution
+
+    rules.verify(RULES)
+    found = list(_each(decks, rules, judge))
+    results = [one for one in found if isinstance(one, Checked)]
+    remarks = dict.fromkeys(remark for result in results for remark in result.remarks)
     return Findings(
-        results=tuple(checked),
-        cautions=tuple(judge.cautions) if judge else (),
-        history=history.sources if history else None,
-        command=("check", *files, *judging, *rules, *positional(names)),
+        results=results,
+        failed=[one for one in found if isinstance(one, Unreadable)],
+        cautions=(*(judge.cautions if judge else ()), *(Caution("unknown-rule", remark) for remark in remarks)),
+        history=judge.run.sources if judge else None,
+        notes=judge.notes if judge else (),
+        **more,
     )
+
+
+def _each(named: Sequence[str], rules: Configuration, judge: HistoryJudge | None) -> Iterator[Checked | Unreadable]:
+    """Check each deck once, by one of its spellings, a run by the first of its files; a folder stands for its decks."""
+    seen: set[str] = set()
+    for name in named:
+        try:
+            decks = main_decks(name) if os.path.isdir(name) else [name]  # noqa: PTH112  Path raises on odd names
+        except DeckError as error:
+            yield Unreadable(name, error)
+            continue
+        for deck in decks:
+            real = os.path.realpath(deck)
+            if real not in seen:
+                seen.update([real, *map(os.path.realpath, run_files(deck))])
+                yield _found(deck, rules, judge)
+
+
+def _found(name: str, rules: Configuration, judge: HistoryJudge | None) -> Checked | Unreadable:
+    """Check a deck by the configuration nearest to it; what is wrong with either does not hide other decks."""
+    source = ""
+    try:
+        configuration = configuration_for(name, rules, SETTINGS)
+        source = configuration.source
+        content = sys.stdin.buffer.read() if name == STDIN else None
+        if judge and content is None:
+            judge.beside(name)
+        found = check_deck(name, configuration, judge, content)
+        return replace(found, files=(source, *found.files))
+    except Exception as error:
+        if isinstance(error, D2RPickError) and not isinstance(error, ConfigurationError | DeckError):
+            raise  # about the history, by which all are judged
+        return Unreadable(name, error, (source,))

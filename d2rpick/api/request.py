@@ -225,7 +225,7 @@ class Request:
 
     def without_history(self) -> None:
         """Refuse to be told how to judge, but not by what."""
-        if lost := [name for name in JUDGING if name in (self.given or ())]:
+        if lost := [name for name in self._given() if name in {*JUDGING, *CHOOSING}]:
             raise ArgumentError(f"`{lost[0]}` needs an energy history; give one with `history`")
 
     def _given(self) -> Iterator[str]:

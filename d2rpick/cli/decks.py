@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from typing import TYPE_CHECKING
 
 import click
 
-from d2rpick.api.cards import SETTINGS, Cards, all_cautions, card_of
-from d2rpick.base.errors import INTERNAL_ERROR, ConfigurationError, D2RPickError, DeckError
+from d2rpick.api.cards import Cards, all_cautions, card_of
+from d2rpick.base.errors import INTERNAL_ERROR
 from d2rpick.cli import options
 from d2rpick.cli.options import FILES, REFERENCE, RESULT
 from d2rpick.cli.output import Output, explained, in_words, tell, text_bytes
 from d2rpick.cli.values import CARDS, click_type
-from d2rpick.report.formats import FORMATS, write
+from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from d2rpick.api.request import Request
     from d2rpick.choice.switched_run import Times
-    from d2rpick.choice.warnings import Caution
-    from d2rpick.rules import Checked, Configuration
-    from d2rpick.rules.base import Unreadable
-    from d2rpick.rules.judgement import HistoryJudge
 
 
 @options.command
@@ -114,102 +108,24 @@ def check(
     d2rpick check sample_data/switching.k --history sample_data/energy.glstat
     d2rpick check -f json --select D2R0,D2R1 --fail-on warning sample_data/switching.k
     """
-    from d2rpick.report.findings import Checks
+    from d2rpick.api.checking import findings_of, judge_by
     from d2rpick.rules import Configuration
     from d2rpick.rules.base import Severity
 
-    judge = _judge(request)
-    output = output.beside(*deck, *(judge.run.sources if judge else ()))
-    results, failed, inputs = _checked(deck, judge, Configuration(_ids(select), _ids(ignore)))
-    output.spare(inputs)
-    cautions = _cautions(results, judge)
-    output.notes(judge.notes if judge else (), cautions)
-    for one in failed:
-        tell(f"d2rpick: {one.reason}")
-    limit, form = Severity(fail_on), output.output_format
-    if results or form != "table":
-        history = judge.run.sources if judge else None
-        checks = Checks(results, failed=failed, cautions=cautions, fail_on=limit, history=history)
-        output.result(in_words(write("findings", form, checks, output.shown()), form, output.columns))
-    if not results or any(one.code == INTERNAL_ERROR for one in failed):
-        click.get_current_context().exit(2)
-    heavy = any(finding.severity.rank <= limit.rank for result in results for finding in result.findings)
-    output.finish(objection=heavy or bool(failed))
-
-
-def _judge(request: Request) -> HistoryJudge | None:
     run = options.judging_run(request)
-    if run is None:
-        return None
-    from d2rpick.rules.judgement import HistoryJudge
-
-    return HistoryJudge(run.files, request.selection(), request.settings)
-
-
-def _checked(
-    decks: Sequence[str], judge: HistoryJudge | None, asked: Configuration
-) -> tuple[list[Checked], list[Unreadable], list[str]]:
-    """Check each deck by the configuration nearest to it, and give all files that were read.
-
-    A deck that cannot be read, or whose configuration cannot, does not hide the others; nor does an internal error.
-    """
-    from d2rpick.deck.source import STDIN
-    from d2rpick.rules import RULES, check_deck, configuration_for
-    from d2rpick.rules.base import Unreadable
-
-    asked.verify(RULES)
-    results, inputs = [], []
-    named, failed = _main_decks(decks)
-    for name in _apart(named):
-        try:
-            configuration = configuration_for(name, asked, SETTINGS)
-            inputs.append(configuration.source)
-            content = sys.stdin.buffer.read() if name == STDIN else None
-            if judge and content is None:
-                judge.beside(name)
-            results.append(check_deck(name, configuration, judge, content))
-            inputs += results[-1].files
-        except (ConfigurationError, DeckError, OSError, MemoryError) as error:
-            failed.append(Unreadable(name, explained(error)))
-        except D2RPickError:
-            raise  # about the history, by which all are judged
-        except Exception as error:  # noqa: BLE001  the others are answered, whatever it is
-            failed.append(Unreadable(name, explained(error, [name]), INTERNAL_ERROR))
-    return results, failed, inputs
-
-
-def _main_decks(named: Sequence[str]) -> tuple[list[str], list[Unreadable]]:
-    """Replace folders by their main decks; those without any are told."""
-    from d2rpick.deck import main_decks
-    from d2rpick.rules.base import Unreadable
-
-    decks: list[str] = []
-    failed: list[Unreadable] = []
-    for name in named:
-        try:
-            decks += main_decks(name) if os.path.isdir(name) else [name]  # noqa: PTH112  Path raises on odd names
-        except DeckError as error:
-            failed.append(Unreadable(name, str(error)))
-    return decks, failed
-
-
-def _apart(names: Sequence[str]) -> Iterator[str]:
-    """Each deck once: by one of its spellings, and a Radioss run by the first of its files."""
-    from d2rpick.deck.radioss_run import run_files
-
-    seen: set[str] = set()
-    for name in names:
-        real = os.path.realpath(name)
-        if real not in seen:
-            seen.update([real, *map(os.path.realpath, run_files(name))])
-            yield name
-
-
-def _cautions(results: Sequence[Checked], judge: HistoryJudge | None) -> list[Caution]:
-    from d2rpick.choice.warnings import Caution
-
-    remarks = dict.fromkeys(remark for result in results for remark in result.remarks)
-    return [*(judge.cautions if judge else ()), *(Caution("unknown-rule", remark) for remark in remarks)]
+    output = output.beside(*deck, *(run.sources if run else ()))
+    rules = Configuration(_ids(select), _ids(ignore))
+    found = findings_of(deck, rules, judge_by(run, request), fail_on=Severity(fail_on))
+    output.spare(file for many in (found.results, found.failed) for one in many for file in one.files)
+    output.notes(found.notes, found.cautions)
+    for one in found.failed:
+        tell(f"d2rpick: {explained(one.error, [one.deck])}")
+    form = output.output_format
+    if found.results or form != "table":
+        output.result(in_words(found.text(form, output.shown()), form, output.columns))
+    if not found.results or any(one.code == INTERNAL_ERROR for one in found.failed):
+        click.get_current_context().exit(2)
+    output.finish(objection=not found.passed)
 
 
 def _ids(texts: Sequence[str]) -> tuple[str, ...]:

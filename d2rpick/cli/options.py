@@ -222,9 +222,8 @@ def windows_in(file: str) -> Sequence[Times]:
 
 
 def judging_run(request: Request) -> Run | None:
-    """Open the history by which cards are judged; None without one, ArgumentError where options need it."""
+    """Open the history by which cards are judged; None without one."""
     if not request.history:
-        request.without_history()
         return None
     from d2rpick.api.asked import open_run  # not above: without a history nothing is computed
 

@@ -7,6 +7,7 @@ from enum import StrEnum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
+from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, one_line
 from d2rpick.deck.parts import Parts, read_parts, read_sections
 from d2rpick.deck.radioss_run import Flaw, Run, RunWindows, find_run_windows
 from d2rpick.deck.switching import Event, Header, SwitchSet, Window, Windows, find_windows, read_switching
@@ -86,11 +87,21 @@ class Finding:
 
 @dataclass(frozen=True)
 class Unreadable:
-    """A deck that could not be checked, and why; ``code`` is that of the warning that tells it."""
+    """A deck that could not be checked, and why; ``files`` may belong to it all the same."""
 
     deck: str
-    reason: str
-    code: str = "unreadable-deck"
+    error: Exception
+    files: tuple[str, ...] = ()
+
+    @property
+    def code(self) -> str:
+        """That of the warning that tells it."""
+        return "unreadable-deck" if isinstance(self.error, FORESEEN) else INTERNAL_ERROR
+
+    @property
+    def reason(self) -> str:
+        """One line that names the deck."""
+        return f"{self.deck}: {one_line(self.error)}" if self.code == INTERNAL_ERROR else one_line(self.error)
 
 
 @dataclass(frozen=True, eq=False)

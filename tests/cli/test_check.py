@@ -344,6 +344,23 @@ def test_two_spellings_of_a_deck_are_one(tmp_path: Path) -> None:
     assert answer("check", "main.k", "./main.k", str(tmp_path / "main.k"), "link.k")["decks"] == ["main.k"]
 
 
+def test_python_takes_decks_as_the_command_line_does() -> None:
+    decks = [place("runs/a.k", LATE), place("runs/b.k", HEAD + PARTS + "$ d2rpick: ignore D2R1O4\n" + THERE + END)]
+    found = d2.check(["runs", f"./{decks[0]}"])
+    assert found.to_dict() == answer(*found.command) | {"command": list(found.command)}
+    assert (found.decks, found.passed, [one.code for one in found.warnings]) == ((*decks,), False, ["unknown-rule"])
+    assert d2.check(place("c.k", GOOD)).passed
+    with pytest.raises(d2.DeckError, match=r"absent\.k: no such file"):
+        d2.check([decks[0], "absent.k"])
+
+
+def test_python_is_not_told_how_to_judge_by_nothing() -> None:
+    with pytest.raises(ValueError, match="`after` needs an energy history"):
+        d2.card([(0.02, 0.09)], parts=11, after=0.02)
+    with pytest.raises(ValueError, match="`max_residual` needs an energy history"):
+        d2.check(DECK, max_residual=0.1)
+
+
 def test_a_comment_that_names_no_rule_is_told() -> None:
     deck = place("main.k", HEAD + PARTS + "$ d2rpick: ignore D2R1O4\n" + THERE + END)
     assert [w["code"] for w in answer("check", deck)["warnings"]] == ["unknown-rule"]
