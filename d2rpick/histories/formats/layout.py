@@ -20,7 +20,10 @@ _COMMENTS = ("#", "$", "%", "//")
 
 # Separator (None: blanks) and decimal sign, in the order they are tried.  Comma and decimal comma together
 # cannot be read for sure.
-_FORMS = ((";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (None, "."), (None, ","))
+_FORMS = (
+    *((sign, decimal) for sign in (";", "\t", "|") for decimal in ".,"),
+    *((",", "."), (None, "."), (None, ",")),
+)
 
 # What was taken is not given back: the time grows with the length of a cell, not with its square.
 _NUMBER = {
@@ -28,7 +31,8 @@ _NUMBER = {
     ",": re.compile(r"[+-]?(?:\d++,?+\d*+|,\d++)(?:[eEdD][+-]?\d++)?", re.ASCII),
 }  # fmt: skip
 _MISSING = frozenset({"", "nan", "+nan", "-nan", "inf", "+inf", "-inf", "infinity", "-infinity", "na", "n/a", "null"})
-_SEP_LINE = re.compile(r"sep=(.)", re.IGNORECASE)
+# What a spreadsheet writes above a table, and anybody may, for a separator that belongs to no number.
+_SEP_LINE = re.compile(r'sep=(?![\w.+"-])([!-~])', re.IGNORECASE)
 _DECIMAL_PART = re.compile(r"[+-]?0\d+")
 
 # Rows looked at to find the layout: more than any header has lines.
@@ -123,7 +127,8 @@ def find_layout(text: Text) -> Layout:
         number, line = next(((n, line) for n, line in enumerate(every, 1) if not is_skipped(line)), (1, ""))
         below = "below" if text.is_short else f"in the first {HEAD} lines"
         found = f"{text.name}:{number}: {_short(line)} and no rows of at least two numbers {below}"
-        raise FormatError(f"{found}; expected a table of time and energy; check that this is the right file")
+        cure = "check that this is the right file, or name its separator in a first line, as sep=:"
+        raise FormatError(f"{found}; expected a table of time and energy; {cure}")
     _refuse_odd_rows(text.name, lines, first, bare)
     _refuse_decimal_commas(text.name, lines, bare)
     return _with_header(text.name, lines[first : bare.start], bare)
@@ -133,11 +138,10 @@ def _find_rows(lines: Sequence[str], first: int, separator: str) -> Layout | Non
     """Take the form in which most lines are rows, with words or without, else any with rows of numbers."""
     numbered = ((i, line) for i, line in enumerate(lines) if i >= first and not is_skipped(line))
     sample = list(islice(numbered, _LOOK_AT))
+    forms = [(separator, decimal) for decimal in ".," if separator != decimal] if separator else _FORMS
     for only_numbers in (False, True):
         best, most = None, 0 if only_numbers else len(sample) // 2
-        for sign, decimal in _FORMS:
-            if separator and sign != separator:
-                continue
+        for sign, decimal in forms:
             cells = [(i, split(line, sign)) for i, line in sample]
             kinds = [(i, row, kind) for i, row in cells if (kind := _kind(row, decimal, only_numbers))]
             if not kinds:

@@ -37,6 +37,8 @@ SCENARIOS: dict[str, tuple[str | bytes, str, str]] = {
     "semicolons": ("Time;IE\n" + table(";"), "IE", ""),
     "semicolons and decimal commas": ("Zeit;Innere Energie\n" + table(";", ","), "Innere Energie", ""),
     "tabs and decimal commas": ("t\tE_int\n" + table("\t", ","), "E_int", ""),
+    "bars": ("time|IE\n" + table("|"), "IE", ""),
+    "bars and decimal commas": ("Zeit | Innere Energie\n" + table(" | ", ","), "Innere Energie", ""),
     "blanks": ("time ALLIE\n" + table("   "), "ALLIE", ""),
     "blanks and names with blanks": ("Time [ms]   Internal Energy\n" + table("   "), "Internal Energy", "ms"),
     "blanks and decimal commas": ("time IE\n" + table(" ", ","), "IE", ""),
@@ -49,6 +51,8 @@ SCENARIOS: dict[str, tuple[str | bytes, str, str]] = {
     "other line ends": ("time,IE\r\n" + table(end="\r\n"), "IE", ""),
     "old line ends": ("time,IE\r" + table(end="\r"), "IE", ""),
     "separator told": ("sep=;\nTime (ms);IE (J)\n" + table(";", ","), "IE (J)", "ms"),
+    "any separator told": ("sep=:\ntime:IE\n" + table(":", ","), "IE", ""),
+    "no separator told": ("sep=5\ntime,IE\n" + table(), "IE", ""),
     "units in brackets": ("Time [s],Internal Energy [J]\n" + table(), "Internal Energy [J]", "s"),
     "units behind a slash": ("t/ms,E_int/mJ\n" + table(), "E_int/mJ", "ms"),
     "units behind a line": ("time_s,IE_J\n" + table(), "IE_J", "s"),
@@ -277,7 +281,7 @@ def in_pieces(data: bytes | OnDisk, size: int) -> object:
 
 @given(
     st.lists(st.sampled_from(LINES), max_size=8),
-    st.sampled_from([(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), (" ", "."), (" ", ",")]),
+    st.sampled_from([(",", "."), (";", "."), ("|", ","), ("\t", "."), ("\t", ","), (" ", "."), (" ", ",")]),
     st.sampled_from(["", ",7", ",", ",x"]),
     st.sampled_from(["utf-8", "latin-1", "utf-16"]),
 )
@@ -374,7 +378,7 @@ def test_precision_is_read_off_the_text(rows: str, time: Precision, energy: Prec
 
 
 finite = st.floats(-1e149, 1e149, allow_subnormal=False)  # a history holds no energies beyond 1e150
-FORMS = [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), ("  ", "."), (" , ", ".")]
+FORMS = [(",", "."), (";", "."), (";", ","), ("|", "."), ("\t", "."), ("\t", ","), ("  ", "."), (" , ", ".")]
 
 
 @given(
