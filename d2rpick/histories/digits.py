@@ -119,6 +119,8 @@ def _next(read: float) -> float:
 
 # Nobody means a time in this first share of a record: a number that lies there in another unit was given in this one.
 _NEVER_MEANT: Final = 0.01
+# Nor in the first share of a record that a smaller unit would lead to: more likely the record was cut before that time.
+_HARDLY_MEANT: Final = 0.05
 # Nor a td that has fewer states before it: no period is seen in them, and hardly anything would be saved.  That its
 # thousandfold lies in the record too takes at least a thousand states, or a td before the second one.
 _FIRST_STATES: Final = 10
@@ -132,7 +134,7 @@ def in_smaller_unit(record: Samples, times: Sequence[float], argument: str) -> s
     first, last = float(record[0]), float(record[-1])
     if any(first <= time <= last for time in times if time) or times[-1] < 2 * last - first:
         return ""
-    least = max(first, 0.0) + _NEVER_MEANT * (last - first)
+    least = max(first, 0.0) + _HARDLY_MEANT * (last - first)
     for unit, size in (("ms", 1e-3), ("us", 1e-6)):
         values = _scaled(times, size)
         if least <= values[-1] and all(first <= value <= last for value in values):

@@ -205,7 +205,7 @@ def _lines(text: str, width: int) -> list[str]:
 
     wrapper = TextWrapper(width, break_on_hyphens=False)
     if max(map(len, text.split())) > width:
-        wrapper.wordsep_simple_re = re.compile(r"(\s+)|(?<=[,/_])(?=\w)")
+        wrapper.wordsep_simple_re = re.compile(r"(\s+)|(?<=[,/_-])(?=\w)")
     return wrapper.wrap(text)
 
 

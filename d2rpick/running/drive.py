@@ -113,6 +113,8 @@ class Driver:
         D2RPickError
             If the solver fails, or the disk has no room; the run goes on from there when it is driven again.
         """
+        if legs := self.legs:
+            self.told(f"resumed: legs that are over: {len(legs)}, the last at {legs[-1].seen.time:.6g}")
         while order := next_order(self.legs, self.limits):
             self._compute(order)
         self.at = None
@@ -234,6 +236,7 @@ class Driver:
         if seen is None or at_once or (left.restart is None and not order.rigid) or (order.rigid and not left.normal):
             if left.normal and not at_once:
                 raise D2RPickError(f"{self.solver.file(order.number, '.out')}: the leg left no state, or no restart")
+            self.told(f"leg {order.number}: it left nothing to go on from, and is begun again at {order.start:.6g}")
             self.journal.add("lost", order=order)
             return
         took = left.timing

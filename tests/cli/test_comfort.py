@@ -101,6 +101,7 @@ def test_channels_are_completed_from_the_history_that_was_typed() -> None:
         (("--td-window", "0.06", "0.2", ENERGY), "--td-window 0.06 0.2 reaches outside the record, 0 to 0.15\n"),
         (("--td", "0.16", ENERGY), "--td 0.16 lies outside the record, 0 to 0.15\n"),
         (("--td", "0.6", ENERGY), "--td 0.6 lies outside the record, 0 to 0.15\n"),
+        (("--td", "2", ENERGY), "--td 2 lies outside the record, 0 to 0.15\n"),  # cut early, or 2 ms
         (("--td", "64ms", ENERGY), "give a number in the unit of the history, 0.064 where it is s"),
         (("64", ENERGY), "a time is given as --td, a number in the unit of the record"),
         (("64ms", ENERGY), "a time is given as --td, a number in the unit of the record, 0.064 where it is s"),

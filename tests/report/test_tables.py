@@ -35,6 +35,7 @@ def test_words_that_are_too_long_are_broken_and_numbers_are_not(width: int, name
 def test_a_long_word_breaks_behind_what_joins_its_parts() -> None:
     lines = as_text(["shares"], [["1,7,11,13,15,16"]], 12).split("\n")
     assert lines == ["shares", "1,7,11,13,", "15,16"]
+    assert as_text(["run"], [["speed-12-thick-3"]], 12).split("\n") == ["run", "speed-12-", "thick-3"]
 
 
 @given(st.integers(20, 60), st.lists(WORDS, min_size=1, max_size=4).map("  ".join))

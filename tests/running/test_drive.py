@@ -90,7 +90,9 @@ def test_a_run_is_rigid_in_its_flight_and_comes_to_its_end(tmp_path: Path) -> No
     again = run(*asked(tmp_path))
     assert again.exit_code == 2
     assert "--resume" in again.stderr
-    assert json.loads(run(*asked(tmp_path, "--resume", "-q")).stdout)["windows"] == found["windows"]
+    over = run(*asked(tmp_path, "--resume"))
+    assert f"resumed: legs that are over: {len(kinds)}, the last at 0.2" in over.stderr
+    assert json.loads(over.stdout)["windows"] == found["windows"]
 
 
 @pytest.mark.slow
