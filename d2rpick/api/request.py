@@ -6,10 +6,11 @@ Python, and the command line that asks the same again.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from math import inf
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
+from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import ArgumentError
 
 if TYPE_CHECKING:
@@ -85,7 +86,7 @@ class Request:
     """
 
     deck: str | None = option("Main deck of the run.", "file", "DECK")
-    weights: str | Weights | None = option(  # noqa: RUF009
+    weights: str | Weights | None = option(
         "Cost of an element by formulation, as d2rpick calibrate writes it.  [default: measured with OpenRadioss]",
         *("file", "FILE"),
     )

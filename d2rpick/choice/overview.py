@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import FormatError, RangeError, if_written, listing
 from d2rpick.choice.health import Health, assess, cautions_of_health, refuse_unsound, unsound
 from d2rpick.choice.of_run import Reference
@@ -20,6 +21,7 @@ from d2rpick.histories.balance import balance_of
 from d2rpick.histories.companions import doubts
 from d2rpick.histories.history import History, rows_of
 from d2rpick.histories.names import Part, Selection, select_parts
+from d2rpick.histories.samples import median
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -118,7 +120,7 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
         time_start=float(time[0]) if time.size else None,
         time_end=float(time[-1]) if time.size else None,
         time_unit=first.time_unit,
-        sampling=Sampling(float(steps.min()), float(np.median(steps)), float(steps.max())) if steps.size else None,
+        sampling=Sampling(float(steps.min()), float(median(steps)), float(steps.max())) if steps.size else None,
         complete=all(database.complete for database in run.databases),
         channels=tuple(dict.fromkeys(name for database in run.databases for name in database.channels)),
         parts=tuple(_overviews(run)),

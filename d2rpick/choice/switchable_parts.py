@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import FormatError, if_written, name_units
 from d2rpick.choice.windows import bounds, flights_of
 from d2rpick.deck.geometry import masses_and_steps

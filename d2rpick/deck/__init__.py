@@ -6,7 +6,6 @@ Here is what begins with a name: what a deck says about its parts, and which fil
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from d2rpick.base.errors import DeckError
@@ -73,6 +72,8 @@ def main_decks(folder: str) -> list[str]:
 
 
 def _files(folder: str) -> Iterator[str]:
+    from pathlib import Path  # not above: start-up
+
     for root, folders, names in os.walk(folder):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         yield from (str(Path(root) / name) for name in sorted(names) if not name.startswith("."))
@@ -97,7 +98,7 @@ def _head(path: str) -> bytes:
     """
     from d2rpick.deck.source import SourceFile
 
-    with Path(path).open("rb", buffering=0) as file:
+    with open(path, "rb", buffering=0) as file:  # noqa: PTH123  start-up
         head = file.read(_HEAD)
     try:
         return head if len(head) == _HEAD else SourceFile(path).read(0, _HEAD)

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
+from d2rpick.base.dataclass import dataclass
 from d2rpick.base.graph import reached
 from d2rpick.deck.expression import ExpressionError, Number, evaluate, names_in, number
 
@@ -358,7 +359,7 @@ class Card:
             return Value(default, found)
         names = names_in(found.text)
         try:
-            return Value(float(self.scope.value(found.text)), found, parameters=names)
+            return Value(float(self.scope.value(found.text)), found, "", names)
         except (ExpressionError, OverflowError) as error:
             return Value(default, found, str(error), names)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import operator
 import re
+from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ class ExpressionError(Exception):
     """What is wrong with a text that should be a number; only used inside the deck reader."""
 
 
+@lru_cache(4096)  # of few texts, most fields are blank or 0
 def number(text: str) -> Number:
     """Read a number as LS-DYNA does: ``12``, ``12.e-3``, ``1.5D-3``, and ``1.5-3`` with the letter left out.
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 import os
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from itertools import pairwise
-from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import DeckError, are, in_rows, name_units
 from d2rpick.deck.card import Card, Field, Value
 from d2rpick.deck.radioss_deck import Body, Leg, Starter, blocks, card_of, kept_off, keyword, read_legs
@@ -88,6 +88,8 @@ def run_files(path: str) -> list[str]:
             head = stream.read(_HEAD)
         if not recognises(head):
             return []
+        from pathlib import Path  # not above: start-up
+
         folder = Path(path).parent
         beside = sorted(os.listdir(folder))  # noqa: PTH208  nothing is asked of each file: there may be many runs
     except (OSError, ValueError):
@@ -100,7 +102,7 @@ def run_files(path: str) -> list[str]:
 
 def _run_name(path: str, head: bytes) -> str:
     """Name of a run by that of its file, else by what stands in it."""
-    numbered = _NUMBERED.fullmatch(Path(path).name)
+    numbered = _NUMBERED.fullmatch(os.path.basename(path))  # noqa: PTH119  start-up
     if numbered:
         return numbered[1]
     found = _NAME.search(head)
@@ -153,6 +155,8 @@ def _read_starter(source: SourceFile, run: Run, chain: tuple[str, ...]) -> None:
 
 
 def _include(card: Card, source: SourceFile, run: Run, chain: tuple[str, ...]) -> None:
+    from pathlib import Path  # not above: start-up
+
     asked = card.block.head.split(maxsplit=1)[1:]
     name = asked[0].strip() if asked else ""
     folders = (Path(source.name).parent, Path(run.deck.path).parent)

@@ -6,17 +6,18 @@ import os
 import re
 from bisect import bisect_right
 from collections import defaultdict
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import DeckError
 from d2rpick.deck.card import LONG, STANDARD, Card, Field, Problem, Row, Scope, Transform
 from d2rpick.deck.source import Block, SourceFile
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+    from pathlib import Path
 
 
 _CONTINUED = " +"
@@ -87,23 +88,29 @@ class Folders:
     """
 
     def __init__(self, main: str) -> None:
-        self._main = Path(main).parent
+        self._main = main
         self._paths: list[Path] = []
 
     def add(self, card: Card) -> None:
         """Take over ``*INCLUDE_PATH``, or ``_RELATIVE`` to the main deck's folder."""
         for name, _ in _names(card):
-            self._paths.append(self._main / _portable(name.text))
+            self._paths.append(_folder(self._main) / _portable(name.text))
 
     def find(self, name: Field) -> str | None:
         """Path of the include as messages should show it, or None."""
-        for folder in (self._main, *self._paths, Path(name.file).parent):
+        for folder in (_folder(self._main), *self._paths, _folder(name.file)):
             # the last has the bytes taken as the file system takes them, not as Latin-1
             for spelling in (name.text, _portable(name.text), os.fsdecode(name.text.encode("latin-1", "replace"))):
                 path = str(folder / spelling)
                 if spelling and os.path.isfile(path):  # noqa: PTH113 - Path.is_file raises on names too long
                     return path
         return None
+
+
+def _folder(file: str) -> Path:
+    from pathlib import Path  # not above: a deck without includes does without it
+
+    return Path(file).parent
 
 
 def _portable(name: str) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from d2rpick.base.errors import FormatError, if_written
 from d2rpick.histories.history import Balance, Momenta, Samples
 from d2rpick.histories.names import Part, is_internal_energy, normalised
+from d2rpick.histories.samples import median
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -131,7 +132,7 @@ class _Columns:
         """Give the mass of the model: as written, or the least that has these momenta, (n, 1, 3)."""
         written, kinetic = self.first("mass", "totalmass"), self.first(*_NAMES["kinetic"])
         if written is not None:
-            return float(np.median(written))
+            return float(median(written))
         if kinetic is None or not (kinetic > 0).any():
             return float("nan")
         return float(least_masses(momenta, kinetic[:, np.newaxis])[0])

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import os
 import re
-from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -71,6 +70,8 @@ def ending(history: str) -> str | None:
 
     A leg that was told to stop has not ended the run, nor has one whose next leg lies there.
     """
+    from pathlib import Path  # not above, nor below: start-up
+
     found = _HISTORY.fullmatch(history)
     if found is None:
         tails = [_ends(str(Path(history).parent / name))[1] for name in ("messag", "d3hsp")]
@@ -182,7 +183,8 @@ def is_glstat(path: str) -> bool:
 
 def _read(path: str) -> bytes:
     try:
-        return Path(path).read_bytes()
+        with open(path, "rb") as stream:  # noqa: PTH123
+            return stream.read()
     except OSError as error:
         raise FormatError(f"{path}: cannot be read ({error.strerror}); check the name and the permissions") from None
 
@@ -250,6 +252,8 @@ def _of_glstat(run: Run) -> Iterator[tuple[str, int, float]]:
 
 
 def _smallest_of_d3hsp(names: Sequence[str]) -> Iterator[tuple[str, int, float]]:
+    from pathlib import Path
+
     for folder in dict.fromkeys(Path(name).parent for name in names):
         path = folder / _D3HSP
         if not path.is_file():

@@ -14,6 +14,7 @@ from d2rpick.base.errors import FormatError, if_written, listing
 from d2rpick.histories.companions import check_sum, doubts
 from d2rpick.histories.history import Balance, Given, History, Momenta, Samples, Track
 from d2rpick.histories.names import QUANTITIES, Part, Selection, menu, quantity_note, select_parts
+from d2rpick.histories.samples import median
 from d2rpick.histories.surroundings import UNKNOWN, Surroundings
 
 if TYPE_CHECKING:
@@ -328,10 +329,8 @@ def _median_of_some(values: Samples) -> Samples:
     """Median over the states of each column of values (n, k) that are not 0: the mass of a rigid part is written so."""
     some = values != 0
     if some.all():
-        return np.asarray(np.median(values, axis=0))
-    return np.array(
-        [np.median(one[there]) if there.any() else 0.0 for one, there in zip(values.T, some.T, strict=True)]
-    )
+        return median(values)
+    return np.array([median(one[there]) if there.any() else 0.0 for one, there in zip(values.T, some.T, strict=True)])
 
 
 def _left_out(springs: str) -> str:

@@ -40,6 +40,18 @@ def integral(time: Samples, values: Samples) -> Samples:
     return np.concatenate([np.zeros_like(values[:1]), np.cumsum(areas.T, axis=0, out=areas.T)])
 
 
+def median(values: Samples) -> Samples:
+    """Median of values (n,) or (n, k) over the first axis; that of numpy, which imports masked arrays to look for NaN.
+
+    Examples
+    --------
+    >>> median(np.array([[3.0, 1.0], [1.0, 1.0], [2.0, 5.0], [4.0, 2.0]])).tolist()
+    [2.5, 1.5]
+    """
+    ends = [(len(values) - 1) // 2, len(values) // 2]
+    return np.asarray(np.partition(values, ends, axis=0)[ends].sum(axis=0) / 2)
+
+
 def bent(time: Samples, values: Samples) -> Samples:
     """Give what is left of each column of values (n, k) beside a straight line.
 

@@ -6,12 +6,11 @@ import os
 import re
 import textwrap
 from collections import Counter
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, Any, Final
-from urllib.parse import quote
 
 from d2rpick.base import __version__
+from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import name_units, printable
 from d2rpick.choice.warnings import Caution
 from d2rpick.deck.source import STDIN
@@ -42,7 +41,7 @@ class Checks:
     """
 
     results: Sequence[Checked]
-    root: Path = field(default_factory=Path.cwd)
+    root: str = field(default_factory=os.getcwd)
     failed: Sequence[Unreadable] = ()
     cautions: Sequence[Caution] = ()
     history: Sequence[str] | None = None
@@ -203,7 +202,7 @@ def as_sarif(checks: Checks, _: Shown) -> str:
     return tables.as_json({"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]})
 
 
-def _window_lines(windows: Sequence[Window], root: Path) -> Iterator[str]:
+def _window_lines(windows: Sequence[Window], root: str) -> Iterator[str]:
     """Windows that the same cards make are one line."""
     groups: dict[tuple[int, int | None, str], list[Window]] = {}
     for window in windows:
@@ -275,16 +274,18 @@ def _last_line(checks: Checks) -> str:
     return f"{', '.join(found)} in {decks}{left_out}{'; times not judged: no `history`' * unjudged}"
 
 
-def _shown(path: str, root: Path) -> str:
+def _shown(path: str, root: str) -> str:
     """Path relative to the working folder where it lies below it, with ``/``; bytes that are no text replaced."""
     if path == STDIN:
         return path
-    absolute = os.path.abspath(root / path)  # noqa: PTH100 - resolve() would follow links to elsewhere
-    shown = os.path.relpath(absolute, root) if Path(absolute).is_relative_to(root) else absolute
+    absolute = os.path.abspath(os.path.join(root, path))  # noqa: PTH100, PTH118  start-up
+    shown = os.path.relpath(absolute, root) if absolute.startswith(os.path.join(root, "")) else absolute  # noqa: PTH118
     return os.fsencode(shown).decode("utf-8", "replace").replace(os.sep, "/")
 
 
-def _uri(path: str, root: Path) -> str:
+def _uri(path: str, root: str) -> str:
+    from urllib.parse import quote
+
     shown = _shown(path, root)
     return quote(shown) if not shown.startswith("/") else f"file://{quote(shown)}"
 

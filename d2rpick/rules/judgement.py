@@ -5,9 +5,10 @@ Not imported by the rules themselves: without a history the check does not need 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import DeckError, if_written, name_units
 from d2rpick.choice.answers import Verdict, find_better_pair, suggest_at
 from d2rpick.choice.deck_of_run import in_deck
@@ -39,7 +40,7 @@ _KEPT: Final = (
 _UNKNOWN: Final = "nothing in the history shows when the load is over; give that time as `after`"
 
 
-@dataclass
+@dataclass()
 class HistoryJudge:
     """Judges by one run: the parts of a window together where the run has parts, else by the whole model.
 

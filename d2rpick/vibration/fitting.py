@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.histories.samples import integral
+from d2rpick.histories.samples import integral, median
 from d2rpick.vibration.modes import BLOCK, energy_and_jacobian, sum_and_jacobian
 
 if TYPE_CHECKING:
@@ -281,7 +281,7 @@ def _starts_of_several(pencil: Pencil, count: int, s: Samples, e: Samples) -> li
     for chosen in combinations(range(poles.size), count):
         members = list(chosen)
         if np.diff(np.sort(omega[members])).min() >= _LEAST_APART:
-            found.append(linear_fit(omega[members], float(np.median(alpha[members])), s, e))
+            found.append(linear_fit(omega[members], float(median(alpha[members])), s, e))
     return [start for misfit, start in sorted(found, key=lambda one: one[0])[:STARTS] if misfit < hopeless]
 
 

@@ -30,7 +30,7 @@ def results(tmp_path: Path) -> list[Checked]:
 
 
 def test_table(results: list[Checked], tmp_path: Path) -> None:
-    lines = report.as_table(report.Checks(results, tmp_path), Shown()).split("\n")
+    lines = report.as_table(report.Checks(results, str(tmp_path)), Shown()).split("\n")
     assert lines[0] == "main.k"
     assert "  part 1: rigid from 0.02 to 0.5 (main.k:14)" in lines
     assert "  part 2: rigid from 0.02 to the end (main.k:14)" in lines
@@ -40,12 +40,12 @@ def test_table(results: list[Checked], tmp_path: Path) -> None:
 
 def test_a_card_without_a_window_is_not_passed_over(tmp_path: Path) -> None:
     deck = place(tmp_path, legs=(("0.2", "/RBODY/ON\n0\n"),))  # without a main node
-    lines = report.as_table(report.Checks([check_deck(deck)], tmp_path), Shown()).split("\n")
+    lines = report.as_table(report.Checks([check_deck(deck)], str(tmp_path)), Shown()).split("\n")
     assert lines[:2] == ["box_0000.rad", "  switching cards that switch nothing"]
 
 
 def test_json(results: list[Checked], tmp_path: Path) -> None:
-    content = json.loads(report.DOCUMENT.as_json(report.Checks(results, tmp_path), ["check", "main.k"]))
+    content = json.loads(report.DOCUMENT.as_json(report.Checks(results, str(tmp_path)), ["check", "main.k"]))
     check_by_schema(content)
     assert content["decks"] == ["main.k", "good/main.k"]
     assert [window["td"] for window in content["windows"]] == [0.5, None, 0.09]
@@ -54,7 +54,7 @@ def test_json(results: list[Checked], tmp_path: Path) -> None:
 
 
 def test_github(results: list[Checked], tmp_path: Path) -> None:
-    lines = report.as_github(report.Checks(results, tmp_path), Shown()).split("\n")
+    lines = report.as_github(report.Checks(results, str(tmp_path)), Shown()).split("\n")
     assert lines[1].startswith("::error file=main.k,line=23,col=28,title=D2R101::TIME1 is 0.5")
     assert lines[0].startswith("::notice file=main.k")
 
@@ -67,7 +67,7 @@ def junit_is_valid(text: str) -> None:
 
 
 def test_junit(results: list[Checked], tmp_path: Path) -> None:
-    text = report.as_junit(report.Checks(results, tmp_path), Shown())
+    text = report.as_junit(report.Checks(results, str(tmp_path)), Shown())
     junit_is_valid(text)
     suites = ET.fromstring(text)
     assert [(suite.get("name"), suite.get("tests"), suite.get("failures")) for suite in suites] == [
@@ -75,7 +75,7 @@ def test_junit(results: list[Checked], tmp_path: Path) -> None:
         ("good/main.k", "1", "0"),
     ]
     assert [failure.get("type") for failure in suites.iter("failure")] == ["D2R101"]
-    strict = ET.fromstring(report.as_junit(report.Checks(results, tmp_path, fail_on=Severity.INFO), Shown()))
+    strict = ET.fromstring(report.as_junit(report.Checks(results, str(tmp_path), fail_on=Severity.INFO), Shown()))
     assert len(list(strict.iter("failure"))) == 2
 
 
@@ -87,7 +87,7 @@ def sarif_is_valid(text: str) -> None:
 
 
 def test_sarif(results: list[Checked], tmp_path: Path) -> None:
-    text = report.as_sarif(report.Checks(results, tmp_path), Shown())
+    text = report.as_sarif(report.Checks(results, str(tmp_path)), Shown())
     sarif_is_valid(text)
     (run,) = json.loads(text)["runs"]
     assert [rule["id"] for rule in run["tool"]["driver"]["rules"]] == list(RULES)
@@ -99,8 +99,8 @@ def test_sarif(results: list[Checked], tmp_path: Path) -> None:
 
 def test_paths_outside_are_absolute(results: list[Checked], tmp_path: Path) -> None:
     elsewhere = tmp_path / "else where"
-    assert f"::error file={tmp_path}/main.k" in report.as_github(report.Checks(results, elsewhere), Shown())
-    assert f"file://{tmp_path}/main.k" in report.as_sarif(report.Checks(results, elsewhere), Shown())
+    assert f"::error file={tmp_path}/main.k" in report.as_github(report.Checks(results, str(elsewhere)), Shown())
+    assert f"file://{tmp_path}/main.k" in report.as_sarif(report.Checks(results, str(elsewhere)), Shown())
 
 
 @pytest.mark.slow
@@ -109,7 +109,7 @@ def test_any_text_makes_a_valid_report(message: str, name: str) -> None:
     name = name.encode("utf-8", "replace").decode()
     finding = Finding("D2R001", Severity.ERROR, message, name, name, 1, 1)
     result = [Checked(name, (), (finding,))]
-    root = Path("/some folder")
+    root = "/some folder"
     ET.fromstring(report.as_junit(report.Checks(result, root), Shown()).encode("utf-8", "replace"))
     sarif_is_valid(report.as_sarif(report.Checks(result, root), Shown()))
     assert report.as_github(report.Checks(result, root), Shown()).count("\n") == 0
@@ -117,6 +117,6 @@ def test_any_text_makes_a_valid_report(message: str, name: str) -> None:
 
 
 def test_nothing_found_is_a_report_too(tmp_path: Path) -> None:
-    sarif_is_valid(report.as_sarif(report.Checks([], tmp_path), Shown()))
-    junit_is_valid(report.as_junit(report.Checks([], tmp_path), Shown()))
-    assert report.as_github(report.Checks([], tmp_path), Shown()) == ""
+    sarif_is_valid(report.as_sarif(report.Checks([], str(tmp_path)), Shown()))
+    junit_is_valid(report.as_junit(report.Checks([], str(tmp_path)), Shown()))
+    assert report.as_github(report.Checks([], str(tmp_path)), Shown()) == ""

@@ -9,13 +9,13 @@ fit - a variable or a part that one state lacks, a count that changes - is refus
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import os
 from functools import cached_property
-from pathlib import PurePath
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.database import DIGITS, Branched
 from d2rpick.histories.formats.lsda import DirectoryLayout, Lsda, Variable, recognises
@@ -308,7 +308,7 @@ class Branch:
         here = np.array([start for file, start, _ in self._id_lists if file == index], dtype=np.int64)
         # The last list before a state is in force; a rank's file may bring its list behind the first states.
         in_force = np.maximum(before + np.searchsorted(here, group.starts) - 1, 0)
-        lists = {int(i): self._id_lists[i][2] for i in np.unique(in_force)}
+        lists = {int(i): self._id_lists[i][2] for i in np.flatnonzero(np.bincount(in_force))}
         if len({entry.size for entry in lists.values()}) > 1:
             raise self._refused(group, "the number of parts changes here or later, that of the values does not")
         if len(lists) == 1:
@@ -344,7 +344,8 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[Binout]:
     """Open the files of each folder as one leg: there a solver continues a binout and spreads its branches."""
     folders: dict[str, list[tuple[str, bytes | Content]]] = {}
     for source in sources:
-        folders.setdefault(str(PurePath(source.name).parent), []).append((source.name, source.data))
+        folder = os.path.dirname(os.path.normpath(source.name))  # noqa: PTH120  start-up
+        folders.setdefault(folder, []).append((source.name, source.data))
     return [Binout(family) for family in folders.values()]
 
 

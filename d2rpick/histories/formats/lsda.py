@@ -17,11 +17,12 @@ from __future__ import annotations
 import re
 import struct
 from array import array
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.content import Content, content_of
 from d2rpick.histories.formats.blocks import Pattern, repeats
@@ -82,7 +83,7 @@ class _Form:
     fixed: int
 
 
-@dataclass
+@dataclass()
 class Visits:
     """Every time the file enters a numbered directory of one branch, in the order of the file.
 

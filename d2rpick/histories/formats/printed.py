@@ -9,6 +9,7 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.history import EXACT, Precision, Samples
+from d2rpick.histories.samples import median
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -153,7 +154,7 @@ def _not_a_restart(time: Samples) -> int | None:
 
 def _median(steps: Samples) -> float:
     steps = steps[steps > 0]  # equal printed times are no interval
-    return float(np.median(steps)) if steps.size else np.nan  # which is neither too small nor too large
+    return float(median(steps)) if steps.size else np.nan  # which is neither too small nor too large
 
 
 _NUMBER: Final = re.compile(rb" *([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]\d+)|[EeDd](\d+))?")
