@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from d2rpick.api.cards import Cards, all_cautions
+from d2rpick.api.cards import SETTINGS, Cards, all_cautions
 from d2rpick.api.request import CHOOSING, NOT_NEGATIVE, READING, Option, Request
 from d2rpick.base.errors import ArgumentError, DeckError, printable
 from d2rpick.cli import options
@@ -140,15 +140,17 @@ def _write_and_check(card: PrintedCard, plan: Plan, folder: str, output: Output)
     passed : bool
         Whether no finding is an error.
     """
-    from d2rpick.api.checking import findings_of
     from d2rpick.deck.writing import write_deck
-    from d2rpick.rules import Configuration
+    from d2rpick.report.findings import Checks, as_table
+    from d2rpick.rules import Configuration, check_deck, configuration_for
+    from d2rpick.rules.base import Severity
     from d2rpick.rules.judgement import HistoryJudge
 
     request = plan.question.request
     written = write_deck(request.deck or "", card, folder, overwrite=output.overwrite)
     done = card.windows[: len(plan.done)]  # as printed
     judge = HistoryJudge(plan.question.reference.run, request.selection(parts=False), plan.settings, done)
-    found = findings_of(written[:1], Configuration(), judge)
+    checked = check_deck(written[0], configuration_for(written[0], Configuration(), SETTINGS), judge)
     listed = [f"written  {printable(name)}" for name in written]
-    return "\n".join([*listed, "", found.text("table", output.shown())]), found.passed
+    text = "\n".join([*listed, "", as_table(Checks([checked], history=judge.run.sources), output.shown())])
+    return text, all(one.severity is not Severity.ERROR for one in checked.findings)
