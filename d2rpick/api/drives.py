@@ -116,7 +116,7 @@ class Driving:
     def answer(self, driver: Driver, command: Sequence[str]) -> Drive:
         """Say what has come of the run so far."""
         legs = driver.legs
-        last = max((leg.order.number for leg in legs), default=0)
+        last = legs[-1].order.number if legs else 0
         names = [str(self.solver.history(number)) for number in range(1, last + 1)]
         return Drive(
             run=open_run(names), deck=self.deck, windows=tuple(windows(legs, self.limits)), legs=tuple(legs),

@@ -30,7 +30,7 @@ _LEG: Final = row(
 DOCUMENT: Final = Document("d2rpick/drive/1", "Answer of d2rpick drive; times in the unit of the deck.", row(
     keys.WARNINGS,
     Field("windows", many(_WINDOW)),
-    Field("legs", many(_LEG), "in the order they were computed; probes are thrown away"),
+    Field("legs", many(_LEG), "in the order they were computed; what probes computed behind td is thrown away"),
     Field("saved_by_model", "number?", "share of a deformable run, by the cost model", lambda one: one.saved[0]),
     Field("saved_by_time", "number?", "the same, by the processor time of the legs", lambda one: one.saved[1]),
 ))  # fmt: skip

@@ -11,7 +11,7 @@ from d2rpick.base.errors import D2RPickError
 from d2rpick.base.files import write_whole
 from d2rpick.choice.warnings import Caution
 from d2rpick.deck.writing import RESTARTS, DrivenDeck
-from d2rpick.running.sequence import LOAD, RIGID, SEARCH, Leg, Order, Seen, control, next_order, window_of
+from d2rpick.running.sequence import LOAD, PROBE, RIGID, SEARCH, Leg, Order, Seen, control, next_order, window_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -27,8 +27,10 @@ JOURNAL: Final = "drive.ndjson"
 # Largest step while rigid over the mean one before: a rigid leg costs a few percent of a deformable one then, and the
 # state of a run is written often enough to show a contact.
 _STEP_RATIO: Final = 5.0
-# Restarts that a search keeps: it goes back by an eighth of the wait at most.
-_IN_SEARCH: Final = 9
+# Restarts that a search or a probe keeps, as others go back to one.  So a search goes back by an eighth of the wait at
+# most, and a probe, which stops soon after a contact, by this share of what is left of the run.
+_KEPT: Final = 9
+_IN_PROBE: Final = 0.02
 # Looks at a leg: so many seconds apart, so many times as long as a look takes, and by this share of the leg.
 _SHORTEST, _LOOKS, _SHARE = 0.1, 2.0, 0.005
 
@@ -82,8 +84,8 @@ class Driver:
     @property
     def out_of_place(self) -> tuple[Caution, ...]:
         """What was said of parts that still swung as they became rigid."""
-        said = {one["order"][1]: (one["order"][2], one["place"]) for one in self.journal.all("started")}
-        return tuple(Caution("out-of-place", f"tr = {tr:.6g}: {place}") for tr, place in said.values() if place)
+        said = {one["order"][1]: one["place"] for one in self.journal.all("started")}
+        return tuple(Caution("out-of-place", place) for place in said.values() if place)
 
     def prepare(self) -> None:
         """Copy the deck into the folder and run the starter, unless that is done."""
@@ -144,11 +146,11 @@ class Driver:
         self.solver.check_room(number, 1 - order.start / self.limits.end)
         before = next((one for one in reversed(legs) if one["order"][1] == number - 1), {"restart": ""})
         restart = before["restart"] if order.restart is None else order.restart
-        cap = _STEP_RATIO * self._step() if order.rigid else None
-        if order.restart is not None:  # what follows in the leg before is computed again
-            self.solver.shorten(number - 1, order.start)
+        cap = self._step_of(order) if order.rigid else None
+        if order.restart is not None:  # known by some cycles; what follows is computed again
+            self.solver.shorten(number - 1, order.start - self.limits.same)
         self.solver.clear(number)
-        text = self.deck.leg(number, order.until, restart, cap and min(self.deck.interval, cap), self._ring(order))
+        text = self.deck.leg(number, order.until, restart, cap, self._ring(order))
         write_whole(self.solver.file(number, ".rad"), text)
         place = self._place(order)
         self.journal.add("started", order=order, place=place)
@@ -163,30 +165,31 @@ class Driver:
         if order.kind != RIGID:
             return ""
         legs = self.legs
-        before = next(leg.order for leg in reversed(legs) if leg.order.number == order.number - 1)
-        return self.look.swing(self._histories(before, legs), order, window_of(legs, self.limits).free)
+        planned = window_of(legs, self.limits)
+        before = next(leg.order for leg in reversed(legs) if leg.order.start < planned.tr)
+        return self.look.swing(self._histories(before, legs), planned)
 
-    def _step(self) -> float:
-        """Smallest mean step of a deformable leg, or the interval of the history where none is known yet [time]."""
+    def _step_of(self, order: Order) -> float:
+        """Step of a leg: the smallest mean one of those before, or the interval of the history where none is [time]."""
         known = [one.length / one.cycles for one in self.legs if one.kind == LOAD and one.cycles and one.length > 0]
-        return float(f"{min([self.deck.interval, *known]):.3g}")
+        step = float(f"{min([self.deck.interval, *known]):.3g}")
+        return min(self.deck.interval, _STEP_RATIO * step) if order.rigid else step
 
     def _ring(self, order: Order) -> tuple[int, int]:
-        """How many restarts a leg keeps, and cycles between them: those of a search lie close, to go back to tr."""
-        if order.kind != SEARCH:
-            return RESTARTS
-        return _IN_SEARCH, max(1, round((order.until - order.start) / self._step() / (_IN_SEARCH - 1)))
+        """How many restarts a leg keeps, and cycles between them: close where a later leg goes back to one."""
+        share = {SEARCH: 1 / (_KEPT - 1), PROBE: _IN_PROBE}.get(order.kind)
+        cycles = (order.until - order.start) / self._step_of(order)
+        return (_KEPT, max(1, round(share * cycles))) if share else RESTARTS
 
     def _written(self, order: Order, left: Left) -> list[tuple[float, str]]:
-        """Times and letters of the restarts that a search wrote on its way, by their cycles."""
-        if order.kind != SEARCH or left.timing is None or not left.timing.cycles:
+        """Times and letters of the last restarts that a search or a probe wrote on its way, by their cycles."""
+        if order.kind not in {SEARCH, PROBE} or left.timing is None or not left.timing.cycles:
             return []
         many, every = self._ring(order)
-        seen = self._seen(order)
-        step = (seen.time - order.start) / left.timing.cycles if seen else 0.0
-        # the last one, at its end, may have taken the next letter
-        count = min((left.timing.cycles - 1) // every, many - 1)
-        return [(order.start + n * every * step, chr(ord("I") + n - 1)) for n in range(1, count + 1)]
+        count = (left.timing.cycles - 1) // every
+        kept = range(max(0, count - many + 1), count)  # the one at the end may have taken the next letter
+        times = self.solver.times(order.number, order.start, [(n + 1) * every for n in kept])
+        return [(time, chr(ord("I") + n % many)) for n, time in zip(kept, times, strict=True)]
 
     def _watch(self, order: Order) -> None:
         """Look at a leg until it is over, and tell the engine when to stop."""

@@ -14,6 +14,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+import numpy as np
+
 from d2rpick.base.errors import ConfigurationError, D2RPickError, FormatError, printable
 from d2rpick.base.files import write_whole
 from d2rpick.histories.formats.radioss_th import TimeHistory
@@ -201,6 +203,18 @@ class Solver:
         """Cut the history of a leg behind a time: a reader would find two energies there."""
         path = self.history(number)
         os.truncate(path, TimeHistory(path.read_bytes(), str(path)).size_until(time))
+
+    def times(self, number: int, start: float, cycles: Sequence[int]) -> list[float]:
+        """Say when a leg that began at ``start`` had computed so many cycles, by the steps that its history shows.
+
+        Between two states a step grows by the same factor each cycle, if it does; so their geometric mean counts.
+        """
+        path = self.history(number)
+        history = TimeHistory(path.read_bytes(), str(path))
+        steps = history.channel("time_step")
+        steps = np.sqrt(steps * np.append(steps[:1], steps[:-1]))
+        counts = np.cumsum(np.diff(history.time, prepend=start) / steps)
+        return [float(one) for one in np.interp(cycles, np.append(0.0, counts), np.append(start, history.time))]
 
     def last_lines(self, number: int) -> str:
         """Give the last lines that the solver printed, in one."""

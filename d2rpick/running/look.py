@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import History
-    from d2rpick.running.sequence import Order
+    from d2rpick.running.sequence import Order, Window
 
 # A leg is told to stop at the end of the wait when so much of it is over.
 HALF = 0.5
@@ -77,10 +77,10 @@ class Looks:
         self.why = f"{wait.reason}, but {asked.reason}" if asked and longer else wait.reason
         return Seen(now, free, wait.time, idle=at_rest)
 
-    def swing(self, histories: Sequence[Path], order: Order, free: float) -> str:
-        """Say so where parts swing too much to be rigid in the leg that is ordered, of a flight since ``free``."""
-        found = swing_in(self._history(histories), free, order.start)
-        return found.told if found and found.flight > order.until - free else ""
+    def swing(self, histories: Sequence[Path], planned: Window) -> str:
+        """Say so where parts swing too much to be rigid in a window."""
+        found = swing_in(self._history(histories), planned.free, planned.tr)
+        return f"tr = {planned.tr:.6g}: {found.told}" if found and found.flight > planned.td - planned.free else ""
 
     def _history(self, histories: Sequence[Path]) -> History:
         return in_deck(open_run([str(path) for path in histories]), self._inventory).history(self._selection)

@@ -1,11 +1,12 @@
 """Which leg comes next in a first run that is switched while it runs: from what the legs so far have shown.
 
 What each kind of leg does is said in docs/first-run.md.  One that is thrown away has the number of the leg that takes
-its place.
+its place.  A probe with a restart shortly before td is kept up to there.
 """
 
 from __future__ import annotations
 
+from itertools import takewhile
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import D2RPickError
@@ -22,6 +23,9 @@ _MARGIN_SHARE: Final = 0.03
 _PASSED: Final = 0.25
 # Where a leg ends, its history does so up to one state earlier; times within it are the same.
 _STATES: Final = 1.5
+# Cycles are counted from the last state before a leg, though it begins up to one interval later: that many small steps
+# are five times as long when rigid, and a restart may come so much later than it seems.
+_EARLY: Final = 8.0
 _MOST_LEGS: Final = 99
 
 
@@ -184,10 +188,14 @@ def _after_probe(legs: Sequence[Leg], limits: Limits) -> Order | None:
     last = legs[-1]
     if last.seen.contact is None:
         return None if last.whole(limits) and not last.cut else last.order
-    found = window_of(legs, limits)
+    found, first = window_of(legs, limits), _frozen(legs)
     if found.reason:
-        return last.order._replace(kind=LOAD, until=limits.end, after=found.tr + limits.same)
-    return last.order._replace(kind=RIGID, until=found.td)
+        return first._replace(kind=LOAD, until=limits.end, after=found.tr + limits.same)
+    before = [one for one in last.restarts if one[0] < found.td - _EARLY * limits.interval]
+    if not before:
+        return first._replace(kind=RIGID, until=found.td)
+    start, letter = max(before)
+    return _following(last, RIGID, found.td)._replace(start=start, restart=letter)
 
 
 def _after_rigid(legs: Sequence[Leg], limits: Limits) -> Order | None:
@@ -231,25 +239,30 @@ def _wait(seen: Seen, limits: Limits) -> float:
 
 def window_of(legs: Sequence[Leg], limits: Limits) -> Window:
     """Give the window before the contact that the last of these legs has shown, or the end of the run without one."""
-    order, seen = legs[-1].order, legs[-1].seen
+    seen, tr = legs[-1].seen, _frozen(legs).start
     flown = next(leg.seen for leg in reversed(legs) if leg.order.kind == LOAD)
-    free = order.start if flown.free is None else flown.free
+    free = tr if flown.free is None else flown.free
     wait = _wait(flown, limits)
     if seen.contact is None:
-        return Window(free, order.start, seen.time, None, wait)
+        return Window(free, tr, seen.time, None, wait)
     td = seen.contact - limits.margin_of(seen.contact - free, idle=flown.idle)
-    short = td - order.start < 2 * wait
-    reason = f"shorter than two waits, {2 * wait:.4g}" if short else None
-    return Window(free, order.start, td, seen.contact, wait, reason)
+    reason = f"shorter than two waits, {2 * wait:.4g}" if td - tr < 2 * wait else None
+    return Window(free, tr, td, seen.contact, wait, reason)
+
+
+def _frozen(legs: Sequence[Leg]) -> Order:
+    """Order of the leg in which the parts became rigid, of those that the last leg goes on with."""
+    *_, first = takewhile(lambda leg: leg.order.rigid, reversed(legs))
+    return first.order
 
 
 def windows(legs: Sequence[Leg], limits: Limits) -> list[Window]:
     """Give the windows of all flights so far that were switched or left out, in their order."""
     found: dict[int, Window] = {}
     for count, leg in enumerate(legs, start=1):
-        number, ended_by_itself = leg.order.number, leg.order.kind == PROBE and leg.whole(limits) and not leg.cut
+        ended_by_itself = leg.order.kind == PROBE and leg.whole(limits) and not leg.cut
         if leg.order.rigid and (leg.seen.contact is not None or ended_by_itself):
-            found[number] = window_of(legs[:count], limits)
+            found[_frozen(legs[:count]).number] = window_of(legs[:count], limits)
     return list(found.values())
 
 

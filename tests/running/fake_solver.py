@@ -32,11 +32,11 @@ def momentum(now: float, *, rigid: bool) -> float:
 
 
 def state(now: float, *, rigid: bool) -> tuple[list[float], list[float]]:
-    """Quantities of the whole model and of its part, whose own are void while it is rigid."""
+    """Quantities of the whole model, and of its part, whose own are void while it is rigid."""
     along = momentum(now, rigid=rigid)
     energy = 0.0 if now <= 0 else 50.0 + 20.0 * math.cos(2 * math.pi * now / 0.01)
-    whole = [energy, along**2 / (2 * MASS), 0.0, 0.0, along, MASS]
-    return whole, [9e9, 0.0, 0.0, 0.0, 0.0, 0.0] if rigid else whole
+    part = [energy, along**2 / (2 * MASS), 0.0, 0.0, along, MASS]
+    return [*part, STEP], [9e9, 0.0, 0.0, 0.0, 0.0, 0.0] if rigid else part
 
 
 def engine(deck: Path) -> None:
@@ -51,7 +51,7 @@ def engine(deck: Path) -> None:
     rigid, stop, step = "/RBODY/ON" in text, end, 0
     history, listing = Path(f"{name}T{number:02d}"), Path(f"{name}_{number:04d}.out")
     listing.write_text(" started\n")
-    made = headed([MadePart(1, "strip of shells", CODES)], globals_=len(CODES))
+    made = headed([MadePart(1, "strip of shells", CODES)], globals_=len(CODES) + 1)
     killed, normal, last = False, True, start
     if number == 2 and os.environ.get("D2RPICK_FAKE") == "slow":
         while not Path(f"{name}_{number:04d}.ctl").exists():

@@ -11,15 +11,32 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis.strategies import floats, integers
 
 from d2rpick.api.drives import Asked, Driving
 from d2rpick.base.errors import D2RPickError
 from d2rpick.histories.formats.radioss_th import TimeHistory
 from d2rpick.histories.opening import open_run
 from d2rpick.running import engine
-from d2rpick.running.sequence import LOAD, PROBE, SEARCH, Leg, Limits, Order, Seen, control, window_of
+from d2rpick.running.sequence import (
+    LOAD,
+    PROBE,
+    RIGID,
+    SEARCH,
+    Leg,
+    Limits,
+    Order,
+    Seen,
+    control,
+    next_order,
+    window_of,
+    windows,
+)
 from tests.command import ROOT, run
 from tests.deck.test_openradioss import ENGINE, starter
 from tests.decks import wide
@@ -79,6 +96,7 @@ def test_a_run_is_rigid_in_its_flight_and_comes_to_its_end(tmp_path: Path) -> No
     assert len(found["windows"]) == 1
     kinds = [leg["kind"] for leg in found["legs"]]
     assert kinds[-3:] == ["probe", "rigid", "load"]
+    assert found["legs"][-2]["length"] < 0.1 * found["legs"][-3]["length"]  # from a restart of the probe
     assert all(leg["cpu"] == 1.0 for leg in found["legs"])
     assert "First run: strip" in report.read_text()
     restarts = {int(path.name[6:10]) for path in (tmp_path / "run").glob("*.rst")}
@@ -208,3 +226,41 @@ def test_the_margin_is_the_least_one_where_nothing_vibrates(idle: bool, margin: 
     probe = Leg(Order(PROBE, 2, 0.01, 1.0), Seen(0.45, contact=0.4))
     assert window_of([flown, probe], Limits(1.0, 1e-3, 0.002)).td == pytest.approx(0.4 - margin)
     assert window_of([flown, probe], Limits(1.0, 1e-3, 0.002, 0.05)).td == pytest.approx(0.35)
+
+
+FLOWN, PROBED = Leg(Order(LOAD, 1, 0.0, 1.0), Seen(0.1, 0.05, 0.05)), Order(PROBE, 2, 0.1, 1.0)
+WITHIN = Limits(1.0, 1e-3, 0.002, 0.01)
+
+
+def test_a_rigid_leg_begins_at_the_last_restart_that_surely_lies_before_td() -> None:
+    """A restart may come later than it seems, by five intervals of the history."""
+    probe = Leg(PROBED, Seen(0.42, contact=0.4), restarts=((0.3, "K"), (0.38, "L"), (0.389, "M"), (0.41, "N")))
+    rigid = next_order([FLOWN, probe], WITHIN)
+    assert rigid == Order(RIGID, 3, 0.38, 0.39, restart="L")
+    after = next_order([FLOWN, probe, Leg(rigid, Seen(0.39))], WITHIN)
+    assert after
+    assert (after.kind, after.number) == (LOAD, 4)
+    (window,) = windows([FLOWN, probe, Leg(rigid, Seen(0.39))], WITHIN)
+    assert (window.tr, window.td) == (0.1, 0.39)
+
+
+def test_a_rigid_leg_without_such_a_restart_or_with_a_contact_begins_where_the_parts_became_rigid() -> None:
+    probe = Leg(PROBED, Seen(0.42, contact=0.4), restarts=((0.389, "M"),))
+    assert next_order([FLOWN, probe], WITHIN) == Order(RIGID, 2, 0.1, 0.39)
+    hit = Leg(Order(RIGID, 3, 0.3, 0.39, restart="K"), Seen(0.37, contact=0.36))
+    assert next_order([FLOWN, probe, hit], WITHIN) == Order(RIGID, 2, 0.1, 0.35)
+    assert [(one.tr, one.td) for one in windows([FLOWN, probe, hit], WITHIN)] == [(0.1, 0.35)]
+
+
+@given(step=floats(1e-6, 1e-4), growth=floats(1.0, 1.2), seed=integers(0, 99))
+def test_the_times_of_cycles_follow_from_the_steps_of_the_history(step: float, growth: float, seed: int) -> None:
+    """Steps that grow to five times as much, as they do when parts become rigid; a state every few cycles."""
+    steps = np.minimum(step * growth ** np.arange(500), 5 * step)
+    times = np.cumsum(steps)
+    made = headed([], globals_=7)
+    for cycle in sorted(np.random.default_rng(seed).choice(500, 99, replace=False)):
+        made.state(times[cycle], [1.0] * 6 + [steps[cycle]], [])
+    with TemporaryDirectory() as folder:
+        Path(folder, "stripT02").write_bytes(made.data)
+        found = engine.Solver(Path(folder), "strip").times(2, 0.0, [100, 200, 400])
+    assert found == pytest.approx(times[[99, 199, 399]], abs=8 * steps[-1])

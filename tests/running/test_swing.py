@@ -12,7 +12,7 @@ from d2rpick.histories.history import EXACT, Momenta
 from d2rpick.histories.names import Part, Selection
 from d2rpick.histories.opening import open_run
 from d2rpick.running.look import Looks
-from d2rpick.running.sequence import RIGID, Order
+from d2rpick.running.sequence import Window
 from d2rpick.running.swing import swing_in
 from tests.command import ROOT, run
 from tests.records import known, table
@@ -59,8 +59,8 @@ def test_nothing_is_said_where_no_momenta_of_parts_tell() -> None:
 def test_it_is_said_before_the_switch_where_the_flight_is_too_short_for_it() -> None:
     parts = [part.id for part in open_run([str(CAR)]).parts]
     looks = Looks(parts, read_inventory(str(ROOT / "sample_data" / "flying_box" / "BOX_0000.rad")))
-    short, long = (looks.swing([CAR], Order(RIGID, 4, 0.0676, td), FREE) for td in (0.12, 0.25))
-    assert "engine still swings against the others" in short
+    short, long = (looks.swing([CAR], Window(FREE, 0.0676, td, None, 0.024)) for td in (0.12, 0.25))
+    assert short.startswith("tr = 0.0676: engine still swings against the others")
     assert not long
 
 
