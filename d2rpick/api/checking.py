@@ -130,35 +130,32 @@ def check(
     named = [text for name in ("select", "ignore") for one in getattr(rules, name) for text in (f"--{name}", one)]
     files = [text for name in request.history for text in ("--history", name)]
     command = ("check", *files, *request.asking(), *named, *positional(names))
-    found = findings_of(names, rules, judge_by(history, request), command=command)
+    found = findings_of(names, rules, history, request, command=command)
     for one in found.failed:
         raise one.error
     return found
 
 
-def judge_by(run: Run | None, request: Request) -> HistoryJudge | None:
-    """Judge windows by a run; without one ArgumentError where the request says how to."""
-    if run is None:
-        request.without_history()
-        return None
-    from d2rpick.rules.judgement import HistoryJudge  # it loads numpy
-
-    return HistoryJudge(run.files, request.selection(), request.settings)
-
-
-def findings_of(decks: Sequence[str], rules: Configuration, judge: HistoryJudge | None = None, **more: Any) -> Findings:
-    """Check decks as they are named, and tell what could not be read; ``more`` are fields of the answer."""
+def findings_of(decks: Sequence[str], rules: Configuration, run: Run | None, request: Request, **more: Any) -> Findings:
+    """Check decks as they are named, by a run where there is one; ``more`` are fields of the answer."""
     from d2rpick.choice.warnings import Caution
 
+    judge = None
+    if run is None:
+        request.without_history()
+    else:
+        from d2rpick.rules.judgement import HistoryJudge  # it loads numpy
+
+        judge = HistoryJudge(run.files, request.selection(), request.settings)
     rules.verify(RULES)
     found = list(_each(decks, rules, judge))
-    results = [one for one in found if isinstance(one, Checked)]
+    results = tuple(one for one in found if isinstance(one, Checked))
     remarks = dict.fromkeys(remark for result in results for remark in result.remarks)
     return Findings(
         results=results,
-        failed=[one for one in found if isinstance(one, Unreadable)],
+        failed=tuple(one for one in found if isinstance(one, Unreadable)),
         cautions=(*(judge.cautions if judge else ()), *(Caution("unknown-rule", remark) for remark in remarks)),
-        history=judge.run.sources if judge else None,
+        history=run.sources if run else None,
         notes=judge.notes if judge else (),
         **more,
     )

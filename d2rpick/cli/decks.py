@@ -108,14 +108,14 @@ def check(
     d2rpick check sample_data/switching.k --history sample_data/energy.glstat
     d2rpick check -f json --select D2R0,D2R1 --fail-on warning sample_data/switching.k
     """
-    from d2rpick.api.checking import findings_of, judge_by
+    from d2rpick.api.checking import findings_of
     from d2rpick.rules import Configuration
     from d2rpick.rules.base import Severity
 
     run = options.judging_run(request)
     output = output.beside(*deck, *(run.sources if run else ()))
     rules = Configuration(_ids(select), _ids(ignore))
-    found = findings_of(deck, rules, judge_by(run, request), fail_on=Severity(fail_on))
+    found = findings_of(deck, rules, run, request, fail_on=Severity(fail_on))
     output.spare(file for many in (found.results, found.failed) for one in many for file in one.files)
     output.notes(found.notes, found.cautions)
     for one in found.failed:
