@@ -327,7 +327,7 @@ def engine_lines(leg: EngineFile, name: str, ids: Sequence[int], others: Sequenc
     """Write what an engine file says of a leg: its run, and which main nodes are rigid; ``others`` stay off."""
     yield f"/RUN/{name}/{leg.number}"
     yield f"{leg.stop!r:>20}"
-    if leg.cap is not None:
+    if leg.cap is not None and ids:
         yield from ("/RBODY/ON", *listed(ids))
     yield from off(others if leg.cap is not None else (*ids, *others))
     if leg.cap is not None:

@@ -231,14 +231,22 @@ class DrivenDeck(NamedTuple):
     notes: tuple[str, ...]
 
     def leg(
-        self, number: int, until: float, restart: str, cap: float | None, restarts: tuple[int, int] = RESTARTS
+        self,
+        number: int,
+        until: float,
+        restart: str,
+        cap: float | None,
+        restarts: tuple[int, int] = RESTARTS,
+        *,
+        frozen: bool = False,
     ) -> bytes:
         """Write the engine file of a leg: from a restart of the leg before, rigid where a step ``cap`` is given.
 
-        ``restarts``: how many of its own are kept, and how many cycles lie between them.
+        ``restarts``: how many of its own are kept, and how many cycles lie between them.  ``frozen``: the parts are
+        rigid there already; OpenRadioss counts the energy of what is switched on twice once more.
         """
         file = EngineFile(number, until, cap)
-        head, *lines = engine_lines(file, self.name, self.nodes, self.others)
+        head, *lines = engine_lines(file, self.name, () if frozen else self.nodes, self.others)
         head += f"/{restart}" * bool(restart)
         kept = [text for words, text in self.further if repeated(words, file)]
         more = ["/MON/ON"] * (not any(words[0] == "MON" for words, _ in self.further))

@@ -150,7 +150,8 @@ class Driver:
         if order.restart is not None:  # known by some cycles; what follows is computed again
             self.solver.shorten(number - 1, order.start - self.limits.same)
         self.solver.clear(number)
-        text = self.deck.leg(number, order.until, restart, cap, self._ring(order))
+        frozen = order.kind == RIGID and order.restart is not None
+        text = self.deck.leg(number, order.until, restart, cap, self._ring(order), frozen=frozen)
         write_whole(self.solver.file(number, ".rad"), text)
         place = self._place(order)
         self.journal.add("started", order=order, place=place)

@@ -47,8 +47,10 @@ def engine(deck: Path) -> None:
     name, number, letter, end = head[1], int(head[2]), head[3], float(head[4])
     many, every = map(int, re.findall(r"/RFILE/(\d+)\n(\d+)", text)[0])
     before = Path(f"{name}_{number - 1:04d}_0001{f'_{letter}' if letter else ''}.rst")
-    start = float(before.read_text() or 0.0)
-    rigid, stop, step = "/RBODY/ON" in text, end, 0
+    begins, *held = before.read_text().split()
+    start, stop, step = float(begins), end, 0
+    assert not (held and "/RBODY/ON" in text), "OpenRadioss adds to the energy of what is rigid already"
+    rigid = "/RBODY/ON" in text or bool(held and "/RBODY/OFF" not in text)
     history, listing = Path(f"{name}T{number:02d}"), Path(f"{name}_{number:04d}.out")
     listing.write_text(" started\n")
     made = headed([MadePart(1, "strip of shells", CODES)], globals_=len(CODES) + 1)
@@ -78,7 +80,7 @@ def engine(deck: Path) -> None:
                 stop = (float(asked[1]) if asked else now) if "/STOP" in told else stop
             if step % every == 0:
                 letter = chr(ord("I") + (step // every - 1) % many)
-                Path(f"{name}_{number:04d}_0001_{letter}.rst").write_text(repr(now))
+                Path(f"{name}_{number:04d}_0001_{letter}.rst").write_text(f"{now!r}{' rigid' * rigid}")
             if number == 2 and step == 5 and os.environ.get("D2RPICK_FAKE") == "fail":
                 normal = False
                 break
@@ -88,7 +90,8 @@ def engine(deck: Path) -> None:
         sys.exit(2)
     if not killed:
         reached = max(last, min(now, stop))
-        Path(f"{name}_{number:04d}_0001_{chr(ord('I') + (step // every) % many)}.rst").write_text(repr(reached))
+        letter = chr(ord("I") + (step // every) % many)
+        Path(f"{name}_{number:04d}_0001_{letter}.rst").write_text(f"{reached!r}{' rigid' * rigid}")
     listing.write_text(
         "  ** CUMULATIVE CPU TIME SUMMARY **\n ELEMENT FORCES..............: .8E+00 80 %\n"
         f" TOTAL.......................: .1E+01 100 %\n     NORMAL TERMINATION\n TOTAL NUMBER OF CYCLES  : {step}\n"
