@@ -18,9 +18,8 @@ if TYPE_CHECKING:
 Number = int | float
 
 _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d+))?", re.ASCII)
-_TOKEN = re.compile(
-    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?)|(?P<name>&?\s*[a-z_]\w*)|(?P<sign>\*\*|[-+*/(),]))",
-    re.ASCII | re.IGNORECASE,
+_TOKEN: Final = (  # compiled where it is needed
+    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?)|(?P<name>&?\s*[a-z_]\w*)|(?P<sign>\*\*|[-+*/(),]))"
 )
 _NAME = re.compile(r"&\s*([a-z_]\w*)", re.ASCII | re.IGNORECASE)
 _DEEPEST = 50  # nested parentheses; no deck needs more, and Python's stack is not to be tried
@@ -226,8 +225,9 @@ class _Parser:
 def _tokens(text: str) -> Iterator[str]:
     position = 0
     text = text.rstrip()
+    token = re.compile(_TOKEN, re.ASCII | re.IGNORECASE)
     while position < len(text):
-        found = _TOKEN.match(text, position)
+        found = token.match(text, position)
         if found is None:
             raise ExpressionError(f"{text!r} is not a number or an expression")
         yield found[0].strip()

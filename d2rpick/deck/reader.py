@@ -125,7 +125,7 @@ _KEPT: Final = (
 )
 _READ_INCLUDES: Final = ("INCLUDE", "INCLUDE_TRANSFORM")
 _PATHS: Final = ("INCLUDE_PATH", "INCLUDE_PATH_RELATIVE")
-_LONG = re.compile(r"\bLONG\s*=\s*([YSK])", re.IGNORECASE)
+_LONG: Final = r"\bLONG\s*=\s*([YSK])"  # compiled where it is needed
 SWITCHING: Final = re.compile(r"\*\s*(DEFORMABLE|RIGID.DEFORMABLE)", re.IGNORECASE)  # keywords meant to switch
 _SUFFIXES: Final = "+-%"
 _DEEPEST = 60  # includes in includes
@@ -250,7 +250,7 @@ class _Reader:
                 self.deck.encrypted.append(block)
                 continue
             name, suffix = _keyword(block.head)
-            if name == "KEYWORD" and (found := _LONG.search(block.head)):
+            if name == "KEYWORD" and "=" in block.head and (found := re.search(_LONG, block.head, re.IGNORECASE)):
                 width = LONG if found[1].upper() == "Y" else STANDARD
                 if not context.chain:
                     self.deck.long = width == LONG
@@ -321,10 +321,9 @@ def _keyword(head: str) -> tuple[str, str]:
     return name.upper(), suffix
 
 
-_MESH: Final = re.compile(
+_MESH: Final = (
     r"\*(ELEMENT_|NODE\b)|"
-    r"/(NODE|SHELL|SH3N|BRICK|TETRA4|TETRA10|PENTA6|QUAD|TRIA|BEAM|TRUSS|SPRING|BRIC20|SHEL16|SPHCEL|XELEM)(/|\s*\Z)",
-    re.IGNORECASE,
+    r"/(NODE|SHELL|SH3N|BRICK|TETRA4|TETRA10|PENTA6|QUAD|TRIA|BEAM|TRUSS|SPRING|BRIC20|SHEL16|SPHCEL|XELEM)(/|\s*\Z)"
 )
 
 
@@ -349,7 +348,7 @@ def cure(block: Block) -> str:
 
 def holds_mesh(block: Block) -> bool:
     """Whether a block holds nodes or elements."""
-    return _MESH.match(block.head) is not None
+    return re.match(_MESH, block.head, re.IGNORECASE) is not None
 
 
 def _sign_of_cut(block: Block, *, main: bool) -> str:

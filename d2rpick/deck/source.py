@@ -249,7 +249,7 @@ _GZIP: Final = b"\x1f\x8b\x08"
 _FIRST: Final = 1 << 16  # bytes in which the first line end is looked for
 _HEAD: Final = 1024  # longest keyword line that is looked at
 _BEFORE: Final = 4096  # how far back comments belonging to a keyword are looked for
-_SILENCE = re.compile(r"[$#]\s*d2rpick:\s*ignore\b[\s:]*((?:D2R\w*[\s,]*)+|\S*)", re.IGNORECASE)
+_SILENCE: Final = r"[$#]\s*d2rpick:\s*ignore\b[\s:]*((?:D2R\w*[\s,]*)+|\S*)"  # compiled where it is needed
 
 
 class SourceFile:
@@ -382,11 +382,13 @@ class Block:
         Only what stands directly behind it counts, so that a reason may follow; a word that is no id is given too.
         """
         above = self.source.read(max(0, self.start - _BEFORE), self.start)
+        if b"d2rpick" not in above.lower():  # as nearly always
+            return ()
         before = above.removeprefix(BYTE_ORDER_MARK).decode("latin-1")
         rules: list[str] = []
         for line in reversed(before.split("\n")[:-1]):
             if not line.encode("latin-1").startswith(self._comment):
                 break
-            if found := _SILENCE.match(line):
+            if found := re.match(_SILENCE, line, re.IGNORECASE):
                 rules += re.split(r"[\s,]+", found[1].strip(" \t\r,").upper())
         return tuple(rules)
