@@ -115,11 +115,12 @@ def span_of(history: History, anchor: float, fit: Identification, bounds: Span) 
 
 def _means(values: Samples, first: int, behind: int, ahead: int) -> Samples:
     """Means over so many values behind each value and ahead of it, from the ``first`` on; there are zeros outside."""
-    begin = max(first - behind, 0)
-    sums = np.concatenate([[0.0], np.cumsum(values[begin:])])
-    at = np.arange(first, values.size)
-    high, low = np.minimum(at + ahead + 1, values.size), np.maximum(at - behind, 0)
-    return np.asarray((sums[high - begin] - sums[low - begin]) / (behind + 1 + ahead))
+    known, width = values[max(first - behind, 0) :], behind + 1 + ahead
+    sums = np.zeros(values.size - first + width)
+    begin = 1 + max(behind - first, 0)
+    sums[begin : begin + known.size] = known
+    np.cumsum(sums, out=sums)
+    return np.asarray((sums[width:] - sums[:-width]) / width)
 
 
 def _windows(td: float, bounds: Span, *, whole: bool) -> Iterator[Span]:
