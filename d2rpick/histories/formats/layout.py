@@ -162,8 +162,10 @@ def _kind(cells: list[str], decimal: str, only_numbers: bool) -> tuple[bool, ...
         return ()
     numbers = tuple(cell.casefold() in _MISSING or as_number(cell, decimal) is not None for cell in cells)
     words = [cell for cell, number in zip(cells, numbers, strict=True) if not number]
+    # "| a title |" is no row.
+    written = any(cell and number for cell, number in zip(cells, numbers, strict=True))
     # A word begins with a letter: "5 load 1" is a piece of "0,5 load 1,5", cut at the wrong places.
-    is_row = sum(numbers) > 1 and all(word[0].isalpha() and not only_numbers for word in words)
+    is_row = written and sum(numbers) > 1 and all(word[0].isalpha() and not only_numbers for word in words)
     return numbers if is_row else ()
 
 

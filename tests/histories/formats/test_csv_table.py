@@ -208,6 +208,7 @@ def test_columns_that_cannot_be_told(text: str, asked: list[str], reason: str) -
         ("time,ALLKE\n0,1\n1,2\n", r"'ALLKE', by its name not an internal energy \(ALLKE\); choose with `energy`"),
         ("Nodal History,Z-acceleration\nTime,A8,\n0,1,\n1,2,\n", "'A8: Z-acceleration', by its name"),
         ("run,IE\na1,1\na2,2\n", "no rows of at least two numbers"),
+        ("| a title |\n| a line |\n" * 9, "no rows of at least two numbers"),
         ("run,IE,KE\na1,1,2\na2,2,3\n", "table:2: 'run' is 'a1'"),
         ("time,IE\n", "table:1: 'time,IE' and no rows"),
         ("time,IE\n0.0,1.5", "no states"),
