@@ -254,7 +254,8 @@ def times_of(switched: History, reference: History) -> tuple[float, float]:
     ]
     if not moving:
         found = "its energy stands still nowhere, or that of the reference does so too"
-        raise RangeError(f"{', '.join(switched.source)}: {found}; give `tr` and `td`")
+        cure = switched.left_beside or "; give `tr` and `td`"
+        raise RangeError(f"{', '.join(switched.source)}: {found}{cure}")
     first, last = max(moving, key=lambda one: time[one[1]] - time[one[0]])
     before = np.linspace(time[max(first - 1, 0)], time[first], _BETWEEN)
     tr = before[np.abs(reference.energies_at(before) - energy[first]).argmin()]

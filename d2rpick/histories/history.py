@@ -311,16 +311,22 @@ class History:
     def _turns(self) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
         return find_turns(self.energy)
 
+    @property
+    def left_beside(self) -> str:
+        """Words on later legs of the run that lie beside its files and were not named; none where none do."""
+        from d2rpick.histories.source import later_legs  # not above: pathlib costs start-up
+
+        legs = later_legs(self.source)
+        return f"; beside it lies {', '.join(legs)}, a later leg of the run? Name it too" if legs else ""
+
     def check(self, *times: float, argument: str = "") -> None:
         """Raise RangeError unless all times of an ``argument`` lie in the record."""
         low, high = self.time[0], self.time[-1]
         if all(low <= time <= high for time in times):
             return
         from d2rpick.histories.digits import in_smaller_unit
-        from d2rpick.histories.source import later_legs  # not above: pathlib costs start-up
 
-        legs = later_legs(self.source) if max(times) > high else []
-        more = f"; beside it lies {', '.join(legs)}, a later leg of the run? Name it too" if legs else ""
+        more = self.left_beside if max(times) > high else ""
         more = more or (in_smaller_unit(self.time, times, argument) if argument else "")
         *asked, first, last = told_apart((*times, low, high))
         what = f"{f'`{argument}`' if argument else 'time'} {' '.join(asked)}"

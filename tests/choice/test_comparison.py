@@ -91,6 +91,14 @@ def test_the_times_are_read_off_the_switched_run() -> None:
     assert "give the time of the switch as --td" in run("verify", "--tr", "0.1", "--part", "box", BOX).stderr
 
 
+def test_a_leg_in_which_nothing_stands_still_names_those_beside_it(tmp_path: Path) -> None:
+    first, later = tmp_path / "runT01.gz", tmp_path / "runT02.gz"
+    first.write_bytes(Path(BOX).read_bytes())
+    later.touch()
+    told = run("verify", "--part", "box", "--switched", str(first), BOX).stderr
+    assert f"beside it lies {later}, a later leg of the run? Name it too" in told
+
+
 @pytest.mark.slow
 def test_of_a_fall_the_times_are_not_guessed_and_given_ones_verify(tmp_path: Path) -> None:
     """Nothing vibrates before the ground: the energies of both runs are round-off until then."""
