@@ -143,7 +143,8 @@ class Driver:
 
     def _start(self, order: Order) -> None:
         number, legs = order.number, self.journal.all("ended")
-        self.solver.check_room(number, 1 - order.start / self.limits.end)
+        ring = self._ring(order)
+        self.solver.check_room(number, 1 - order.start / self.limits.end, ring[0])
         before = next((one for one in reversed(legs) if one["order"][1] == number - 1), {"restart": ""})
         restart = before["restart"] if order.restart is None else order.restart
         cap = self._step_of(order) if order.rigid else None
@@ -151,7 +152,7 @@ class Driver:
             self.solver.shorten(number - 1, order.start - self.limits.same)
         self.solver.clear(number)
         frozen = order.kind == RIGID and order.restart is not None
-        text = self.deck.leg(number, order.until, restart, cap, self._ring(order), frozen=frozen)
+        text = self.deck.leg(number, order.until, restart, cap, ring, frozen=frozen)
         write_whole(self.solver.file(number, ".rad"), text)
         place = self._place(order)
         self.journal.add("started", order=order, place=place)

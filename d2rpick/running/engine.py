@@ -33,8 +33,6 @@ _HOME: Final = "OPENRADIOSS_PATH"
 _STARTER_ERROR: Final = re.compile(rb"^ *[1-9]\d* +ERROR\(S\)", re.MULTILINE)
 _TAIL: Final = 1 << 14
 _LAST_LINES: Final = 5
-# Restarts of the size of the largest that a leg may hold at a time: two, and one that is being written.
-_RESTARTS: Final = 3
 
 
 class Commands(NamedTuple):
@@ -228,14 +226,17 @@ class Solver:
             for path in self._restarts(earlier):
                 path.unlink(missing_ok=True)
 
-    def check_room(self, number: int, share: float) -> None:
-        """Raise D2RPickError where the disk has no room for a leg that has this share of the run still before it."""
+    def check_room(self, number: int, share: float, restarts: int) -> None:
+        """Raise D2RPickError where the disk has no room for a leg that has this share of the run still before it.
+
+        It keeps so many ``restarts`` of the size of the largest so far, and one that is being written.
+        """
         import shutil
 
         files = list(self.folder.iterdir())
         restart = max((one.stat().st_size for one in files if one.suffix == ".rst"), default=0)
         histories = sum(self.history(one).stat().st_size for one in range(number) if self.history(one).exists())
-        needed = _RESTARTS * restart + round(histories * share / max(1 - share, 0.1))
+        needed = (restarts + 1) * restart + round(histories * share / max(1 - share, 0.1))
         free = shutil.disk_usage(self.folder).free
         if free < needed:
             raise D2RPickError(

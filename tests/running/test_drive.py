@@ -172,9 +172,9 @@ def test_a_leg_is_not_begun_on_a_full_disk(tmp_path: Path, monkeypatch: pytest.M
     usage = shutil.disk_usage(tmp_path)
     monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=2999))
     with pytest.raises(D2RPickError, match="make room, then --resume"):
-        solver.check_room(2, 0.5)
+        solver.check_room(2, 0.5, 2)
     monkeypatch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=3000))
-    solver.check_room(2, 0.5)
+    solver.check_room(2, 0.5, 2)
 
 
 def test_commands_are_split_as_a_shell_does_and_given_to_none() -> None:
