@@ -7,6 +7,7 @@ Python, and the command line that asks the same again.
 from __future__ import annotations
 
 from dataclasses import field, fields
+from functools import cache
 from math import inf
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -60,6 +61,7 @@ def option(text: str, kind: Any = "text", metavar: str | None = None, *, default
     return field(default=default, metadata={"option": Option(text, kind, metavar, **more)})
 
 
+@cache
 def options_of(table: Any) -> dict[str, Option]:
     """Give the options of a table by the names of their fields."""
     return {one.name: one.metadata["option"] for one in fields(table) if "option" in one.metadata}

@@ -22,12 +22,13 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.histories.run import Run
 
-_HISTORY: Final = re.compile(r"(?P<root>.+)T(?P<leg>\d\d)(\.csv)?(\.gz)?", re.DOTALL)
+# Patterns are compiled where they are needed, by the functions of `re`: start-up.
+_HISTORY: Final = r"(?s)(?P<root>.+)T(?P<leg>\d\d)(\.csv)?(\.gz)?"
 _HEAD, _TAIL = 1 << 20, 1 << 16  # bytes: the engine echoes its input, and tells when it ran at the end
-_SWITCHED: Final = re.compile(rb"RIGID BODY: *\d+ +SET O(?:N|FF)")
-_COMMIT: Final = re.compile(rb"CommitID: *([0-9a-f]{7,40})\b")
-_BUILT: Final = re.compile(rb"COPYRIGHT \(C\) (?:\d{4}-)?(\d{4})")  # the year is that of the build
-_RAN: Final = re.compile(rb"EXECUTION (?:STARTED|COMPLETED) *[.:]+ *(\d{4})/(\d\d)/(\d\d)")
+_SWITCHED: Final = rb"RIGID BODY: *\d+ +SET O(?:N|FF)"
+_COMMIT: Final = rb"CommitID: *([0-9a-f]{7,40})\b"
+_BUILT: Final = rb"COPYRIGHT \(C\) (?:\d{4}-)?(\d{4})"  # the year is that of the build
+_RAN: Final = rb"EXECUTION (?:STARTED|COMPLETED) *[.:]+ *(\d{4})/(\d\d)/(\d\d)"
 _FIXED: Final = (2026, 1, 13)
 # Commits from the last weeks before the fix, which may have been built in its year.
 _BEFORE: Final = (
@@ -46,7 +47,7 @@ def wrong_energies(histories: Iterable[str]) -> Iterator[str]:
     restart switches.  Nothing is told where the listing does not show when the engine was built.
     """
     for name in histories:
-        found = _HISTORY.fullmatch(name)
+        found = re.fullmatch(_HISTORY, name)
         if found and int(found["leg"]) > 1:
             listing = f"{found['root']}_{int(found['leg']):04d}.out"
             old = _before_the_fix(*_ends(listing))
@@ -72,7 +73,7 @@ def ending(history: str) -> str | None:
     """
     from pathlib import Path  # not above, nor below: start-up
 
-    found = _HISTORY.fullmatch(history)
+    found = re.fullmatch(_HISTORY, history)
     if found is None:
         tails = [_ends(str(Path(history).parent / name))[1] for name in ("messag", "d3hsp")]
     elif Path(f"{found['root']}_{int(found['leg']) + 1:04d}.rad").exists():
@@ -96,9 +97,9 @@ def _ends(path: str) -> tuple[bytes, bytes]:
 
 def _before_the_fix(head: bytes, tail: bytes) -> str:
     """Say what shows that an engine that switches bodies is from before the fix; nothing where nothing does."""
-    if b"OpenRadioss" not in head or not _SWITCHED.search(head):
+    if b"OpenRadioss" not in head or not re.search(_SWITCHED, head):
         return ""
-    commit, built, ran = _COMMIT.search(head), _BUILT.search(head), _RAN.search(tail)
+    commit, built, ran = re.search(_COMMIT, head), re.search(_BUILT, head), re.search(_RAN, tail)
     if commit and commit[1][:_SHORT].decode() in _BEFORE:
         return f"commit {commit[1].decode()[:9]}"
     if built and int(built[1]) < _FIXED[0]:
@@ -109,19 +110,17 @@ def _before_the_fix(head: bytes, tail: bytes) -> str:
 
 
 _NUMBER: Final = rb"([-+]?[.\d]+(?:[Ee][-+]?\d+)?)"
-_RADIOSS_ELEMENTS: Final = re.compile(rb"^ *ELEMENT FORCES\.*: *" + _NUMBER, re.MULTILINE)
-_RADIOSS_TOTAL: Final = re.compile(rb"^ *TOTAL\.*: *" + _NUMBER, re.MULTILINE)
-_RADIOSS_CYCLES: Final = re.compile(rb"TOTAL NUMBER OF CYCLES *: *(\d+)")
+_RADIOSS_ELEMENTS: Final = rb"(?m)^ *ELEMENT FORCES\.*: *" + _NUMBER
+_RADIOSS_TOTAL: Final = rb"(?m)^ *TOTAL\.*: *" + _NUMBER
+_RADIOSS_CYCLES: Final = rb"TOTAL NUMBER OF CYCLES *: *(\d+)"
 _SUMMARY: Final = b"CUMULATIVE CPU TIME SUMMARY"
 _TIMING: Final = b"T i m i n g   i n f o r m a t i o n"
 _D3HSP_ROW: Final = rb" *\.* +" + _NUMBER + rb" +" + _NUMBER + rb" +" + _NUMBER
-_D3HSP_ELEMENTS: Final = re.compile(rb"^ *Element processing" + _D3HSP_ROW, re.MULTILINE)
-_D3HSP_TOTAL: Final = re.compile(rb"^ *T o t a l s" + _D3HSP_ROW, re.MULTILINE)
-_D3HSP_SETUP: Final = re.compile(
-    rb"^ *(?:Keyword Processing|Initialization|MPP Decomposition)" + _D3HSP_ROW, re.MULTILINE
-)
-_D3HSP_CYCLES: Final = re.compile(rb"Problem cycle *= *(\d+)")
-_ZONE: Final = re.compile(rb"^ time(?:\.{5,}| per zone cycle\.\(nanosec\)\.\.) +" + _NUMBER, re.MULTILINE)
+_D3HSP_ELEMENTS: Final = rb"(?m)^ *Element processing" + _D3HSP_ROW
+_D3HSP_TOTAL: Final = rb"(?m)^ *T o t a l s" + _D3HSP_ROW
+_D3HSP_SETUP: Final = rb"(?m)^ *(?:Keyword Processing|Initialization|MPP Decomposition)" + _D3HSP_ROW
+_D3HSP_CYCLES: Final = rb"Problem cycle *= *(\d+)"
+_ZONE: Final = rb"(?m)^ time(?:\.{5,}| per zone cycle\.\(nanosec\)\.\.) +" + _NUMBER
 _PER_ZONE: Final = b" time per zone"
 
 
@@ -164,7 +163,7 @@ def read_zone_times(path: str) -> ZoneTimes:
     """Read the time per zone cycle of a glstat; FormatError where it has none above zero."""
     pairs: list[tuple[float, float]] = []
     time = 0.0
-    for line in _ZONE.finditer(_read(path)):
+    for line in re.finditer(_ZONE, _read(path)):
         if line[0].startswith(_PER_ZONE):
             pairs.append((time, float(line[1])))
         else:
@@ -191,7 +190,7 @@ def _read(path: str) -> bytes:
 
 def _of_radioss(name: str, data: bytes) -> Timing | None:
     summary = data[data.rindex(_SUMMARY) :]
-    found = [one.search(summary) for one in (_RADIOSS_ELEMENTS, _RADIOSS_TOTAL, _RADIOSS_CYCLES)]
+    found = [re.search(one, summary) for one in (_RADIOSS_ELEMENTS, _RADIOSS_TOTAL, _RADIOSS_CYCLES)]
     elements, total, cycles = (float(one[1]) if one else 0.0 for one in found)
     return Timing(name, int(cycles), total, elements)
 
@@ -199,20 +198,18 @@ def _of_radioss(name: str, data: bytes) -> Timing | None:
 def _of_d3hsp(name: str, data: bytes) -> Timing | None:
     """Take processor times, or times of the clock where those are rounded to nothing; less what came before the run."""
     table = data[data.rindex(_TIMING) :]
-    cycles, total, elements = (one.search(table) for one in (_D3HSP_CYCLES, _D3HSP_TOTAL, _D3HSP_ELEMENTS))
+    cycles, total, elements = (re.search(one, table) for one in (_D3HSP_CYCLES, _D3HSP_TOTAL, _D3HSP_ELEMENTS))
     if not (cycles and total and elements):
         return None
     column = 1 if float(elements[1]) > 0 else 3
-    before = sum(float(row[column - 1]) for row in _D3HSP_SETUP.findall(table))
+    before = sum(float(row[column - 1]) for row in re.findall(_D3HSP_SETUP, table))
     return Timing(name, int(cycles[1]), float(total[column]) - before, float(elements[column]))
 
 
 _STEP_NUMBER: Final = rb"([-+.\dEe]+)"
-_STEP: Final = re.compile(
-    rb"is controlled by +[\w ]*?\d+ +of part +(\d+)|^ time step\.+ +" + _STEP_NUMBER, re.MULTILINE
-)
-_TABLE: Final = re.compile(rb"smallest timesteps *\r?\n[^\n]*\n[^\n]*part +timestep *\r?\n((?:[^\n]*\n)*?) *(?:\n|\Z)")
-_ROW: Final = re.compile(rb"^ *[a-z][a-z ]* +\d+ +(\d+) +" + _STEP_NUMBER + rb"\s*$", re.MULTILINE)
+_STEP: Final = rb"(?m)is controlled by +[\w ]*?\d+ +of part +(\d+)|^ time step\.+ +" + _STEP_NUMBER
+_TABLE: Final = rb"smallest timesteps *\r?\n[^\n]*\n[^\n]*part +timestep *\r?\n((?:[^\n]*\n)*?) *(?:\n|\Z)"
+_ROW: Final = rb"(?m)^ *[a-z][a-z ]* +\d+ +(\d+) +" + _STEP_NUMBER + rb"\s*$"
 _SEARCHED: Final = 64 << 20  # bytes of a file that are searched: it begins with what matters
 _D3HSP: Final = "d3hsp"
 
@@ -243,7 +240,7 @@ def _of_glstat(run: Run) -> Iterator[tuple[str, int, float]]:
     """Pair the part that controls each cycle with the step printed below it."""
     for file in run.files:
         part: bytes | None = None
-        for line in _STEP.finditer(file.data[:_SEARCHED]):
+        for line in re.finditer(_STEP, file.data[:_SEARCHED]):
             if line[1]:
                 part = line[1]
             elif part:
@@ -259,9 +256,9 @@ def _smallest_of_d3hsp(names: Sequence[str]) -> Iterator[tuple[str, int, float]]
         if not path.is_file():
             continue
         with path.open("rb") as stream:
-            table = _TABLE.search(stream.read(_SEARCHED))
+            table = re.search(_TABLE, stream.read(_SEARCHED))
         if table:
-            yield from ((_D3HSP, *_pair(*row.groups())) for row in _ROW.finditer(table[1]))
+            yield from ((_D3HSP, *_pair(*row.groups())) for row in re.finditer(_ROW, table[1]))
 
 
 def _pair(part: bytes, step: bytes) -> tuple[int, float]:

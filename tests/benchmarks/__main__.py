@@ -15,7 +15,7 @@ from importlib import import_module
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, NamedTuple
 
-from tests.benchmarks.timing import ROOT, ratio
+from tests.benchmarks.timing import ROOT, processor_seconds, ratio
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -33,7 +33,7 @@ _ROUNDS = 5
 
 
 def process_ratio(libraries: str, *args: str, env: Mapping[str, str] | None = None) -> float:
-    """Whole process of a command over a process that only imports what it cannot do without."""
+    """Processor time of a command over that of a process that only imports what it cannot do without."""
     own = (THREADS, "PYTHONDONTWRITEBYTECODE")
     clean = {name: value for name, value in os.environ.items() if name not in own and not name.startswith("D2RPICK_")}
 
@@ -46,7 +46,7 @@ def process_ratio(libraries: str, *args: str, env: Mapping[str, str] | None = No
     with TemporaryDirectory() as compiled:
         clean["PYTHONPYCACHEPREFIX"] = compiled  # an installed package is compiled; a working copy may not be
         ours(), least()
-        return ratio(ours, least, _PROCESSES)
+        return ratio(ours, least, _PROCESSES, cost=processor_seconds)
 
 
 def integration_ratio(repeats: int) -> float:
@@ -110,9 +110,22 @@ SEARCHES = (
     ("wide window", ("suggest", "--td-window", "0.3", "0.9"), 3.0),
     ("explore", ("explore", "--steps", "200"), 10.0),
 )
+STARTS = (
+    *((("info", f"sample_data/rollover_box{kind}"), 1.5) for kind in (".h5", ".binout", ".matsum", "T01")),
+    (("plan", "sample_data/energy.csv"), 2.0),
+    (("explore", "sample_data/energy.csv", "--td", "0.064"), 2.5),
+)
 ROWS = (
     Row("suggest / import numpy, click: processes", lambda: process_ratio("numpy, click", *SUGGEST)),
     Row("  both with one thread", lambda: process_ratio("numpy, click", *SUGGEST, env=ONE_THREAD), most=1.4),
+    *(
+        Row(
+            f"{' '.join(command)} / import numpy, click: processes, one thread",
+            partial(process_ratio, "numpy, click", *command, env=ONE_THREAD),
+            most,
+        )
+        for command, most in STARTS
+    ),
     Row("--help / import click: processes", lambda: process_ratio("click", "--help"), most=1.3),
     Row("suggest, noise, 1e5 states / pandas.read_csv", choosing("noisy_to_pandas"), most=4.0),
     Row("suggest, noise, 1e6 / 1e5 states", choosing("noisy_growth"), most=12.0),
@@ -166,7 +179,7 @@ ROWS = (
     Row("parts and elements of a 50 MB deck / loop over its lines", deck("to_loop", "inventory"), most=15.0),
     Row("check of a 50 MB deck / dynars.parse_deck", deck("check_to_dynars"), most=1.0),
     Row("  memory for the cards [MB]", deck("memory"), most=32.0),
-    Row("check / import click: processes", lambda: process_ratio("click", *CHECK)),
+    Row("check / import click: processes", lambda: process_ratio("click", *CHECK), most=1.5),
     Row("loop over lines / glstat, 1e5 states", reading("glstat_to_loop"), least=8.0),
     Row("glstat, 1e5 states / bare read", reading("glstat_to_bare_read"), most=4.0),
     Row("glstat, 1e5 states / version 0.6.0, CPU", reading("glstat_to_first"), most=1.3),

@@ -10,7 +10,6 @@ import json
 import os
 from functools import cache, partial
 from pathlib import Path
-from resource import RUSAGE_CHILDREN, getrusage
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
@@ -18,7 +17,7 @@ import numpy as np
 
 from d2rpick.histories.formats import csv_table
 from tests.benchmarks.study import LOOP, write_runs
-from tests.benchmarks.timing import output, ratio, seconds
+from tests.benchmarks.timing import output, processor_seconds, ratio, seconds
 from tests.records import MODE
 from tests.text_files import matsum_text
 
@@ -250,14 +249,7 @@ def _runs() -> list[str]:
 
 def _ratio(one: Sequence[str], other: Sequence[str], rounds: int = _ROUNDS) -> float:
     """Processor time of the first process over that of the second, in turns."""
-    return ratio(lambda: output(*one), lambda: output(*other), rounds, cost=_processor_seconds)
-
-
-def _processor_seconds(call: Callable[[], object]) -> float:
-    before = getrusage(RUSAGE_CHILDREN)
-    call()
-    after = getrusage(RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return ratio(lambda: output(*one), lambda: output(*other), rounds, cost=processor_seconds)
 
 
 def _speed_up(command: Callable[[str], Sequence[str]], rounds: int) -> float | None:
