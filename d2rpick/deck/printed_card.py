@@ -191,20 +191,24 @@ def read_windows(text: str, source: str) -> tuple[Times, ...]:
 
 
 def _of_journal(text: str) -> list[Times]:
-    """Windows of the rigid legs that ended; one that goes on from a restart belongs to the leg before it."""
+    """Windows of the rigid legs that ended: each begins with the probe, or another rigid leg, that it goes on from."""
     import json  # not above: start-up
 
-    windows: list[Times] = []
+    windows: dict[float, float] = {}
+    tr = None
     for line in text.splitlines():
         try:
             record = json.loads(line)
-            if record["event"] != "ended" or record["order"][0] != "rigid":
+            if record["event"] != "ended":
                 continue
+            kind = record["order"][0]
             start, until, reached = (float(one) for one in (*record["order"][2:4], record["seen"][0]))
         except (ValueError, KeyError, TypeError, IndexError):
             continue  # cut, or of another kind
-        again = bool(windows) and start <= windows[-1][1]
-        windows[-1 if again else len(windows) :] = [
-            (windows[-1][0] if again else start, reached if record["cut"] else until)
-        ]
-    return windows
+        if kind not in {"probe", "rigid"}:
+            tr = None
+            continue
+        tr = start if tr is None else tr
+        if kind == "rigid":
+            windows[tr] = reached if record["cut"] else until
+    return list(windows.items())

@@ -98,9 +98,11 @@ def test_a_file_of_windows() -> None:
 
 
 def test_windows_are_read_from_the_journal_of_a_driven_run() -> None:
-    """A rigid leg that was ended from outside goes on from its last restart; a probe is no window."""
+    """A rigid leg that was ended from outside goes on from its last restart; a probe alone is no window."""
     legs = [("load", 0.0, 0.06, 0.06, False), ("probe", 0.06, 0.2, 0.15, False), ("rigid", 0.06, 0.145, 0.1, True),
-            ("rigid", 0.09, 0.145, 0.1449, False), ("rigid", 0.2, 0.3, 0.2998, False)]  # fmt: skip
+            ("rigid", 0.09, 0.145, 0.1449, False), ("load", 0.145, 0.9, 0.16, False), ("probe", 0.16, 0.9, 0.17, False),
+            ("load", 0.16, 0.9, 0.2, False), ("probe", 0.2, 0.9, 0.32, False),
+            ("rigid", 0.29, 0.3, 0.2998, False)]  # fmt: skip
     lines = [
         json.dumps({"event": "ended", "order": [kind, 2, start, until, 0.0, None], "seen": [seen, None], "cut": cut})
         for kind, start, until, seen, cut in legs
