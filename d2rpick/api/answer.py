@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import field, fields
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from d2rpick.api.cards import Cards
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import if_written
 from d2rpick.base.files import write_whole
 

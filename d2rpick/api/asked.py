@@ -6,12 +6,11 @@ The commands of one run and Python go this one way, and get the same numbers.
 from __future__ import annotations
 
 import os
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from d2rpick.api import arguments
 from d2rpick.api.request import Request
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import ArgumentError, FormatError, listing, name_units
 from d2rpick.choice.of_run import Reference
 from d2rpick.choice.warnings import Caution

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypedDict, Unpack
 
 from d2rpick.api.request import OPTIONS, POSITIVE, TIME, UNLIMITED, Number, Option, Request, dashed, option, options_of
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import ArgumentError
 
 if TYPE_CHECKING:

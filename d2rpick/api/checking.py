@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import os
 import sys
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Unpack
 
 from d2rpick.api import arguments
 from d2rpick.api.answer import Answer, frame_of
 from d2rpick.api.cards import SETTINGS
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import ConfigurationError, D2RPickError, DeckError
 from d2rpick.deck import main_decks
 from d2rpick.deck.radioss_run import run_files

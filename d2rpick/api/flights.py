@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
@@ -10,7 +10,6 @@ from d2rpick.api.answer import RunAnswer, frame_of
 from d2rpick.api.asked import Asked, ask, request_of
 from d2rpick.api.cards import CardOptions, Cards, JudgedCard, judged
 from d2rpick.api.request import check_window
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import ArgumentError
 from d2rpick.choice import plan as planning
 from d2rpick.choice import trade_off

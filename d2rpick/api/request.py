@@ -6,12 +6,11 @@ Python, and the command line that asks the same again.
 
 from __future__ import annotations
 
-from dataclasses import field, fields
+from dataclasses import dataclass, field, fields
 from functools import cache
 from math import inf
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import ArgumentError
 
 if TYPE_CHECKING:
@@ -88,7 +87,7 @@ class Request:
     """
 
     deck: str | None = option("Main deck of the run.", "file", "DECK")
-    weights: str | Weights | None = option(
+    weights: str | Weights | None = option(  # noqa: RUF009
         "Cost of an element by formulation, as d2rpick calibrate writes it.  [default: measured with OpenRadioss]",
         *("file", "FILE"),
     )

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from d2rpick.api import arguments
 from d2rpick.api.cards import numbers
-from d2rpick.base.dataclass import dataclass
 from d2rpick.histories.names import Selection
 
 if TYPE_CHECKING:

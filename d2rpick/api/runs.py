@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import IO, TYPE_CHECKING, Any
 
 from d2rpick.api import arguments
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import if_written
 
 if TYPE_CHECKING:

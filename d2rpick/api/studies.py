@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 from contextlib import suppress
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import chain
 from os.path import abspath
@@ -19,7 +19,6 @@ from d2rpick.api import arguments
 from d2rpick.api.answer import Paged, frame_of
 from d2rpick.api.asked import request_of
 from d2rpick.api.request import Request, needed_time, time_or_window
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import INTERNAL_ERROR, FormatError
 from d2rpick.base.files import record_of, signed
 from d2rpick.base.workers import Farm, answers, on_cores

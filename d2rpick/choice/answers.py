@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.candidates import Candidate, Candidates, find_candidates, judge
 from d2rpick.choice.expectation import Expectation, against_td, expectation, most_energy

@@ -12,12 +12,12 @@ measured ratio to the others.
 from __future__ import annotations
 
 import hashlib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import ConfigurationError, DeckError, FormatError
 from d2rpick.choice.cost import ELEMENT_SHARE, MEASURED, POINT, RIGID_NODE, Weights
 from d2rpick.choice.warnings import Caution

@@ -6,12 +6,12 @@ They are judged as columns; a `Candidate` is made only where one is looked at.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, overload
 
 import numpy as np
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.choice.expectation import Objection, objections
 from d2rpick.histories.digits import not_before
 from d2rpick.vibration import measures

@@ -5,11 +5,11 @@ Between the switches nothing is compared but energy: a rigid part reports neithe
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.judged_parts import FEWEST, SAME
 from d2rpick.flight.internal_energy import round_off

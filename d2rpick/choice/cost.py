@@ -14,11 +14,10 @@ step while rigid over that before (`d2rpick.vibration.measures.run_time_share`).
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import ConfigurationError, are, name_units
 from d2rpick.histories.source import Source
 

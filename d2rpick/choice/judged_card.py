@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import D2RPickError
 from d2rpick.choice.of_run import Reference, judge_of
 from d2rpick.deck.printed_card import PrintedCard, Printing, Times

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import FormatError, RangeError, if_written, listing
 from d2rpick.choice.health import Health, assess, cautions_of_health, refuse_unsound, unsound
 from d2rpick.choice.of_run import Reference

@@ -11,12 +11,11 @@ Each window that locks in energy costs a run of its own, so a short one is left 
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.choice.health import refuse_unsound
 from d2rpick.choice.of_run import Reference, check_units, suggest_of
 from d2rpick.choice.switched_run import Done, Times, done_windows, switched_history

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import FormatError, RangeError, are, name_units
 from d2rpick.choice.candidates import ONE_BODY
 from d2rpick.choice.cost import CostModel, Share, Weights

@@ -5,14 +5,13 @@ That is the flight, the vibration, the level, and whether anything vibrates.
 
 from __future__ import annotations
 
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from math import inf
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import RangeError
 from d2rpick.flight.flight import Flight, Seen, find_flight, seen_flight
 from d2rpick.flight.internal_energy import round_off

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from d2rpick.api.request import NOT_NEGATIVE, OPTIONS, POSITIVE, TIME, UNLIMITED, Request, dashed, option
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import D2RPickError
 from d2rpick.cli import options
 from d2rpick.cli.options import FILES, RESULT

@@ -6,14 +6,13 @@ import os
 import re
 import sys
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
 import click
 
 from d2rpick.api.cards import Cards, JudgedCard
 from d2rpick.api.request import OPTIONS, UNLIMITED, Request, dashed, option, options_of
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import FORESEEN, ArgumentError, D2RPickError, listing, one_line, printable
 from d2rpick.base.files import write_whole
 from d2rpick.cli.progress import on_terminal, reading

@@ -7,11 +7,10 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.graph import reached
 from d2rpick.deck.expression import ExpressionError, Number, evaluate, names_in, number
 

@@ -6,7 +6,7 @@ Arrays of elements hold places of nodes in the table of nodes, not their ids; -1
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from math import inf
@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Final, NamedTuple, TypeVar
 
 import numpy as np
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.graph import reached
 from d2rpick.deck.mesh import NO_NODE, Elements, NodeTable, distinct
 

@@ -5,10 +5,9 @@ Columns: the vendor's keyword data as published in its Python library.
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.graph import reached
 
 if TYPE_CHECKING:

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 import re
 import textwrap
-from dataclasses import field
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import DeckError, printable
 
 if TYPE_CHECKING:

@@ -7,10 +7,9 @@ A block is a line that begins with ``/``, and the data lines below it.  Columns 
 from __future__ import annotations
 
 import math
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.graph import reached
 from d2rpick.deck.card import Card, Field, Row, Scope, Value
 from d2rpick.deck.expression import ExpressionError, number

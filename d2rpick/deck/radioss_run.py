@@ -9,12 +9,11 @@ from __future__ import annotations
 import math
 import os
 import re
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import DeckError, are, in_rows, name_units
 from d2rpick.deck.card import Card, Field, Value
 from d2rpick.deck.radioss_deck import Body, Leg, Starter, blocks, card_of, kept_off, keyword, read_legs

@@ -12,12 +12,12 @@ import os
 import re
 from bisect import bisect_right
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice, zip_longest
 from threading import Thread
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import DeckError
 from d2rpick.base.files import FileState, at_rest, beyond, long_line
 

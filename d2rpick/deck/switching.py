@@ -10,11 +10,10 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.deck.card import Card, Field, Row, Value
 from d2rpick.deck.reader import SWITCHING, Deck
 

@@ -8,10 +8,11 @@ never switched.  Vectors of the plane are complex numbers, x + i z: x forward, z
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import RangeError
 
 Plane = NDArray[np.complex128]

@@ -8,11 +8,11 @@ While it is switched the box moves as one body, by three equations in the plane 
 from __future__ import annotations
 
 import copy
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import RangeError
 from d2rpick.models.box_model import GRAVITY, Bars, Ends, Parameters, Plane, Structure, Values, build, stiffest_rate
 

@@ -6,11 +6,11 @@ Python computes and prints everything; the script in ``explorer.js`` looks it up
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.histories.samples import outline
 from d2rpick.report.html import Markup, join, resource, tag
 from d2rpick.report.suggestion import acceptable

@@ -6,11 +6,10 @@ import os
 import re
 import textwrap
 from collections import Counter
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base import __version__
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import name_units, printable
 from d2rpick.choice.warnings import Caution
 from d2rpick.deck.source import STDIN

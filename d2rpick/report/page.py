@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.deck.printing import DEFAULT, SOLVERS
 from d2rpick.report.explorer import Explorer, explorer, scripts, styles
 from d2rpick.report.html import Markup, document, drawings, join, pairs, resource, section, table, tag

@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Mapping
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import ConfigurationError
 from d2rpick.base.settings import RULE_KEYS, nearest_settings, refuse_unknown
 from d2rpick.deck import radioss_run

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, one_line
 from d2rpick.deck.parts import Parts, read_parts, read_sections
 from d2rpick.deck.radioss_run import Flaw, Run, RunWindows, find_run_windows

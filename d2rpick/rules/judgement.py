@@ -5,10 +5,9 @@ Not imported by the rules themselves: without a history the check does not need 
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import DeckError, if_written, name_units
 from d2rpick.choice.answers import Verdict, find_better_pair, suggest_at
 from d2rpick.choice.deck_of_run import in_deck

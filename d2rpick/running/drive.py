@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import time
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import D2RPickError
 from d2rpick.base.files import write_whole
 from d2rpick.choice.warnings import Caution

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.histories.samples import narrow
 
 if TYPE_CHECKING:

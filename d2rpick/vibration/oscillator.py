@@ -12,12 +12,12 @@ from the frozen deformation with both masses at one speed.  A `Replay` runs it t
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import sqrt
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import RangeError
 from d2rpick.vibration.modes import LARGEST_ENERGY, Mode
 

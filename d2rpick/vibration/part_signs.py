@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.vibration import measures
 from d2rpick.vibration.part_motion import PartMotion, Places, all_zeros, by_own_modes, followed
 from d2rpick.vibration.swings import SOLVER_FLOOR

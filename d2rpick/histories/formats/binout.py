@@ -10,12 +10,12 @@ fit - a variable or a part that one state lacks, a count that changes - is refus
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.database import DIGITS, Branched
 from d2rpick.histories.formats.lsda import DirectoryLayout, Lsda, Variable, recognises

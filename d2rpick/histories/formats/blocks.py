@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from d2rpick.base import __version__
-from d2rpick.base.dataclass import dataclass
 from d2rpick.histories.formats.printed import decode
 
 if TYPE_CHECKING:

@@ -11,12 +11,12 @@ import re
 import signal
 import struct
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any, BinaryIO, Final
 
 import numpy as np
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import FormatError
 from d2rpick.base.files import beyond, unpacked_beyond
 

@@ -17,12 +17,11 @@ from __future__ import annotations
 import re
 import struct
 from array import array
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.content import Content, content_of
 from d2rpick.histories.formats.blocks import Pattern, repeats

@@ -8,13 +8,13 @@ How a record lies in the file is said in `radioss_records`.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.dataclass import dataclass
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.content import Content, content_of
 from d2rpick.histories.database import Database
