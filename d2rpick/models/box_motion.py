@@ -204,7 +204,7 @@ _SAFETY = 0.9
 _SAME = 1e-6
 
 
-@dataclass()
+@dataclass
 class Accounts:
     """What has been exchanged with the surroundings since time 0.
 

@@ -39,7 +39,7 @@ _KEPT: Final = (
 _UNKNOWN: Final = "nothing in the history shows when the load is over; give that time as `after`"
 
 
-@dataclass()
+@dataclass
 class HistoryJudge:
     """Judges by one run: the parts of a window together where the run has parts, else by the whole model.
 

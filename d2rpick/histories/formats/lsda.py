@@ -82,7 +82,7 @@ class _Form:
     fixed: int
 
 
-@dataclass()
+@dataclass
 class Visits:
     """Every time the file enters a numbered directory of one branch, in the order of the file.
 
