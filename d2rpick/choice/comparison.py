@@ -120,22 +120,21 @@ def compare_runs(
         notes.append(f"{found}; some solvers report rigid solid elements wrongly")
     still = _still(reference, switched, tr, td)
     error, rigid = _relative(*momenta, td, end), _rigid_window(switched, tr, td, still)
+    mean, mean_reference = float(after.mean()), float(reference_after.mean())
     objections = [*_not_rigid(reference, switched, rigid, tr, td, still)]
     if known:
         objections += _not_locked_in(reference, tr, frozen, wanted, tolerance)
-        if float(reference_after.mean()) > round_off(reference):
-            objections += _another_mean(float(after.mean() / reference_after.mean()), min_mean)
-    if error is not None and error > MOST_MOMENTUM_ERROR:
-        moved = f"the switched run's momentum after td is off by {error:.1%}"
-        objections.append(f"{moved}: its motion differs from the reference")
+        if mean_reference > round_off(reference):
+            objections += _another_mean(mean / mean_reference, min_mean)
+    objections += _another_motion(error)
     return Comparison(
         source=switched.source,
         energy_frozen=frozen,
         energy_td=wanted,
         energy_ratio=frozen / wanted if wanted > 0 else None,
         end=end,
-        mean_after=float(after.mean()),
-        mean_after_reference=float(reference_after.mean()),
+        mean_after=mean,
+        mean_after_reference=mean_reference,
         spread_after=float(after.std()),
         spread_after_reference=float(reference_after.std()),
         momentum_error=error,
@@ -226,6 +225,13 @@ def _another_mean(share: float, least: float) -> Iterator[str]:
     if not least <= share <= 2 - least:
         found = f"the mean energy after td is {share:.2g} times that of the reference"
         yield f"{found}, {least:g} to {2 - least:g} were expected (`min_mean_energy`)"
+
+
+def _another_motion(error: float | None) -> Iterator[str]:
+    """Object to a momentum that is off by this share of its maximum after td."""
+    if error is not None and error > MOST_MOMENTUM_ERROR:
+        moved = f"the switched run's momentum after td is off by {error:.1%}"
+        yield f"{moved}: its motion differs from the reference"
 
 
 def times_of(switched: History, reference: History) -> tuple[float, float]:

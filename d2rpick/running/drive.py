@@ -191,7 +191,7 @@ class Driver:
         count = (left.timing.cycles - 1) // every
         kept = range(max(0, count - many + 1), count)  # the one at the end may have taken the next letter
         times = self.solver.times(order.number, order.start, [(n + 1) * every for n in kept])
-        return [(time, chr(ord("I") + n % many)) for n, time in zip(kept, times, strict=True)]
+        return [(time, chr(ord("I") + n % many)) for n, time in zip(kept, times, strict=False)]
 
     def _watch(self, order: Order) -> None:
         """Look at a leg until it is over, and tell the engine when to stop."""

@@ -199,20 +199,25 @@ class Solver:
 
     def shorten(self, number: int, time: float) -> None:
         """Cut the history of a leg behind a time: a reader would find two energies there."""
-        path = self.history(number)
-        os.truncate(path, TimeHistory(path.read_bytes(), str(path)).size_until(time))
+        os.truncate(self.history(number), self._states(number).size_until(time))
 
     def times(self, number: int, start: float, cycles: Sequence[int]) -> list[float]:
         """Say when a leg that began at ``start`` had computed so many cycles, by the steps that its history shows.
 
         Between two states a step grows by the same factor each cycle, if it does; so their geometric mean counts.
+        Nothing where a step is not written.
         """
-        path = self.history(number)
-        history = TimeHistory(path.read_bytes(), str(path))
-        steps = history.channel("time_step")
+        history = self._states(number)
+        steps = history.channel("time_step") if "time_step" in history.channels else np.zeros(1)
+        if not np.all(steps > 0):
+            return []
         steps = np.sqrt(steps * np.append(steps[:1], steps[:-1]))
         counts = np.cumsum(np.diff(history.time, prepend=start) / steps)
         return [float(one) for one in np.interp(cycles, np.append(0.0, counts), np.append(start, history.time))]
+
+    def _states(self, number: int) -> TimeHistory:
+        path = self.history(number)
+        return TimeHistory(path.read_bytes(), str(path))
 
     def last_lines(self, number: int) -> str:
         """Give the last lines that the solver printed, in one."""

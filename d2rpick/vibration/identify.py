@@ -212,11 +212,8 @@ def _through_zero(found: Identification, simple: list[Identification]) -> Identi
     differ.  What tells them apart is then as small as what a spring that stiffens adds.  If it is a preload after all,
     residuals are twice as large, which counts like a hidden mode.
     """
-    mode = found.mode
-    if not isinstance(mode, Mode) or mode.preload**2 <= float(mode.vibration_energy(found.start)):
-        return found
-    near = [one for one in simple if one.misfit is not None and one.misfit < MAX_OF_SPRING]
-    if not near:
+    mode, near = found.mode, [one for one in simple if one.misfit is not None and one.misfit < MAX_OF_SPRING]
+    if not near or not isinstance(mode, Mode) or mode.preload**2 <= float(mode.vibration_energy(found.start)):
         return found
     best = min(near, key=lambda one: one.rms)
     return best._replace(describes_record=True, follows=True, reason=None, hidden_share=_OF_A_PRELOAD)

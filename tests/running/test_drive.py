@@ -264,3 +264,11 @@ def test_the_times_of_cycles_follow_from_the_steps_of_the_history(step: float, g
         Path(folder, "stripT02").write_bytes(made.data)
         found = engine.Solver(Path(folder), "strip").times(2, 0.0, [100, 200, 400])
     assert found == pytest.approx(times[[99, 199, 399]], abs=8 * steps[-1])
+
+
+@pytest.mark.parametrize("written", [[], [0.0]])
+def test_without_steps_no_restart_has_a_time(tmp_path: Path, written: list[float]) -> None:
+    made = headed([], globals_=6 + len(written))
+    made.state(1.0, [1.0] * 6 + written, [])
+    (tmp_path / "stripT02").write_bytes(made.data)
+    assert engine.Solver(tmp_path, "strip").times(2, 0.0, [100]) == []
