@@ -113,5 +113,4 @@ def _mean_ratio(parameters: Parameters, tr: float, td: float, interval: float) -
 
 def _until(record: Record, states: int) -> Record:
     """Give the first states of a record."""
-    columns = {name: value[:states] for name, value in vars(record).items() if isinstance(value, np.ndarray)}
-    return Record(**{**vars(record), **columns})
+    return Record._make(value[:states] if isinstance(value, np.ndarray) else value for value in record)

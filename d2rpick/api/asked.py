@@ -6,8 +6,8 @@ The commands of one run and Python go this one way, and get the same numbers.
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.api import arguments
 from d2rpick.api.request import Request
@@ -26,8 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.histories import run as histories
 
 
-@dataclass(frozen=True, eq=False)
-class Asked:
+class Asked(NamedTuple):
     """A run that is open, the energy in it that is meant, and how it is judged.
 
     ``cautions`` are what the deck left unknown, ``selection`` the columns and parts, with those that the deck names;
@@ -200,4 +199,4 @@ def _merged(asked: Asked, merge: int) -> Asked:
         cautions = (*cautions, Caution("merged-apart", f"{found}; leave it out to keep them apart"))
     merged = tuple(sorted({part.id for part in parts} | {merge}))
     whole = len(merged) > 1 or any(body.whole for body in bodies)  # a part alone may be of pieces
-    return replace(asked, settings=replace(asked.settings, bodies=(RigidBody(merged, whole=whole),)), cautions=cautions)
+    return asked._replace(settings=replace(asked.settings, bodies=(RigidBody(merged, whole=whole),)), cautions=cautions)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Unpack
 
 from d2rpick.api import arguments
@@ -186,7 +186,7 @@ def _found(name: str, rules: Configuration, judge: HistoryJudge | None) -> Check
         if judge and content is None:
             judge.beside(name)
         found = check_deck(name, configuration, judge, content)
-        return replace(found, files=(source, *found.files))
+        return found._replace(files=(source, *found.files))
     except Exception as error:
         if isinstance(error, D2RPickError) and not isinstance(error, ConfigurationError | DeckError):
             raise  # about the history, by which all are judged

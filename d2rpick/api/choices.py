@@ -152,7 +152,7 @@ class Verdict(Judged, answers.Verdict):
         chosen = (self.situation, self.tr) if self.verified else None
         explored = explored_around(self.question.reference, self.situation)
         context = self._context(command, judging, cards, chosen, explored)
-        return verdict_page(self, replace(context, switched=self.compared.files if self.compared else None))
+        return verdict_page(self, context._replace(switched=self.compared.files if self.compared else None))
 
 
 def suggest(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
@@ -160,7 +160,7 @@ class Plan(RunAnswer, planning.Plan):
     def printed(self, cards: Cards, *, every: bool = False) -> JudgedCard | None:
         """Print the card of the next run, its new windows judged; None where none is new."""
         new, asked = self.all_windows if every else self.windows, self.question
-        asked = replace(asked, reference=asked.reference._replace(history=self.history))
+        asked = asked._replace(reference=asked.reference._replace(history=self.history))
         return judged(asked, cards, new, done=self.done) if new else None
 
     def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:  # noqa: ARG002

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.api import arguments
 from d2rpick.api.cards import numbers
@@ -16,8 +15,7 @@ if TYPE_CHECKING:
     from d2rpick.running.events import Event
 
 
-@dataclass(frozen=True)
-class FirstRun:
+class FirstRun(NamedTuple):
     """What `first` wrote: the names of the ``files``, the main deck first, and ``notes`` on what the run cannot know.
 
     ``wait`` is the time without force that counts as flight [time of the deck], ``reason`` where it comes from.

@@ -43,8 +43,7 @@ _TOLD: Final = 0.5
 _REST, _RIGID = "rest", "rigid node"
 
 
-@dataclass(frozen=True)
-class Observation:
+class Observation(NamedTuple):
     """What one leg took per cycle [us], and what it computed.
 
     ``counts`` are deformable elements by class; ``elements`` is None where the solver gives the total alone.

@@ -5,8 +5,7 @@ Between the switches nothing is compared but energy: a rigid part reports neithe
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -40,8 +39,7 @@ _ABOUT = 0.05
 _BETWEEN: Final = 101
 
 
-@dataclass(frozen=True)
-class Comparison:
+class Comparison(NamedTuple):
     """Measures of a switched run; fields are the keys of the JSON output, None where the files lack the quantity.
 
     ``energy_frozen`` is the energy that came back at td, ``energy_td`` that of the reference there.

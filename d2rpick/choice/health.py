@@ -6,8 +6,7 @@ takes them, and left out where that is tiny.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -48,8 +47,7 @@ _COUNTING_REFERENCE = 0.1
 OF_THE_MODEL = ("contact-in-window", "work-in-window")
 
 
-@dataclass(frozen=True)
-class Health:
+class Health(NamedTuple):
     """How a run stands up to the time ``until``; fields are the keys of the JSON output, None for what is not written.
 
     Shares are of the peak internal energy of the model (``part_hourglass_share``: of ``part``, the worst of those

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -19,21 +18,20 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
 
 
-@dataclass(frozen=True)
-class CardRequest:
+class CardRequest(NamedTuple):
     """What is known of a card before its times: ``solver`` None is the one that wrote the history.
 
     What ``printing`` leaves open the history fills in: its chosen parts, and its end for that of the run.
     """
 
     solver: str | None = None
-    printing: Printing = field(default_factory=Printing)
+    printing: Printing = Printing()
 
     def of(self, history: History) -> tuple[str, Printing]:
         """Name the solver, and say what its card needs."""
         ids = self.printing.part or tuple(part.id for part in history.parts or ())
         end = float(history.time[-1]) if self.printing.end is None else self.printing.end
-        return self.solver or solver_of(history.format), replace(self.printing, part=ids, end=end)
+        return self.solver or solver_of(history.format), self.printing._replace(part=ids, end=end)
 
     def whom(self, history: History) -> tuple[int, ...]:
         """Give the parts or main nodes that the card switches; none where nobody says it."""
@@ -45,7 +43,7 @@ class CardRequest:
         """Let the parts of each rigid body that a deck tells be merged, and what its run keeps off stay off."""
         bodies = tuple(body.parts for body in settings.bodies or ())
         off = tuple(node for node in settings.kept_off if node not in self.printing.node)
-        return replace(self, printing=replace(self.printing, bodies=bodies, off=off))
+        return self._replace(printing=self.printing._replace(bodies=bodies, off=off))
 
 
 class SolverInput(NamedTuple):

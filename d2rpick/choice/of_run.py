@@ -144,7 +144,7 @@ def compare_with(verdict: Verdict, reference: Reference, switched: Reference, mi
     objections = (*judged.objections, *found.objections)
     return replace(
         verdict,
-        switched=replace(found, objections=objections, notes=(*judged.notes, *found.notes)),
+        switched=found._replace(objections=objections, notes=(*judged.notes, *found.notes)),
         verified=verdict.verified and not objections,  # a wrong motion overrules the verdict
         reasons=verdict.reasons + objections,
         cautions=(*verdict.cautions, *cautions_of_engine(switched.run.sources)),

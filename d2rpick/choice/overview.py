@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -34,16 +34,14 @@ _RADIOSS: Final = "/TH/PART with DEF, MASS and HE for all parts"
 _LS_DYNA: Final = "*DATABASE_MATSUM"
 
 
-@dataclass(frozen=True)
-class PartOverview:
+class PartOverview(NamedTuple):
     """A part and the highest internal energy it ever has; None where that is not written, or not in every state."""
 
     part: Part
     energy_max: float | None
 
 
-@dataclass(frozen=True)
-class Sampling:
+class Sampling(NamedTuple):
     """Output intervals [time]."""
 
     min: float
@@ -51,8 +49,7 @@ class Sampling:
     max: float
 
 
-@dataclass(frozen=True)
-class Overview:
+class Overview(NamedTuple):
     """What the files of a run hold.
 
     Times in the unit of the run, which ``time_unit`` gives only where a file names it.  ``sampling`` is None where

@@ -12,7 +12,7 @@ Each window that locks in energy costs a run of its own, so a short one is left 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -44,8 +44,7 @@ MIN_RIGID: Final = 0.05
 _LONGER: Final = 2.0
 
 
-@dataclass(frozen=True)
-class Planned:
+class Planned(NamedTuple):
     """One flight of a run and the rigid window in it; times in the unit of the history.
 
     ``status``: "supported" by this reference, "re-plan" from a switched run, "done", or "left-out"; ``reason`` says
@@ -231,13 +230,13 @@ def _rows(
         within = [one for one in known if one.flight == seen]
         if within:
             for one in within:
-                yield replace(row, status="done", reason=one.told, done=one)
+                yield row._replace(status="done", reason=one.told, done=one)
         elif last is not None and start < last:
-            yield replace(row, reason="before the last window that is done")
+            yield row._replace(reason="before the last window that is done")
         elif settings.after is not None and end <= settings.after:
-            yield replace(row, reason=f"the load ends after it, at {settings.after:.6g}")
+            yield row._replace(reason=f"the load ends after it, at {settings.after:.6g}")
         elif end - margin.time - start < shortest:
-            yield replace(row, reason=_too_short(end - margin.time - start, shortest, margin))
+            yield row._replace(reason=_too_short(end - margin.time - start, shortest, margin))
         else:
             yield _asked(reference, row, settings, shortest, landed, fits)
         landed = flight.end
@@ -265,15 +264,15 @@ def _asked(
     window = row.start, last_td(row.end, row.margin.time)
     answer = suggest_of(reference, window, asked, since=landed, fits=fits)
     known = answer.situation.flight
-    row = replace(row, answer=answer)
+    row = row._replace(answer=answer)
     if known.start is not None and (known.start < row.start or answer.recommended):
         flight = row.flight._replace(start=known.start, source=known.source)
-        row = replace(row, flight=flight, start=known.start)
+        row = row._replace(flight=flight, start=known.start)
     if answer.recommended is None:
-        return replace(row, reason=answer.why_none)
+        return row._replace(reason=answer.why_none)
     if answer.recommended.rigid_time < shortest:
-        return replace(row, reason=_too_short(answer.recommended.rigid_time, shortest, row.margin))
-    return replace(row, status="supported")
+        return row._replace(reason=_too_short(answer.recommended.rigid_time, shortest, row.margin))
+    return row._replace(status="supported")
 
 
 def _too_short(rigid: float, shortest: float, margin: Margin) -> str:
@@ -294,7 +293,7 @@ def _without_short(rows: Sequence[Planned]) -> Iterator[Planned]:
         own = f"rigid for {rigid:.3g} from {tr:.6g} to {td:.6g}, {longer}"
         why = "this window locks in energy and moves the landings after it, so that flight would wait for one run more"
         cure = f"with `min_rigid` below {rigid:.6g} this one is planned too"
-        yield replace(row, status="left-out", reason=f"{own}: {why}; {cure}")
+        yield row._replace(status="left-out", reason=f"{own}: {why}; {cure}")
 
 
 def _with_status(rows: Sequence[Planned], known: Sequence[Done]) -> Iterator[Planned]:
@@ -306,7 +305,7 @@ def _with_status(rows: Sequence[Planned], known: Sequence[Done]) -> Iterator[Pla
         why = f"the run was rigid in a contact in {window}; plan the windows from there again"
     for row in rows:
         if row.status == "supported" and why:
-            yield replace(row, status="re-plan", reason=why)
+            yield row._replace(status="re-plan", reason=why)
             continue
         yield row
         if row.status == "supported" and row.locks_in and row.window:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -46,8 +46,7 @@ _ALL, _STILL = "all that may", "all but what moves"
 _NO_ANGLE: Final = "the momenta of the parts do not tell how a body of them turns; the angle error is not known"
 
 
-@dataclass(frozen=True)
-class PartSet:
+class PartSet(NamedTuple):
     """A set of parts, what it saves and what it does; None with a word in ``reasons`` where unknown.
 
     ``bodies`` are the rigid bodies that its parts make, ``cost_share`` is what they save of a step [-].
@@ -253,15 +252,14 @@ class _Comparison:
             reasons.append(str(error))
         if one.rigid_fraction is not None and one.cost_share is not None:
             run_time = run_time_share(one.rigid_fraction, one.cost_share, self.settings.step_ratio)
-            one = replace(one, run_time_share=run_time)
-        return replace(one, reasons=tuple(reason for reason in (*reasons, *one.reasons) if reason))
+            one = one._replace(run_time_share=run_time)
+        return one._replace(reasons=tuple(reason for reason in (*reasons, *one.reasons) if reason))
 
     def _with_cost(self, one: PartSet, inventory: Inventory, share: Share) -> PartSet:
         within = {part: counts.total() for part, counts in inventory.elements_within(one.parts).items()}
         whole = {part: counts.total() for part, counts in inventory.counts.items()}
         rigid = {part for part, count in within.items() if count == whole[part]}
-        return replace(
-            one,
+        return one._replace(
             bodies=inventory.bodies(one.parts),
             moving=self._loose(inventory, one.parts),
             elements=sum(within.values()),
@@ -299,7 +297,7 @@ class _Comparison:
                 raise RangeError(answer.why_none)
             situation, (tr, td) = answer.situation, (answer.recommended.tr, answer.recommended.td)
         time = reference.history.time
-        one = replace(one, window=(tr, td), rigid_fraction=(td - tr) / float(time[-1] - time[0]))
+        one = one._replace(window=(tr, td), rigid_fraction=(td - tr) / float(time[-1] - time[0]))
         return _with_position(one, situation, tr)
 
 
@@ -311,10 +309,9 @@ def _with_position(one: PartSet, situation: Situation, tr: float) -> PartSet:
     worst = bodies.worst(tr, situation.td) if bodies else None
     if bodies is None or worst is None:
         apart = {part.id for part in bodies.apart} if bodies else set()
-        return replace(one, reasons=why, moving=one.moving | apart, apart=bool(apart))
+        return one._replace(reasons=why, moving=one.moving | apart, apart=bool(apart))
     angle = float(worst.drift.angles(np.array([tr]), situation.td)[0])
-    placed = replace(
-        one,
+    placed = one._replace(
         position_error=worst.error,
         position_limit=bodies.limit if worst.part else None,
         position_part=worst.drift.part if worst.part else None,
@@ -323,7 +320,7 @@ def _with_position(one: PartSet, situation: Situation, tr: float) -> PartSet:
         angle_error=None if np.isnan(angle) else angle,
         position_is_lower_bound=worst.at_least,
     )
-    return replace(placed, moving=one.moving | {*worst.drift.moving}) if placed.out_of_place else placed
+    return placed._replace(moving=one.moving | {*worst.drift.moving}) if placed.out_of_place else placed
 
 
 def _with_recommendation(sets: Sequence[PartSet]) -> Iterator[PartSet]:
@@ -337,7 +334,7 @@ def _with_recommendation(sets: Sequence[PartSet]) -> Iterator[PartSet]:
     alike = [one for one in in_place if (one.saving or 0.0) >= most - _LIKE]
     best = min(alike, key=lambda one: len(one.parts), default=None)
     for one in sets:
-        yield replace(one, recommended=one is best)
+        yield one._replace(recommended=one is best)
 
 
 def _cautions(

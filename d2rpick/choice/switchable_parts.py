@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -36,8 +35,7 @@ STOPPED: Final = 0.1
 _LANDING: Final = 0.05
 
 
-@dataclass(frozen=True)
-class InFlight:
+class InFlight(NamedTuple):
     """One part in one flight; energies are None where the part has none or they are not written.
 
     ``scatter`` is the standard deviation of the internal energy over its mean [-]; ``change`` its end less its start.
@@ -55,8 +53,7 @@ class InFlight:
         return None if self.scatter is None else self.scatter >= STOPPED
 
 
-@dataclass(frozen=True)
-class PartFacts:
+class PartFacts(NamedTuple):
     """What the history says about one part; ``has_energy`` None: its energy is not written.
 
     ``held`` says what holds it in the longest flight, or at the end of a record without any.
@@ -69,8 +66,7 @@ class PartFacts:
     held: str | None = None
 
 
-@dataclass(frozen=True)
-class RunFacts:
+class RunFacts(NamedTuple):
     """What a history says about all of its parts.
 
     ``flights`` are (start, end) [time], ``longest`` the place of the longest one, None without any.  ``reason`` says
@@ -173,8 +169,7 @@ LANDING_ALONE: Final = 0.9
 _CHEAP: Final = 0.1
 
 
-@dataclass(frozen=True)
-class PartRow:
+class PartRow(NamedTuple):
     """One part with all that is known of it; None stands for what is not.
 
     ``cost_share`` is that of its elements in the cost of all elements [-], ``smallest_step`` its smallest stable time
@@ -279,11 +274,11 @@ def _judged(row: PartRow, facts: RunFacts, inventory: Inventory | None, alone: i
     data = inventory.parts.get(row.id) if inventory else None
     kept = tuple(_to_keep(row, fact, data, alone)) or tuple(_in_pieces(row, inventory))
     if kept:
-        return replace(row, verdict=KEEP, reasons=kept)
+        return row._replace(verdict=KEEP, reasons=kept)
     open_ = tuple(_not_known(row, facts, inventory, data))
     if open_:
-        return replace(row, verdict=UNKNOWN, reasons=open_)
-    return replace(row, verdict=SWITCH, reasons=(*_to_switch(row, fact, data), *_joined(row, inventory)))
+        return row._replace(verdict=UNKNOWN, reasons=open_)
+    return row._replace(verdict=SWITCH, reasons=(*_to_switch(row, fact, data), *_joined(row, inventory)))
 
 
 def _joined(row: PartRow, inventory: Inventory | None) -> Iterator[str]:
@@ -394,6 +389,6 @@ def _merged(rows: Sequence[PartRow], inventory: Inventory) -> Iterator[PartRow]:
     lead = {part: body[0] for body in bodies for part in body[1:]}
     for row in rows:
         if row.id in lead:
-            yield replace(row, verdict=MERGE, merge_with=lead[row.id], reasons=row.reasons)
+            yield row._replace(verdict=MERGE, merge_with=lead[row.id], reasons=row.reasons)
         else:
             yield row

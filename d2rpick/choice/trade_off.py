@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -26,8 +26,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.situation import Settings, Situation
 
 
-@dataclass(frozen=True)
-class Offer:
+class Offer(NamedTuple):
     """A td [time] and the tr that is recommended for it, None where none is: then ``reason`` says why.
 
     ``peak``: the energy peaks at td.  ``error`` is what offers are compared by [-]: the residual, on basis "energy"
@@ -165,7 +164,7 @@ def explore_of(
     fully = looking(history, settings, fits, since, quick=False)
     asked_at = map(look, sorted({*times, *([] if chosen is None else [chosen])}))
     situations = [one if one.evidence.span else fully(one.td) for one in asked_at]  # why none is seen is told of each
-    offers = [replace(one, recommended=one.td == chosen) for one in _marked([*offers_of(situations, peaks)])]
+    offers = [one._replace(recommended=one.td == chosen) for one in _marked([*offers_of(situations, peaks)])]
     asked = next((one for one in offers if one.td == td), None)
     situation = fully(known_best.td)
     told = suggestion.situation  # the first td of the flight has too little before it to tell of a vibration
@@ -201,7 +200,7 @@ def _marked(offers: Sequence[Offer]) -> Iterator[Offer]:
             if error < least or (error, rigid) == (least, longest):  # equal pairs do not beat each other
                 unbeaten.add(one.td)
                 least, longest = error, rigid
-    return (replace(one, unbeaten=one.td in unbeaten) for one in offers)
+    return (one._replace(unbeaten=one.td in unbeaten) for one in offers)
 
 
 def _step(start: Offer, offers: Sequence[Offer]) -> Offer | None:

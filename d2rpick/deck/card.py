@@ -106,8 +106,7 @@ _REFERENCE = re.compile(r"&\s*([a-z_]\w*)", re.ASCII | re.IGNORECASE)
 _PAIRS = 4  # name and value, repeated in a line of *PARAMETER
 
 
-@dataclass(frozen=True)
-class Definition:
+class Definition(NamedTuple):
     """One line that gives a parameter a value; ``problem`` says why it has none, ``order`` counts all of a deck."""
 
     name: str

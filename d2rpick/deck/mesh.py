@@ -7,7 +7,6 @@ taken one by one.  Columns of Radioss: Altair's public help for the elements, an
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -238,8 +237,7 @@ class NodeTable:
         return lookup
 
 
-@dataclass(frozen=True, eq=False)
-class Elements:
+class Elements(NamedTuple):
     """Elements of one kind: the id of the part, shape (n,), and the places of the nodes, shape (n, nodes)."""
 
     kind: str

@@ -142,8 +142,7 @@ class Formulation(NamedTuple):
     in_plane: int = 0
 
 
-@dataclass(frozen=True)
-class Material:
+class Material(NamedTuple):
     """Name of a material, ``kind`` ("deformable", "rigid", "spring", "airbag", "void"), and what makes its wave speed.
 
     Numbers are None where the deck does not give them in a way that is followed.
@@ -175,8 +174,7 @@ class Section:
     stiffness: float | None = None
 
 
-@dataclass(frozen=True)
-class PartData:
+class PartData(NamedTuple):
     """What the deck says about one part besides its elements."""
 
     id: int

@@ -46,8 +46,7 @@ _ELEMENT_OPTIONS: Final = {  # their lines hold reals or words, or a single inte
 }
 
 
-@dataclass(frozen=True)
-class PartSet:
+class PartSet(NamedTuple):
     """Members of a part set, ranges still to be compared with the parts there are, and sets it adds up.
 
     ``problems`` are fields that say nothing usable; with one of them the members cannot be known.

@@ -33,8 +33,7 @@ PHYSICS = (
 )
 
 
-@dataclass(frozen=True)
-class Printing:
+class Printing(NamedTuple):
     """What a card needs to say besides its times; a solver takes what its ``takes`` names.
 
     Attributes

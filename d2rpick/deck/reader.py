@@ -8,7 +8,7 @@ from bisect import bisect_right
 from collections import defaultdict
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import DeckError
 from d2rpick.deck.card import LONG, STANDARD, Card, Field, Problem, Row, Scope, Transform
@@ -24,8 +24,7 @@ _FACTORS, _OF_TIME = 3, 1  # of mass, time and length
 UNKNOWN_KIND = "this kind of include is not read"
 
 
-@dataclass(frozen=True)
-class Asked:
+class Asked(NamedTuple):
     """A file an ``*INCLUDE`` card asks for: its name as written, the transform of the card, its unreadable fields."""
 
     name: Field
@@ -33,8 +32,7 @@ class Asked:
     problems: tuple[Problem, ...] = ()
 
 
-@dataclass(frozen=True)
-class Unread:
+class Unread(NamedTuple):
     """An include that was not read: its name as written, and why."""
 
     name: Field
@@ -220,13 +218,12 @@ def read_deck(path: str, content: bytes | None = None) -> Deck:
     return deck
 
 
-@dataclass(frozen=True)
-class _Context:
+class _Context(NamedTuple):
     """What a file inherits from the one that includes it."""
 
     scope: Scope
     width: int = STANDARD
-    transform: Transform = field(default_factory=Transform)
+    transform: Transform = Transform()
     chain: tuple[str, ...] = ()
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
@@ -43,8 +43,7 @@ _INERTIA_ROWS: Final = ("the first line (PID)", "the second line (XC to TM)", "t
 _REALS: Final = {"automatic": (4, 0), "inertia": (4, 6), "restart": (0, 0), "plain": (0, 0)}
 
 
-@dataclass(frozen=True)
-class Switched:
+class Switched(NamedTuple):
     """One line: a part (or a part set, ``by_set``) that is made rigid or deformable."""
 
     part: Value[int]
@@ -279,8 +278,7 @@ class Event(NamedTuple):
     line: Switched
 
 
-@dataclass(frozen=True)
-class Window:
+class Window(NamedTuple):
     """A unit is rigid from ``tr`` to ``td`` [time of the deck]; ``td`` is None when it stays rigid.
 
     ``td`` may lie before ``tr``: that is what the cards say, and a finding.
@@ -298,8 +296,7 @@ class Window:
         return self.unit.id if self.unit.kind == "part" else None
 
 
-@dataclass(frozen=True)
-class Windows:
+class Windows(NamedTuple):
     """All windows of a deck by unit and time; ``orphans`` switch back what nothing made rigid before.
 
     ``other_rigid`` and ``other_deformable`` are switched at times that no clock tells (CODE 1-5, restarts).
@@ -331,7 +328,7 @@ def find_windows(sets: Iterable[SwitchSet], parts: Parts) -> Windows:
         found, left = follow(unit, sorted(timed[unit], key=lambda timed: (timed[0], timed[1].line.to_rigid)))
         if left and found and found[-1].td is None:
             td, closed = left.pop()
-            found[-1] = replace(found[-1], td=td, closed=closed)
+            found[-1] = found[-1]._replace(td=td, closed=closed)
         windows += found
         orphans += [event for _, event in left]
     other = [event for event in events if event.by.time is None]
@@ -359,7 +356,7 @@ def follow(unit: Unit, events: Iterable[tuple[float, Event]]) -> tuple[list[Wind
         if event.line.to_rigid and not rigid:
             windows.append(Window(unit, time, None, event, None))
         elif rigid and not event.line.to_rigid:
-            windows[-1] = replace(windows[-1], td=time, closed=event)
+            windows[-1] = windows[-1]._replace(td=time, closed=event)
         elif not event.line.to_rigid:
             orphans.append((time, event))
     return windows, orphans

@@ -9,6 +9,7 @@ never switched.  Vectors of the plane are complex numbers, x + i z: x forward, z
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,8 +97,7 @@ class Parameters:
             raise RangeError(f"mesh is {self.mesh}, at least {_COARSEST} cells along each side were expected")
 
 
-@dataclass(frozen=True, eq=False)
-class Truss:
+class Truss(NamedTuple):
     """Elastic-plastic bars: ``ends`` (bars, 2), ``rest`` length [m], ``stiffness`` [N/m], ``strength`` [N] (bars,)."""
 
     ends: Ends
@@ -113,8 +113,7 @@ class Truss:
         return cls(pairs, rest, axial / rest, np.full(rest.size, axial * yield_strain))
 
 
-@dataclass(frozen=True, eq=False)
-class Structure:
+class Structure(NamedTuple):
     """Points at ``places`` (n,) with ``masses``, the first ``of_box`` those of the box, and the bars of both parts.
 
     The outer ring comes first.  ``skin`` are the points that may touch floor and ground, ``toes`` those that may meet

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 from time import perf_counter
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -28,8 +28,7 @@ _REALS, _PLANES = 12, 4
 _BLOCK: Final = 256
 
 
-@dataclass(frozen=True, eq=False)
-class Record:
+class Record(NamedTuple):
     """States of a run over ``time`` (n,); SI units, vectors x + i z.
 
     Of the box: ``centre`` of mass and its ``velocity`` (n,), ``roll`` forward since time 0 [rad], ``omega`` [rad/s] by
@@ -270,8 +269,7 @@ def history_of(record: Record) -> History:
 _FINE, _COARSE, _LAST = 0.003, 0.004, 0.03
 
 
-@dataclass(frozen=True)
-class Outcome:
+class Outcome(NamedTuple):
     """One switched run against the reference run.
 
     ``energy`` [J]: of the box at tr, what is locked in; ``energy_ratio``: over that at td.  At td: ``roll_error``

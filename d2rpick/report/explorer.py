@@ -6,7 +6,6 @@ Python computes and prints everything; the script in ``explorer.js`` looks it up
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -36,8 +35,7 @@ _HELP: Final = (
 )
 
 
-@dataclass(frozen=True)
-class Explorer:
+class Explorer(NamedTuple):
     """What can be explored: the trade-offs of one or several flights.
 
     ``command`` is the command line that asks for the pair of a td, in front of td and behind it.

@@ -234,7 +234,7 @@ def _windows(checks: Checks) -> Iterator[dict[str, Any]]:
 def _findings(checks: Checks) -> Iterator[dict[str, Any]]:
     for finding in (one for result in checks.results for one in result.findings):
         shown = {"file": _shown(finding.file, checks.root), "deck": _shown(finding.deck, checks.root)}
-        yield {**vars(finding), **shown}
+        yield {**finding._asdict(), **shown}
 
 
 def _warnings(checks: Checks) -> list[Caution]:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.deck.printing import DEFAULT, SOLVERS
 from d2rpick.report.explorer import Explorer, explorer, scripts, styles
@@ -30,8 +29,7 @@ SIGNED: Final = ("chosen by", "date", "signature")
 CHECKED: Final = ("checked by", "date", "signature")
 
 
-@dataclass(frozen=True)
-class PageContext:
+class PageContext(NamedTuple):
     """What a page shows besides the answer.
 
     ``run`` is what was read, ``switched`` a finished switched run; ``command`` repeats the answer, ``judging`` are the

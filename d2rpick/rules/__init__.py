@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import ConfigurationError
 from d2rpick.base.settings import RULE_KEYS, nearest_settings, refuse_unknown
@@ -109,8 +109,7 @@ def _names(table: Mapping[str, object], key: str, source: str) -> tuple[str, ...
     return tuple(value)
 
 
-@dataclass(frozen=True)
-class Checked:
+class Checked(NamedTuple):
     """What was found in one deck; ``cards`` is the number of its switching cards, ``files`` all that were read.
 
     ``remarks`` tell of comments in the deck that silence nothing.

@@ -72,8 +72,7 @@ class Severity(StrEnum):
 ERROR, WARNING, INFO = Severity
 
 
-@dataclass(frozen=True)
-class Finding:
+class Finding(NamedTuple):
     """One thing wrong with a deck: ``deck`` is the deck that was checked, ``file`` the file it stands in."""
 
     rule: str
@@ -85,8 +84,7 @@ class Finding:
     column: int
 
 
-@dataclass(frozen=True)
-class Unreadable:
+class Unreadable(NamedTuple):
     """A deck that could not be checked, and why; ``files`` may belong to it all the same."""
 
     deck: str
@@ -292,8 +290,7 @@ class Example:
     name: str = "main.k"
 
 
-@dataclass(frozen=True)
-class Rule:
+class Rule(NamedTuple):
     """A rule: ``passing`` and ``failing`` decks are its documentation and its tests at once."""
 
     id: str

@@ -230,8 +230,7 @@ class Moments:
         return Moment(float(self.tr[place]), _KINDS[self.kind[place]], rising > 0 if rising else None)
 
 
-@dataclass(frozen=True, eq=False)
-class Profile:
+class Profile(NamedTuple):
     """Lock-in errors ``error`` at ascending times ``time``, both of shape (n,), for one td [time], [-]."""
 
     time: Samples

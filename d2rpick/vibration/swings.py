@@ -7,7 +7,6 @@ on a smooth floor, another mode holds the rest of the energy there, and nothing 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -37,8 +36,7 @@ _OF_ANY_SPRING: Final = 2.0
 _OF_THE_FLOOR: Final = 5.0
 
 
-@dataclass(frozen=True, eq=False)
-class Swings:
+class Swings(NamedTuple):
     """The deformation that was counted, in the states of a flight.
 
     Parameters

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -24,8 +23,7 @@ _AS_GOOD, _ROUNDING = 1.5, 1e-12
 _LARGEST_EXPONENT: Final = 100.0
 
 
-@dataclass(frozen=True, eq=False)
-class Waves:
+class Waves(NamedTuple):
     r"""A signed deformation, the sum of the modes that meet in one part.
 
     .. math:: q(t) = \mathrm{Re} \sum_i w_i e^{\lambda_i (t - t_0)}

@@ -55,7 +55,7 @@ def test_shells_cost_more_with_more_integration_points(layers: int | None, extra
     """Four points in each layer, of which 3 are assumed; without a weight for points none counts."""
     of_deck = sure(radioss("shell", 12, 0, 0))
     found = inventory({1: 30, 2: 70}, formulations={2: UNKNOWN})
-    parts = {1: replace(found.parts[1], section=Section({"shell": of_deck}, layers=layers)), 2: found.parts[2]}
+    parts = {1: found.parts[1]._replace(section=Section({"shell": of_deck}, layers=layers)), 2: found.parts[2]}
     found = replace(found, parts=parts)
     assert found.further_points(1, "shell") == extra
     model = CostModel(found, Weights({"QBAT": 1.0, "strange": 1.0, "point": 0.5}))

@@ -1,6 +1,5 @@
 """Verdicts on parts, and sets of them: on a made run, a made car with loose wheels, and one that a solver computed."""
 
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -134,14 +133,14 @@ def test_parts_of_a_run_in_which_nothing_deforms_are_listed(tmp_path: Path) -> N
 
 def test_the_step_grows_by_what_stays_deformable() -> None:
     one, two, three, four = (
-        replace(row(part, None, None), smallest_step=step) for part, step in enumerate((2e-6, 6e-6, 3e-6, None), 1)
+        row(part, None, None)._replace(smallest_step=step) for part, step in enumerate((2e-6, 6e-6, 3e-6, None), 1)
     )
     assert step_growth([one, two, three], {1}) == pytest.approx(1.5)
     assert step_growth([one, two, three], {2}) == 1.0
     assert step_growth([one, two, three], {1, 2, 3}) == float("inf")
     assert step_growth([one, two, four], {1}) is None  # the step of part 4 is not known
     assert step_growth([one, two, four], {1, 4}) == 3.0
-    assert step_growth([one, replace(four, kind="rigid")], {1}) == float("inf")
+    assert step_growth([one, four._replace(kind="rigid")], {1}) == float("inf")
 
 
 @pytest.fixture(scope="module")
@@ -221,7 +220,7 @@ def row(part: int, landing: float | None, cost: float | None) -> PartRow:
         ([row(1, 0.0, 0.95), row(2, 0.0, 0.05)], None),  # nothing is taken up
         ([row(1, None, 0.95), row(2, None, 0.05)], None),  # the record ends in the flight
         ([row(1, 1.0, None), row(2, 19.0, None)], None),  # no cost is known
-        ([row(1, 1.0, 0.95), replace(row(2, 19.0, 0.05), kind="spring")], None),
+        ([row(1, 1.0, 0.95), row(2, 19.0, 0.05)._replace(kind="spring")], None),
     ],
 )
 def test_which_part_drives_the_landing_alone(rows: list[PartRow], alone: int | None) -> None:
@@ -233,10 +232,10 @@ def test_a_part_that_drives_the_landing_alone_is_kept() -> None:
     facts = facts_of(open_run([BOX]), Settings())
 
     def with_landing(part: PartFacts, landing: float) -> PartFacts:
-        return replace(part, flights=tuple(replace(one, landing=landing) for one in part.flights))
+        return part._replace(flights=tuple(one._replace(landing=landing) for one in part.flights))
 
     known = {1: with_landing(facts.parts[1], 0.01), 2: with_landing(facts.parts[2], 5.0)}
-    rows = rows_of(replace(facts, parts=known), model)
+    rows = rows_of(facts._replace(parts=known), model)
     assert [one.verdict for one in rows] == ["switch", "keep", "keep"]
     assert rows[1].reasons == ("drives the landing alone, at little cost",)
 

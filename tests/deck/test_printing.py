@@ -2,7 +2,6 @@
 
 import json
 import re
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -122,7 +121,7 @@ def test_what_is_not_a_file_of_windows(text: str, message: str) -> None:
 
 
 PARTS = Printing(part=(11, 12))
-MERGED = replace(PARTS, merge=11)
+MERGED = PARTS._replace(merge=11)
 CARD = """\
 *DEFORMABLE_TO_RIGID_AUTOMATIC
 $#   swset      code     time1     time2     time3     entno     relsw    paired
@@ -188,13 +187,13 @@ def test_warnings_are_those_that_apply() -> None:
     assert "d2rpick card --merge" in text(PARTS)
     assert "merged" not in text(MERGED)
     assert "merged" not in text(Printing(part=(11,)))
-    assert "already" in text(replace(PARTS, merge=5))
+    assert "already" in text(PARTS._replace(merge=5))
     assert "    7.0e-5 " in text(PARTS)  # a thousandth of the window
-    assert "    1.0e-5 " in text(replace(PARTS, step_cap=1e-5))
+    assert "    1.0e-5 " in text(PARTS._replace(step_cap=1e-5))
 
 
 def test_every_window_has_sets_of_its_own(tmp_path: Path) -> None:
-    text = cards([(0.02, 0.09), (0.2, 0.3), (0.4, 0.5)], replace(MERGED, swset=(8, 7))).text
+    text = cards([(0.02, 0.09), (0.2, 0.3), (0.4, 0.5)], MERGED._replace(swset=(8, 7))).text
     assert re.findall(r"^ +(\d+) +0 +\S+ +0.0 +0.0 +0 +0 +0$", text, flags=re.MULTILINE) == [
         *("8", "7", "9", "10", "11", "12")
     ]
@@ -236,16 +235,16 @@ ONE, LONE = [(0.02, 0.09)], Printing(node=(1,))
         ("ls-dyna", ONE, Printing(), "no id was given"),
         ("ls-dyna", ONE, Printing(part=(0,)), "id 0 does not fit"),
         ("ls-dyna", ONE, Printing(part=(10**10,)), "id 10000000000 does not fit"),
-        ("ls-dyna", ONE, replace(PARTS, merge=10**9), "id 1000000000 does not fit"),
-        ("ls-dyna", ONE, replace(PARTS, swset=(5, 5)), "both switch sets are 5"),
+        ("ls-dyna", ONE, PARTS._replace(merge=10**9), "id 1000000000 does not fit"),
+        ("ls-dyna", ONE, PARTS._replace(swset=(5, 5)), "both switch sets are 5"),
         ("ls-dyna", [(1.0000000001, 1.0000000002)], PARTS, "different times"),
         ("ls-dyna", [(1.0, 2.00000000001), (2.00000000002, 3.0)], PARTS, "different times"),
-        ("radioss", ONE, replace(LONE, end=0.05), "the run ends at 0.05"),
+        ("radioss", ONE, LONE._replace(end=0.05), "the run ends at 0.05"),
         ("radioss", ONE, LONE, "not given"),
-        ("radioss", ONE, replace(LONE, end=float("inf")), "the run ends"),
+        ("radioss", ONE, LONE._replace(end=float("inf")), "the run ends"),
         ("radioss", ONE, Printing(end=1.0), "no id was given"),
-        ("radioss", ONE, replace(LONE, end=1.0, name="a/b"), "the name of the run"),
-        ("radioss", [(i, i + 0.5) for i in range(1, 60)], replace(LONE, end=100.0), "at most 99"),
+        ("radioss", ONE, LONE._replace(end=1.0, name="a/b"), "the name of the run"),
+        ("radioss", [(i, i + 0.5) for i in range(1, 60)], LONE._replace(end=100.0), "at most 99"),
     ],
 )
 def test_what_a_solver_cannot_be_told_is_refused(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -25,8 +24,7 @@ UNSURE: Final = -1  # in place of an offset: the field is cut, or stands in the 
 _OVERLONG: Final = 512  # bytes of a line that no solver writes
 
 
-@dataclass(frozen=True, eq=False)
-class BlockLayout:
+class BlockLayout(NamedTuple):
     """Where in a block what stands.
 
     ``fields`` maps the name of a number to its offset in the block, or to UNSURE.  ``literal`` is 255 for the
@@ -42,8 +40,7 @@ class BlockLayout:
     broken_off: bool
 
 
-@dataclass(frozen=True)
-class Grammar:
+class Grammar(NamedTuple):
     """What the engine has to know about a database.
 
     ``start`` is the text a block's first line begins with, ``describe`` takes a block apart, ``whole`` tells
@@ -223,8 +220,7 @@ _LONGEST: Final = 1 << 22
 _CHUNK: Final = 1 << 18
 
 
-@dataclass(frozen=True)
-class Pattern:
+class Pattern(NamedTuple):
     """What has to be equal in every repetition of a block.
 
     ``fixed`` is 0xFF for each byte of structure and 0 for each byte of data; ``numbers`` are place and width

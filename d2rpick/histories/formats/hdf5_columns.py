@@ -11,9 +11,8 @@ import re
 import signal
 import struct
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any, BinaryIO, Final
+from typing import TYPE_CHECKING, Any, BinaryIO, Final, NamedTuple
 
 import numpy as np
 
@@ -181,8 +180,7 @@ _BOOKKEEPING: Final = ("_i_", "#")  # PyTables' index trees, MATLAB's references
 _WIDEST: Final = 64  # a matrix with more columns and no names for them is no table of histories
 
 
-@dataclass(frozen=True)
-class Column:
+class Column(NamedTuple):
     """One column: the ``path`` by which a user names it, and where in the file it is.
 
     ``field`` is the member of a compound dataset, ``place`` the (axis, index) to take in a matrix.

@@ -18,7 +18,7 @@ import re
 import struct
 from array import array
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -60,16 +60,14 @@ class Variable:
     count: int
 
 
-@dataclass(frozen=True)
-class DirectoryLayout:
+class DirectoryLayout(NamedTuple):
     """The variables of a directory; ``doubled`` are the names that stand in it more than once."""
 
     variables: dict[str, Variable]
     doubled: frozenset[str]
 
 
-@dataclass(frozen=True)
-class _Form:
+class _Form(NamedTuple):
     """All bytes of a directory's records as one integer, to find the same records again at once.
 
     ``heads`` are the records without their values; ``fixed`` are those bytes in their places, ``mask``

@@ -8,10 +8,9 @@ How a record lies in the file is said in `radioss_records`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -46,8 +45,7 @@ _PART_VARIABLES: Final = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class _Head:
+class _Head(NamedTuple):
     """What the records before the first state say."""
 
     title: str
