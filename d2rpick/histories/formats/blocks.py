@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base import __version__
-from d2rpick.histories.formats.printed import decode
 
 if TYPE_CHECKING:
     import re
@@ -16,7 +15,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.histories.content import Bytes, Content
-    from d2rpick.histories.history import Samples
 
 
 UNSURE: Final = -1  # in place of an offset: the field is cut, or stands in the block twice
@@ -107,8 +105,9 @@ class Stretch(NamedTuple):
 
 
 def like_example(
-    data: Content, run: Stretch, offset: int, literal: Bytes, varied: Bytes | None = None, ahead: Ahead | None = None
-) -> int:
+    data: Content, run: Stretch, offset: int, literal: Bytes, varied: Bytes | None = None,
+    take: Callable[[Bytes], object] | None = None,
+) -> int:  # fmt: skip
     """Count the blocks of ``run`` that have, from ``offset`` on, the literal bytes of its example.
 
     Parameters
@@ -121,8 +120,8 @@ def like_example(
         255 for the bytes that must be those of the example, 0 for the others.
     varied : array of shape (size,), optional
         Gets the bits in which a byte of any counted block differs from the example.
-    ahead : Ahead, optional
-        Takes numbers from the counted blocks, with ``offset`` 0.
+    take : callable, optional
+        Gets those bytes of the counted blocks, some blocks at a time, shape (count, size), while they are at hand.
 
     Examples
     --------
@@ -136,20 +135,19 @@ def like_example(
     done, step = (0, 1) if size else (run.repeats, 1)
     most = max(1, CHUNK // max(1, size))
     most -= most % _FOLD if most > _FOLD else 0
-    while done < run.repeats:
-        step = min(step, run.repeats - done)
-        rows = _rows(data, run.start + done * run.stride + offset, run.stride, step, size)
+    alike = True
+    while alike and done < run.repeats:
+        rows = _rows(data, run.start + done * run.stride + offset, run.stride, min(step, run.repeats - done), size)
         differing = _differing(rows, example)
-        alike = not (differing & literal).max()
+        alike = not (differing & literal).any()
         if not alike:
-            step = int(((rows ^ example) & literal).any(axis=1).argmax())
-        if varied is not None and step:
-            varied |= differing if alike else _differing(rows[:step], example)
-        if ahead is not None and step:
-            ahead.take(rows[:step], differing)
-        done += step
-        if not alike:
-            break
+            rows = rows[: int(((rows ^ example) & literal).any(axis=1).argmax())]
+            differing = _differing(rows, example) if len(rows) else np.zeros_like(example)
+        if varied is not None:
+            varied |= differing
+        if take is not None:
+            take(rows)
+        done += len(rows)
         step = min(2 * step, most)
     return done
 
@@ -168,51 +166,8 @@ def _differing(rows: Bytes, example: Bytes) -> Bytes:
     if count % _FOLD == 0 and rows.flags.c_contiguous:
         rows = rows.reshape(count // _FOLD, _FOLD * size)
     # a bit is the example's in all rows where it is so in their AND and in their OR
-    differing = np.bitwise_and.reduce(rows, axis=0).reshape(-1, size) ^ example
-    differing |= np.bitwise_or.reduce(rows, axis=0).reshape(-1, size) ^ example
-    return np.asarray(np.bitwise_or.reduce(differing, axis=0))
-
-
-BATCH: Final = 1 << 14  # numbers converted at a time: they stay in the cache
-
-
-class Ahead:
-    """Numbers at the same ``offsets`` of all blocks, of so many columns and decimals, converted in batches."""
-
-    def __init__(self, offsets: NDArray[np.int64], width: int, decimals: int, batch: int = BATCH) -> None:
-        self._offsets, self._width, self._decimals, self._batch = offsets, width, decimals, batch
-        self._waiting: list[NDArray[np.bytes_]] = []
-        self._moving = np.zeros(offsets.size, bool)
-        self._done: list[Samples] = []
-
-    def take(self, rows: Bytes, differing: Bytes) -> None:
-        """Take the numbers of further blocks, shape (count, stride), which differ in these bits, shape (stride,)."""
-        self._waiting.append(self._fields(rows))
-        self._moving |= self._fields(differing[np.newaxis])[0].view(np.uint8).reshape(-1, self._width).any(axis=1)
-        if sum(one.size for one in self._waiting) >= self._batch:
-            self._convert()
-
-    def numbers(self) -> Samples:
-        """Give all numbers taken, shape (blocks, len(offsets)); NaN for what is no number."""
-        self._convert()
-        return np.concatenate([np.empty((0, self._offsets.size)), *self._done])
-
-    def _convert(self) -> None:
-        """Turn what waits into numbers; what is the same in all blocks, as of a part at rest, only once."""
-        if not self._waiting:
-            return
-        fields, moving = np.concatenate(self._waiting), self._moving
-        values = np.empty(fields.shape)
-        values[:, ~moving] = decode(fields[0, ~moving], self._decimals)
-        chosen = slice(None) if moving.all() else moving  # without copies, as mostly
-        values[:, chosen] = decode(fields[:, chosen].ravel(), self._decimals).reshape(len(fields), -1)
-        self._done.append(values)
-        self._waiting, self._moving = [], np.zeros_like(moving)
-
-    def _fields(self, rows: Bytes) -> NDArray[np.bytes_]:
-        count, size = rows.shape
-        starts = np.ndarray((count, size - self._width + 1), f"S{self._width}", rows, strides=(rows.strides[0], 1))
-        return starts[:, self._offsets]
+    least, most = (of.reduce(of.reduce(rows, axis=0).reshape(-1, size)) for of in (np.bitwise_and, np.bitwise_or))
+    return np.asarray((least ^ example) | (most ^ example))
 
 
 # A block longer than this is left to the walk, and no more than this is compared at a time.

@@ -17,7 +17,7 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.content import content_of
-from d2rpick.histories.formats.blocks import BATCH, CHUNK, UNSURE, Ahead, BlockLayout, Grammar, Stretch, like_example
+from d2rpick.histories.formats.blocks import CHUNK, UNSURE, BlockLayout, Grammar, Stretch, like_example
 from d2rpick.histories.formats.printed import decode
 
 if TYPE_CHECKING:
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.content import Addresses, Bytes, Content
     from d2rpick.histories.history import Samples
+
+    Fields = NDArray[np.bytes_]
 
 _RECENT: Final = 4  # layouts tried before a block is taken apart
 _LINE: Final = 1 << 10  # no first line of a block is longer
@@ -38,10 +40,11 @@ class Portions(NamedTuple):
 
     many: int = 64  # of so many blocks it is remembered what differs between them, a small share of the file
     chunk: int = CHUNK  # bytes in which the beginning of a line is looked for
-    batch: int = BATCH  # numbers that are converted
+    batch: int = 1 << 14  # numbers that are converted: they stay in the cache
 
 
 PORTIONS: Final = Portions()
+_NOTHING: Final[Mapping[int, Fields]] = {}
 
 
 class Blocks:
@@ -91,7 +94,7 @@ class Blocks:
         self._trusted = False  # whether a part of each block was compared for numbers that were asked for
         self._varied: dict[int, Bytes] = {}  # by the start of a run of many blocks: 0 for the bytes that they share
         self._asked_ahead = tuple(ahead)
-        self._ahead: dict[int, Samples] = {}  # by the start of such a run: the numbers taken of its blocks
+        self._ahead: dict[int, Fields] = {}  # by the start of such a run: the numbers taken of its blocks, as printed
         self.states, self.complete = 0, True
         self.notes: tuple[str, ...] = ()
         self.rest: Stretch | None = None
@@ -118,7 +121,8 @@ class Blocks:
             self._compare_in_full(names)  # who asks again will go on asking: one comparison is for all
         self._trusted = self._trusted or bool(anchors)
         if self._ahead and tuple(names) == self._asked_ahead:
-            return self._table(names, self._taken())
+            taken, self._ahead = self._ahead, {}  # who asks again has them
+            return self._table(names, taken)
         moving = self._moving(names)
         if 2 * np.count_nonzero(moving) > moving.size:
             return self._table(names)
@@ -179,35 +183,44 @@ class Blocks:
         for run in self:
             if run.repeats == 1:
                 continue
-            varied = self._varied.get(run.start)
-            if varied is None:
+            if run.start not in self._varied:
                 return np.ones_like(moving)
-            before = np.concatenate([[0], np.cumsum(varied != 0)])
-            offsets = self._offsets(run, names)
-            moving |= before[offsets + self._grammar.width] > before[offsets]
+            moving |= self._moves(run, names)
         return moving
 
-    def _taken(self) -> dict[int, Samples]:
-        """Hand out the numbers taken ahead, by the start of their run; none of a run where one is no number."""
-        found, self._ahead = self._ahead, {}  # who asks again has them
-        return {start: values for start, values in found.items() if not np.isnan(values).any()}
+    def _moves(self, run: Stretch, names: Sequence[Hashable]) -> NDArray[np.bool_]:
+        """Tell the same of the blocks of a run whose differences are known."""
+        before = np.concatenate([[0], np.cumsum(self._varied[run.start] != 0)])
+        offsets = self._offsets(run, names)
+        return np.asarray(before[offsets + self._grammar.width] > before[offsets])
 
-    def _table(self, names: Sequence[Hashable], taken: Mapping[int, Samples] | None = None) -> Samples:
-        """Numbers of all states, shape (states, len(names)): of some runs they are known, the others are fetched."""
+    def _table(self, names: Sequence[Hashable], taken: Mapping[int, Fields] = _NOTHING) -> Samples:
+        """Numbers of all states, shape (states, len(names)): of some runs they are at hand, the others are fetched."""
         values, left = np.empty((self.states, len(names))), np.ones(self.states, bool)
         addresses = values.view(np.int64)  # each address gives way to the number found there
         row = 0
         for run in self:
             rows = slice(row, row := row + run.repeats)
-            if taken and run.start in taken:
-                values[rows], left[rows] = taken[run.start][: run.repeats], False
-            else:
+            if run.start in taken:
+                values[rows] = self._converted(taken[run.start][: run.repeats], self._moves(run, names))
+                left[rows] = np.isnan(values[rows]).any()  # it is fetched again to say where
+            if left[rows.start]:
                 starts = run.start + run.stride * np.arange(run.repeats)
                 np.add(starts[:, None], self._offsets(run, names), out=addresses[rows])
         fetched = values if left.all() else values[left]
         self._fetch(fetched.reshape(-1), names)
         if fetched is not values:
             values[left] = fetched
+        return values
+
+    def _converted(self, fields: Fields, moving: NDArray[np.bool_]) -> Samples:
+        """Numbers of fields (states, names), NaN for what is none; what is the same in all states only once."""
+        values, decimals = np.empty(fields.shape), self._grammar.decimals
+        values[:, ~moving] = decode(fields[0, ~moving], decimals)
+        step = max(1, self._portions.batch // max(1, int(moving.sum())))
+        for at in range(0, len(fields), step):
+            some = fields[at : at + step, moving]
+            values[at : at + step, moving] = decode(some.ravel(), decimals).reshape(some.shape)
         return values
 
     def _offsets(self, run: Stretch, names: Sequence[Hashable]) -> Addresses:
@@ -305,13 +318,18 @@ class Blocks:
         varied, fields = np.zeros_like(literal), self.layout(run.example, run.stride).fields
         offsets = np.array([fields.get(name, UNSURE) for name in self._asked_ahead], dtype=np.int64)
         sure = offsets.size > 0 and not np.any(offsets == UNSURE)
-        form = self._grammar.width, self._grammar.decimals
-        ahead = Ahead(offsets, *form, self._portions.batch) if sure else None
-        count = like_example(self._data, run, 0, literal, varied, ahead)
+        width = self._grammar.width
+        ahead: list[Fields] = []
+
+        def take(rows: Bytes) -> None:
+            starts = np.ndarray((len(rows), run.stride - width + 1), f"S{width}", rows, strides=(rows.strides[0], 1))
+            ahead.append(starts[:, offsets])
+
+        count = like_example(self._data, run, 0, literal, varied, take if sure else None)
         if count > self._portions.many:
             self._varied[run.start] = varied
-            if ahead is not None:
-                self._ahead[run.start] = ahead.numbers()
+            if sure:
+                self._ahead[run.start] = np.concatenate(ahead)
         return count
 
     def _alike(self, names: Sequence[Hashable], anchors: Sequence[Hashable]) -> bool:

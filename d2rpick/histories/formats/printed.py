@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -159,8 +160,18 @@ def _median(steps: Samples) -> float:
 
 _NUMBER: Final = re.compile(rb" *([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]\d+)|[EeDd](\d+))?")
 _EXACT: Final = 22  # 10**22 is the largest power of ten that a double holds exactly
-_FACTORS: Final = np.array([float(f"{sign}1e{max(power, 0)}") for sign in "+-" for power in range(-_EXACT, _EXACT + 1)])
-_DIVISORS: Final = _FACTORS[2 * _EXACT :: -1].copy()  # one of both is 1
+_SHRINKS, _NEGATIVE = 1 << 8, 1 << 9  # beside the two digits of an exponent, which fill a byte
+
+
+@cache
+def _scales(decimals: int) -> tuple[Samples, Samples]:
+    """Factors and divisors of mantissas without point, one of both 1, by exponent and signs; NaN for none exact."""
+    exponent = np.arange(_SHRINKS) * [[1], [-1]] - decimals
+    powers = np.array([float(f"1e{size}") for size in range(_EXACT + 1)] + [np.nan])[
+        np.minimum(abs(exponent), _EXACT + 1)
+    ]
+    factors = np.where(exponent > 0, powers, 1.0)
+    return np.stack([factors, -factors]).ravel(), np.tile(np.where(exponent < 0, powers, 1.0).ravel(), 2)
 
 
 def number(text: bytes) -> float:
@@ -209,24 +220,24 @@ def decode(fields: NDArray[np.bytes_], decimals: int) -> Samples:
     width = fields.dtype.itemsize
     column = np.ascontiguousarray(np.ascontiguousarray(fields).view(np.uint8).reshape(-1, width).T)
     point, mark = width - 5 - decimals, width - 4
-    digit = column - np.uint8(ord("0"))  # wraps around for what is below "0", so one comparison is enough
     negative, shrinks = column[point - 2] == ord("-"), column[mark + 1] == ord("-")
-    usual = np.max(digit[[point - 1, *range(point + 1, mark), mark + 2, mark + 3]], axis=0) <= 9
+    # wraps around for what is below "0", so one comparison is enough
+    digits = column[[point - 1, *range(point + 1, mark), mark + 2, mark + 3]] - np.uint8(ord("0"))
+    usual = digits.max(axis=0) <= 9
     usual &= (column[point] == ord(".")) & (column[mark] == ord("E"))
     usual &= negative | (column[point - 2] == ord(" "))
     usual &= shrinks | (column[mark + 1] == ord("+"))
     usual &= np.all(column[: point - 2] == ord(" "), axis=0)
 
-    values: Samples = digit[point - 1].astype(np.float64)
-    for place in range(point + 1, mark):
-        values *= 10
-        values += digit[place]
-    exponent = (digit[mark + 2].astype(np.int64) * 10 + digit[mark + 3]) * (1 - 2 * shrinks) - decimals
-    power = np.clip(exponent, -_EXACT, _EXACT) + (_EXACT + negative * _DIVISORS.size)
-    values *= _FACTORS.take(power)
-    values /= _DIVISORS.take(power, mode="wrap")
+    weights = np.array([float(10**place) for place in range(decimals, -1, -1)])
+    values: Samples = weights @ digits[:-2].astype(np.float64)  # exact
+    tens, ones = digits[-2:]
+    scale = tens * np.uint8(10) + ones + shrinks * np.uint16(_SHRINKS) + negative * np.uint16(_NEGATIVE)
+    factors, divisors = (table.take(scale) for table in _scales(decimals))
+    values *= factors
+    values /= divisors
 
-    far = usual & (np.abs(exponent) > _EXACT)
+    far = usual & np.isnan(values)
     values[far] = [float(text) for text in fields[far].tolist()]
     for row in np.flatnonzero(~usual):
         values[row] = number(fields[row : row + 1].tobytes())
