@@ -57,6 +57,15 @@ def run(*args: str, stdin: bytes | None = None, color: bool = False, env: Mappin
     return _ANSWERED[asked]
 
 
+def refused(*args: str) -> str:
+    """Give the message of a command that could not run; it is one line on stderr and all there is."""
+    result = run(*args)
+    assert (result.exit_code, result.stdout) == (2, ""), result.stderr
+    assert result.stderr.count("\n") == 1
+    assert result.stderr.startswith("d2rpick: ")
+    return result.stderr.removeprefix("d2rpick: ").rstrip("\n")
+
+
 def _files(args: Sequence[str]) -> frozenset[tuple[str, int, int, int]]:
     """Temporary files that may be read or written, and their state; those of the clone stay as they are."""
     named = (Path(os.path.abspath(arg)).parent for arg in args if "/" in arg and "\0" not in arg)  # noqa: PTH100
@@ -104,6 +113,14 @@ def answer(*args: str) -> dict[str, Any]:
     assert result.exit_code in (0, 1), result.stderr
     found: dict[str, Any] = json.loads(result.stdout)
     return found
+
+
+def replayed(form: str, *options: str, v0: str = "6") -> bytes:
+    """The oscillator of the paper for 0.15 s, a state each 0.1 ms, as a file of this format has it."""
+    times = ("--t-end", "0.15", "--dt", "1e-4", "--write-as", form)
+    result = run("replay", *OSCILLATOR[:-1], v0, *times, *options)
+    assert result.exit_code == 0, result.stderr
+    return result.stdout_bytes
 
 
 def codes(found: dict[str, Any]) -> set[str]:

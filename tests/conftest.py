@@ -5,6 +5,7 @@ import os
 import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 # As on the command line: the systems here are small, and threads of several test processes would fight over cores.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -40,6 +41,13 @@ def new_files(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let files look as new as they are, but make no pause: what is under way in these tests ends by itself."""
     monkeypatch.setattr(time, "time_ns", _now)
     monkeypatch.setattr(time, "sleep", lambda _: None)
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
 
 
 @pytest.fixture

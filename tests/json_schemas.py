@@ -1,8 +1,9 @@
-"""Answers held against the JSON schemas that ship with the package; each schema is read and checked once."""
+"""Answers held against the JSON schemas that ship, findings against those of others; each schema is read once."""
 
 import json
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 import jsonschema
@@ -17,6 +18,29 @@ def check_by_schema(found: dict[str, Any]) -> None:
 def check_by_definition(found: Any, schema: str, definition: str) -> None:
     """Hold a part of an answer against a definition of the schema ``schema``."""
     _holder(schema, definition).validate(found)
+
+
+def junit_is_valid(text: str) -> None:
+    _junit().validate(text)
+
+
+def sarif_is_valid(text: str) -> None:
+    _sarif().validate(json.loads(text))
+
+
+OF_OTHERS = Path(__file__).with_name("schemas")
+
+
+@cache
+def _junit() -> Any:
+    import xmlschema  # slow
+
+    return xmlschema.XMLSchema(str(OF_OTHERS / "junit-10.xsd"))
+
+
+@cache
+def _sarif() -> jsonschema.Draft4Validator:
+    return jsonschema.Draft4Validator(json.loads((OF_OTHERS / "sarif-2.1.0.json").read_text("utf-8")))
 
 
 @cache

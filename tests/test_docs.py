@@ -5,8 +5,9 @@ import re
 import shlex
 import shutil
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
@@ -53,9 +54,12 @@ def links(page: str) -> Iterator[tuple[Path, str]]:
             yield (PAGES[page].parent / name if name else PAGES[page]), anchor
 
 
-@pytest.mark.parametrize(
-    "page", [page if page == "README.md" else pytest.param(page, marks=pytest.mark.slow) for page in PAGES]
-)
+def one_is_quick(pages: Iterable[str]) -> list[Any]:
+    """Pages of which the README alone is tried each time."""
+    return [page if page == "README.md" else pytest.param(page, marks=pytest.mark.slow) for page in pages]
+
+
+@pytest.mark.parametrize("page", one_is_quick(PAGES))
 def test_the_sessions_on_a_page_show_what_the_commands_print(page: str) -> None:
     with folder_of_a_reader():
         for command, shown in sessions(text_of(page)):  # in order and in one folder, as a reader would type them
@@ -67,7 +71,7 @@ def test_the_sessions_show_the_commands_that_matter_most() -> None:
     assert {*COMMANDS} - {"rule"} <= shown
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if "pycon" in languages(text_of(page))])
+@pytest.mark.parametrize("page", one_is_quick(page for page in PAGES if "pycon" in languages(text_of(page))))
 def test_the_python_on_a_page_gives_what_it_shows(page: str) -> None:
     source = "".join(blocks(text_of(page), "pycon"))
     test = doctest.DocTestParser().get_doctest(source, {}, page, page, 0)
@@ -159,8 +163,8 @@ def test_ci_runs_the_test_command_of_the_readme() -> None:
     assert second in (ROOT / ".ci" / "run").read_text("utf-8")
 
 
-def test_the_jobs_in_the_documentation_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.usefixtures("here")
+def test_the_jobs_in_the_documentation_run() -> None:
     shutil.copy(DECK, "main.k")
     Path("d2rpick").symlink_to(ROOT)  # where the clone lies
     jobs = "".join(blocks(ALL, "yaml"))
@@ -180,22 +184,19 @@ def test_the_configuration_in_the_documentation_is_one() -> None:
 
 
 @pytest.mark.parametrize("page", ["docs/recipes.md", "docs/scripts.md"])
-def test_the_settings_in_the_documentation_are_taken(
-    page: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_the_settings_in_the_documentation_are_taken(page: str, here: Path) -> None:
     (settings,) = blocks(text_of(page), "toml")
-    (tmp_path / "d2rpick.toml").write_text(settings)
-    monkeypatch.chdir(tmp_path)
+    (here / "d2rpick.toml").write_text(settings)
     shown = run("suggest", "--deck", "x.k", "x.csv", "--show-settings").stdout
     table = tomllib.loads(settings)
     taken = {*table, *table.pop("suggest")} - {"suggest", "fail-on"}  # which check alone takes
-    assert shown.count(f"# settings, {tmp_path / 'd2rpick.toml'}") == len(taken)
+    assert shown.count(f"# settings, {here / 'd2rpick.toml'}") == len(taken)
 
 
-def test_the_parquet_of_the_recipes_is_read(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+@pytest.mark.usefixtures("here")
+def test_the_parquet_of_the_recipes_is_read() -> None:
     """Where pandas can: pyarrow is no dependency."""
     pytest.importorskip("pyarrow")
-    monkeypatch.chdir(tmp_path)
     (line,) = re.findall(r"`(pd\.read_parquet\(.*?\))`", text_of("docs/recipes.md"))
     pd.read_csv(ENERGY, index_col="time").to_parquet("energies.parquet")
     assert d2rpick.from_frame(eval(line)).parts == ()

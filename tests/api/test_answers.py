@@ -18,7 +18,7 @@ import d2rpick as d2
 from d2rpick.api.answer import written
 from d2rpick.report.keys import MEASURES
 from d2rpick.report.plan import sentence as plan_sentence
-from tests.command import BOX, DECK, ENERGY, GLSTAT, MATSUM, ROLLOVER, answer, run
+from tests.command import BOX, DECK, ENERGY, GLSTAT, MATSUM, ROLLOVER, ROOT, answer, run
 from tests.command import run as run_command
 from tests.sample_deck import DECK as SAMPLE_DECK
 
@@ -92,10 +92,8 @@ def test_arguments_mean_what_options_mean(arguments: dict[str, Any], options: tu
         ({}, ()),  # the cost stays open
     ],
 )
-def test_a_deck_means_what_it_means_on_the_command_line(
-    arguments: dict[str, Any], options: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.usefixtures("here")
+def test_a_deck_means_what_it_means_on_the_command_line(arguments: dict[str, Any], options: tuple[str, ...]) -> None:
     Path("site.toml").write_text("[per_element]\nBT = 1\nQBAT = 2\n", "utf-8")
     run, by_deck = d2.read(BOX), {"deck": SAMPLE_DECK, "replay": False, **arguments}
     cost = ("--no-verify", "--deck", str(SAMPLE_DECK), *options, BOX)
@@ -130,11 +128,8 @@ def test_weights_of_a_site_are_those_of_the_command_line_and_of_the_file_they_ar
     assert read["element_share"] == pytest.approx(found.weights.element_share, rel=1e-5)
 
 
-def test_a_folder_that_begins_with_a_dash_is_calibrated_by_the_command_too(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    shutil.copytree("sample_data/flying_box", tmp_path / "-box")
-    monkeypatch.chdir(tmp_path)
+def test_a_folder_that_begins_with_a_dash_is_calibrated_by_the_command_too(here: Path) -> None:
+    shutil.copytree(ROOT / "sample_data/flying_box", here / "-box")
     found = d2.calibrate("-box")
     name, *words = found.command
     repeated = json.loads(run(name, "-f", "json", *words).stdout)
@@ -245,22 +240,6 @@ def test_pictures_and_pages(tmp_path: Path) -> None:
     verdict = d2.verify(d2.read(ENERGY), tr=found.recommended.tr, td=float(TD))
     assert verdict.plot().axes
     assert "Verified" in verdict.report(str(tmp_path / "verdict.html")).read_text("utf-8")
-
-
-@pytest.mark.slow
-def test_a_study_and_a_check_say_what_the_command_line_says(tmp_path: Path) -> None:
-    copy = tmp_path / "second.csv"
-    copy.write_bytes(Path(ENERGY).read_bytes())
-    names = [ENERGY, str(copy), str(tmp_path / "absent.csv")]
-    found = d2.study(names, td=float(TD))
-    same(found.to_dict(), answer("study", "--td", TD, *names))
-    assert found.to_frame()["status"].tolist() == ["ok", "ok", "unreadable"]
-    assert found.plot().axes
-    assert found.report(tmp_path / "study.html").stat().st_size > 0
-    checked = d2.check(DECK, history=d2.read(ENERGY))
-    theirs = answer("check", "--history", ENERGY, DECK)
-    assert checked.to_dict()["findings"] == theirs["findings"]
-    assert checked.to_frame()["rule"].tolist() == [one["rule"] for one in theirs["findings"]]
 
 
 def test_the_command_of_a_study_runs_whatever_was_asked() -> None:

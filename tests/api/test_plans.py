@@ -1,7 +1,6 @@
 """The plan in Python says what the command line says."""
 
 import json
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -30,17 +29,6 @@ def test_arguments_mean_what_options_mean(arguments: dict[str, Any], options: tu
     assert {**found.to_dict(), "command": None} == {**theirs, "command": None}
     assert {**answer(*found.command), "command": None} == {**theirs, "command": None}
     assert [(row["tr"], row["td"]) for row in theirs["windows"] if row["status"] == "supported"] == list(found.windows)
-
-
-@pytest.mark.slow
-def test_a_table_a_figure_and_a_page(tmp_path: Path) -> None:
-    found = d2.plan(d2.read(MATSUM), parts="box", replay=False)
-    frame = found.to_frame()
-    assert frame["status"].tolist() == [row.status for row in found.flights]
-    assert found.plot().axes
-    page = found.report(tmp_path / "plan.html").read_text()
-    assert page.count("*DEFORMABLE_TO_RIGID_AUTOMATIC") == 2 * len(found.windows)
-    assert found.next_run == found.windows
     assert found.rigid_fraction == pytest.approx(sum(td - tr for tr, td in found.windows) / 0.42, rel=1e-3)
 
 

@@ -1,8 +1,6 @@
 """``import d2rpick`` is light, offers every public name, and its types hold for whoever uses it."""
 
 import re
-import subprocess
-import sys
 from inspect import isfunction, signature
 from typing import assert_type
 
@@ -11,22 +9,8 @@ import pytest
 
 import d2rpick as d2
 from d2rpick.api.arguments import Choosing
-from tests.command import ENERGY, ROOT
+from tests.command import ENERGY
 from tests.examples import PAGES, text_of
-
-HEAVY = ("numpy", "pandas", "scipy", "matplotlib", "h5py", "click")
-
-
-def test_the_import_alone_loads_nothing_heavy() -> None:
-    code = "import sys, d2rpick; print(*sys.modules)"
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
-    assert not {*HEAVY} & {*loaded.stdout.split()}
-
-
-def test_reading_and_choosing_load_no_pandas() -> None:
-    code = f"import sys, d2rpick as d2; d2.suggest(d2.read({ENERGY!r}), 0.064); print(*sys.modules)"
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
-    assert not {"pandas", "scipy", "matplotlib", "h5py", "click"} & {*loaded.stdout.split()}
 
 
 @pytest.mark.parametrize("name", d2.__all__)

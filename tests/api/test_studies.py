@@ -45,9 +45,8 @@ def test_a_row_comes_back_to_the_last_digit(tmp_path: Path, curve: bool) -> None
     assert again.told(1) == f"1 of 1 runs reused from {ledger}"
 
 
-def test_a_row_is_found_under_another_name_of_its_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    _, ledger, row = kept(tmp_path)
-    monkeypatch.chdir(tmp_path)
+def test_a_row_is_found_under_another_name_of_its_file(here: Path) -> None:
+    _, ledger, row = kept(here)
     assert values(Ledger(ledger, QUESTION).find("./run.csv")) == {**values(row), "source": "./run.csv"}
 
 

@@ -10,7 +10,7 @@ from d2rpick.choice.situation import Settings
 from d2rpick.choice.suggest_td import looking
 from d2rpick.vibration import measures
 from tests import paper
-from tests.energies import codes, of, rollover, sure, vibration
+from tests.energies import codes, of, sure, vibration
 
 PLAIN = Settings()
 
@@ -59,26 +59,6 @@ def test_td_on_the_highest_peak_of_an_undamped_record_has_extrema_for_candidates
     # the peak at 0.75 has the other sign; of 0.25, 1.25, 2.25 the earliest saves most
     assert answer.recommended.tr == pytest.approx(0.25, abs=1e-6)
     assert answer.recommended.residual == pytest.approx(0.0, abs=1e-6)
-
-
-@pytest.mark.slow
-def test_crossings_during_the_trip_are_not_acceptable() -> None:
-    answer = suggest(rollover(), 0.37, PLAIN)
-    start = sure(answer.situation.flight.start)
-    early = [c for c in answer.candidates if c.tr < start]
-    assert early
-    assert not any(c.acceptable for c in early)
-    assert all("before the end of the load" in c.notes[0] for c in early)
-
-
-def test_margin_and_after_move_the_earliest_tr() -> None:
-    plain = suggest(paper.history(), paper.TD, PLAIN)
-    later = suggest(paper.history(), paper.TD, Settings(after=0.013))
-    margin = suggest(paper.history(), paper.TD, Settings(after=0.013, margin=0.02))
-    assert sure(plain.recommended).tr == pytest.approx(0.0128853, abs=1e-6)
-    assert sure(later.recommended).tr == pytest.approx(0.0247264, abs=1e-6)
-    assert sure(margin.recommended).tr == pytest.approx(0.0383104, abs=1e-6)
-    assert later.situation.flight.source == "given"
 
 
 @pytest.mark.parametrize("energy", [np.zeros(50), np.full(50, 3.0), -np.ones(50)])

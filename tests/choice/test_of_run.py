@@ -1,44 +1,20 @@
 """The one way from files to an answer: every user of it gets the same, and a record is examined once per question."""
 
-import json
 from functools import partial
-
-import pytest
 
 from d2rpick.choice.judged_card import CardRequest, judged_card
 from d2rpick.choice.of_run import Reference, judge_of, read, suggest_of, verify_of
 from d2rpick.choice.situation import Settings
-from d2rpick.choice.study import Question, ask
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
-from d2rpick.report import suggestion
-from d2rpick.report import verdict as verdict_report
 from d2rpick.rules.judgement import faults_of
 from tests.command import BOX as T01
-from tests.command import ENERGY, GLSTAT, run
+from tests.command import ENERGY, GLSTAT
 from tests.counted_fits import CountedFits
 from tests.energies import sure
 
 BOX = Selection(parts=("box",))
 PLAIN = Settings()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("file", "selection", "td"), [(ENERGY, Selection(), 0.064), (T01, BOX, 0.37)])
-def test_the_command_line_and_a_study_answer_as_the_library_does(file: str, selection: Selection, td: float) -> None:
-    parts = [text for part in selection.parts for text in ("--part", part)]
-    args = ["suggest", "--td", str(td), *parts, "-f", "json", file]
-    answer = suggest_of(read([file], selection), td, PLAIN)
-    assert run(*args).stdout == f"{suggestion.DOCUMENT.as_json(answer, args)}\n"
-    row = ask(Question(td, PLAIN, selection), file)
-    assert answer.recommended is not None
-    assert (row.tr, row.residual) == (answer.recommended.tr, answer.recommended.residual)
-    assert {caution.code for caution in answer.cautions} - {"no-better-td"} == set(row.warnings)
-    tr = answer.recommended.tr
-    args = ["verify", "--tr", repr(tr), "--td", str(td), *parts, "-f", "json", file]
-    verdict = verify_of(read([file], selection), tr, td, PLAIN)
-    assert verdict.verified
-    assert json.loads(run(*args).stdout) == json.loads(verdict_report.DOCUMENT.as_json(verdict, args))
 
 
 def test_the_health_of_the_run_comes_with_every_answer() -> None:

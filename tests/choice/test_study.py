@@ -285,10 +285,8 @@ def test_a_folder_of_folders_of_runs_says_how_to_name_them(tmp_path: Path) -> No
     assert [ask(asked, name).status for name in names] == [OK, OK]
 
 
-def test_every_match_of_a_pattern_is_a_run_and_what_matches_nothing_stays(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.usefixtures("here")
+def test_every_match_of_a_pattern_is_a_run_and_what_matches_nothing_stays() -> None:
     for name in ("b", "a"):
         Path(name).mkdir()
         (Path(name) / "glstat").write_bytes(b"")

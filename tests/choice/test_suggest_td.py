@@ -21,8 +21,8 @@ from d2rpick.histories.opening import Selection, open_run
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import history_of, simulate
 from d2rpick.report.suggestion import outlook
-from tests import chain, paper
-from tests.command import ENERGY, ROLLOVER, answer, run
+from tests import paper
+from tests.command import ENERGY, ROLLOVER, answer, refused, run
 from tests.computed import results, stored
 from tests.counted_fits import CountedFits
 from tests.energies import of, sure
@@ -61,14 +61,6 @@ def test_without_a_peak_in_the_window_one_of_its_ends_is_taken() -> None:
     assert found.recommended is not None
     assert found.recommended.td == 0.066
     assert found.recommended.residual == min(end.residual or 1 for end in ends if end)
-
-
-@pytest.mark.slow
-def test_several_parts_choose_the_peak_by_their_residual() -> None:
-    found = suggest_in_window(chain.history(), (0.12, 0.14), PLAIN)
-    assert found.situation.basis == "parts"
-    assert found.recommended is not None
-    assert (found.recommended.tr, found.recommended.td) == pytest.approx((0.08084, 0.13505), abs=1e-4)
 
 
 def test_on_energy_alone_of_levels_alike_the_longest_rigid_window_wins() -> None:
@@ -255,10 +247,7 @@ def test_value_prints_both_times_with_one_blank() -> None:
     ],
 )
 def test_a_td_that_cannot_be_chosen_is_explained(args: list[str], message: str) -> None:
-    result = run("suggest", *args)
-    assert (result.exit_code, result.stdout) == (2, "")
-    assert message in result.stderr
-    assert result.stderr.count("\n") == 1
+    assert message in refused("suggest", *args)
 
 
 def test_the_expected_run_time_is_told_by_suggest_and_verify() -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, codes, run
+from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, codes, refused, run
 from tests.json_schemas import check_by_schema
 
 HEAD = "time,internal_energy\n"
@@ -26,15 +26,6 @@ def with_line(number: int, line: str) -> bytes:
     lines = table(lambda t: t * t).decode().split("\n")
     lines[number - 1] = line
     return "\n".join(lines).encode()
-
-
-def refused(*args: str) -> str:
-    """Give the message of a command that could not run; it is one line on stderr and all there is."""
-    result = run(*args)
-    assert (result.exit_code, result.stdout) == (2, ""), result.stderr
-    assert result.stderr.count("\n") == 1
-    assert result.stderr.startswith("d2rpick: ")
-    return result.stderr.removeprefix("d2rpick: ").rstrip("\n")
 
 
 # Files that are no history: content, further arguments, and what the message has to say.
@@ -74,10 +65,8 @@ FILES = {
 
 @pytest.mark.parametrize("case", FILES)
 @pytest.mark.parametrize("command", ["suggest", "verify"])
-def test_a_file_that_cannot_be_used_is_named_with_what_is_wrong(
-    command: str, case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.usefixtures("here")
+def test_a_file_that_cannot_be_used_is_named_with_what_is_wrong(command: str, case: str) -> None:
     content, args, parts = FILES[case]
     Path("input").write_bytes(content)
     first = ("suggest",) if command == "suggest" else ("verify", "--tr", "0")
@@ -180,14 +169,11 @@ ONE_COMMAND = f"replay {GIVEN} --t-end 0.01 --dt 1e-3"
         (f"{ONE_COMMAND} --plot plot.gif", ["plot.gif", "png, svg, pdf"]),
     ],
 )  # fmt: skip
-def test_a_usage_that_makes_no_sense_is_explained_in_one_line(
-    line: str, parts: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_a_usage_that_makes_no_sense_is_explained_in_one_line(line: str, parts: list[str], here: Path) -> None:
     message = refused(*shlex.split(line))
     for part in parts:
         assert part in message
-    assert not list(tmp_path.iterdir())
+    assert not list(here.iterdir())
 
 
 @pytest.mark.parametrize(
@@ -225,10 +211,8 @@ OBJECTIONS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", OBJECTIONS)
-def test_a_record_without_an_answer_is_an_objection_and_says_why(
-    case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
+@pytest.mark.usefixtures("here")
+def test_a_record_without_an_answer_is_an_objection_and_says_why(case: str) -> None:
     content, args, code = OBJECTIONS[case]
     Path("input").write_bytes(content)
     found = answer("suggest", "--td", "0.5", *args, "input")

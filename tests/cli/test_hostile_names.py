@@ -50,12 +50,6 @@ def given_back(line: str) -> list[bytes]:
     return found.split(b"\0")[:-1]
 
 
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
 def test_a_shell_gives_back_the_words_of_a_command() -> None:
     words = [NAME, NO_TEXT, "plain", "", *(os.fsdecode(bytes([byte, 48])) for byte in range(1, 256))]
     line = shell_line(words)
@@ -87,8 +81,8 @@ def test_a_name_stays_in_its_cell_of_a_markdown_table(one: str, other: str) -> N
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", FORMS, ids=lambda command: command[0])
-def test_answers_name_a_file_without_control_codes(command: tuple[str, ...], folder: Path) -> None:
-    shutil.copy(ENERGY, folder / NAME)
+def test_answers_name_a_file_without_control_codes(command: tuple[str, ...], here: Path) -> None:
+    shutil.copy(ENERGY, here / NAME)
     for form in FORMS[command]:
         result = run(*command, "-f", form, "--", NAME)
         assert result.exit_code == 0, result.stderr
@@ -113,16 +107,16 @@ def test_answers_name_a_file_without_control_codes(command: tuple[str, ...], fol
 
 
 @pytest.mark.parametrize("asked", [("--td", "9"), ("--td", "0.064", "--energy", "no\nsuch\x1b")])
-def test_refusals_name_a_file_without_control_codes(asked: tuple[str, ...], folder: Path) -> None:
-    shutil.copy(ENERGY, folder / NAME)
+def test_refusals_name_a_file_without_control_codes(asked: tuple[str, ...], here: Path) -> None:
+    shutil.copy(ENERGY, here / NAME)
     result = run("suggest", *asked, "--", NAME)
     assert printable(NAME) in result.stderr
     assert not unseen(result.stderr)
 
 
 @pytest.mark.parametrize("form", ["table", "json", "csv", "markdown"])
-def test_why_a_set_of_parts_has_no_window_is_told_without_control_codes(form: str, folder: Path) -> None:
-    shutil.copy(MATSUM, folder / NAME)
+def test_why_a_set_of_parts_has_no_window_is_told_without_control_codes(form: str, here: Path) -> None:
+    shutil.copy(MATSUM, here / NAME)
     result = run("parts", "--td", "9", "--deck", str(SAMPLE_DECK), "-f", form, "--", NAME)
     assert (result.exit_code, "outside the record" in result.stdout) == (1, form != "csv")
     assert not unseen(result.stdout + result.stderr)
@@ -130,10 +124,10 @@ def test_why_a_set_of_parts_has_no_window_is_told_without_control_codes(form: st
 
 
 @pytest.mark.parametrize("form", CHECKS)
-def test_findings_name_a_deck_and_a_history_without_control_codes(form: str, folder: Path) -> None:
+def test_findings_name_a_deck_and_a_history_without_control_codes(form: str, here: Path) -> None:
     deck = f"{NAME}.k"
-    shutil.copy(ENERGY, folder / NAME)
-    shutil.copy(DECK, folder / deck)
+    shutil.copy(ENERGY, here / NAME)
+    shutil.copy(DECK, here / deck)
     result = run("check", "-f", form, "--history", NAME, "--", deck, f"no{NAME}")
     assert result.exit_code == 1
     assert not unseen(result.stdout + result.stderr)
@@ -149,8 +143,8 @@ def test_findings_name_a_deck_and_a_history_without_control_codes(form: str, fol
 
 
 @pytest.mark.parametrize("name", [NAME, NO_TEXT], ids=["hostile", "no text"])
-def test_cards_settings_and_messages_are_text(name: str, folder: Path) -> None:
-    shutil.copy(ENERGY, folder / os.fsencode(name).decode(errors="surrogateescape"))
+def test_cards_settings_and_messages_are_text(name: str, here: Path) -> None:
+    shutil.copy(ENERGY, here / os.fsencode(name).decode(errors="surrogateescape"))
     times = ("--tr", "0.0135867", "--td", "0.0687534")
     card = run("card", *times, "--part", "1", "--history", name)
     assert card.exit_code == 0
@@ -167,11 +161,11 @@ def test_cards_settings_and_messages_are_text(name: str, folder: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", [command for command in FORMS if command[0] != "info"], ids=lambda one: one[0])
-def test_pages_show_a_name_as_text_and_repeat_it_for_a_shell(command: tuple[str, ...], folder: Path) -> None:
+def test_pages_show_a_name_as_text_and_repeat_it_for_a_shell(command: tuple[str, ...], here: Path) -> None:
     names = {"hostile": NAME, "plain": "-plain.csv"}
     pages = {}
     for kind, name in names.items():
-        shutil.copy(ENERGY, folder / name)
+        shutil.copy(ENERGY, here / name)
         assert run(*command, "--no-verify", "--report", f"{kind}.html", "--", name).exit_code == 0
         pages[kind] = Path(f"{kind}.html").read_text("utf-8")
         lines = [html.unescape(line) for line in re.findall(r'<pre class="wrap">(.*?)</pre>', pages[kind], re.DOTALL)]
@@ -199,23 +193,23 @@ class Tags(HTMLParser):
             self.counts[name] = self.counts.get(name, 0) + 1
 
 
-def test_a_study_of_a_name_that_is_no_text_can_be_reported(folder: Path) -> None:
-    shutil.copy(ENERGY, folder / NO_TEXT)
+def test_a_study_of_a_name_that_is_no_text_can_be_reported(here: Path) -> None:
+    shutil.copy(ENERGY, here / NO_TEXT)
     result = run("study", "--td", "0.064", "--report", "page.html", NO_TEXT, ENERGY)
     assert result.exit_code == 0
-    assert "run\ufffd" in (folder / "page.html").read_text("utf-8")
+    assert "run\ufffd" in (here / "page.html").read_text("utf-8")
 
 
-def test_a_list_of_runs_may_name_files_with_any_sign_but_a_line_feed(folder: Path) -> None:
+def test_a_list_of_runs_may_name_files_with_any_sign_but_a_line_feed(here: Path) -> None:
     name = "run\u2028\x85\x0b\x1c.csv"
-    shutil.copy(ENERGY, folder / name)
+    shutil.copy(ENERGY, here / name)
     found = run("study", "--jobs", "1", "--td", "0.064", "-f", "json", "--from", "-", stdin=f"{name}\r\n".encode())
     assert [one["source"] for one in json.loads(found.stdout)["runs"]] == [name]
 
 
-def test_a_unit_is_no_formula_of_a_figure(folder: Path) -> None:
+def test_a_unit_is_no_formula_of_a_figure(here: Path) -> None:
     head, rows = Path(ENERGY).read_text("utf-8").split("\n", 1)
     Path("run.csv").write_text(head.replace("time", '"Time ($^{_$)"') + "\n" + rows, "utf-8")
     assert run("suggest", "--td", "0.064", "--plot", "plot.svg", "run.csv").exit_code == 0
-    assert ET.parse(folder / "plot.svg") is not None
+    assert ET.parse(here / "plot.svg") is not None
     assert with_unit("time", "$x$") == r"time [\$x\$]"

@@ -11,7 +11,7 @@ import d2rpick as d2
 from d2rpick.report.formats import Shown
 from d2rpick.report.parts import COLUMNS, SET_COLUMNS
 from tests.choice.test_calibration import run_folder
-from tests.command import ROOT, answer, run
+from tests.command import ROOT, answer, refused, run
 from tests.json_schemas import check_by_schema
 from tests.sample_deck import DECK
 
@@ -101,10 +101,7 @@ def test_the_page_holds_parts_and_sets(tmp_path: Path) -> None:
     ],
 )
 def test_wrong_use_is_said_in_one_line(args: tuple[str, ...], told: str) -> None:
-    result = run("parts", *args)
-    assert result.exit_code == 2
-    assert told in result.stderr
-    assert len(result.stderr.splitlines()) == 1
+    assert told in refused("parts", *args)
 
 
 def test_where_nothing_can_be_recommended_the_answer_is_an_objection(tmp_path: Path) -> None:
@@ -145,9 +142,7 @@ def test_a_deck_takes_the_place_of_a_cost_share(command: tuple[str, ...]) -> Non
 def test_a_deck_is_never_written_over(tmp_path: Path, command: str) -> None:
     own = tmp_path / "main.k"
     own.write_bytes(DECK.read_bytes())
-    result = run(command, "--part", "1", "--deck", str(own), "-o", str(own), "--overwrite", BOX)
-    assert result.exit_code == 2
-    assert "this is an input" in result.stderr
+    assert "this is an input" in refused(command, "--part", "1", "--deck", str(own), "-o", str(own), "--overwrite", BOX)
     assert own.read_bytes() == DECK.read_bytes()
 
 

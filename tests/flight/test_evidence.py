@@ -18,7 +18,7 @@ from d2rpick.histories.history import Balance, Given, History, Momenta
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
 from d2rpick.models.box_model import Parameters
-from d2rpick.models.box_run import simulate
+from d2rpick.models.box_run import Record, simulate
 from d2rpick.models.files import BOX_WRITERS
 from tests.command import BOX, ENERGY, ROLLOVER, answer, codes, run
 from tests.computed import columns, stored
@@ -31,11 +31,19 @@ CAR, DROP = stored("carT01.gz"), stored("drop2T01.gz")
 
 
 class Rolled(NamedTuple):
-    """A computed run in every format, and when it truly flies."""
+    """A computed run, and when it truly flies."""
 
-    files: dict[str, Path]
+    record: Record
+    folder: Path
     start: float
     end: float
+
+    def file(self, form: str) -> str:
+        """The run in a format."""
+        path = self.folder / f"run.{form}"
+        if not path.exists():
+            path.write_bytes(t01(self.record) if form == "T01" else BOX_WRITERS[form](self.record))
+        return str(path)
 
 
 @pytest.fixture(
@@ -51,18 +59,14 @@ def rolled(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
     record = simulate(request.param, 0.5, interval=2e-4)
     assert record.released is not None
     assert record.landed is not None
-    folder = tmp_path_factory.mktemp("rolled")
-    files = {name: folder / f"run.{name}" for name in (*BOX_WRITERS, "T01")}
-    for name, file in files.items():
-        file.write_bytes(t01(record) if name == "T01" else BOX_WRITERS[name](record))
-    return Rolled(files, record.released, record.landed)
+    return Rolled(record, tmp_path_factory.mktemp("rolled"), record.released, record.landed)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("form", ["csv", "hdf5", "glstat", "matsum", "T01"])
 def test_every_format_of_a_run_tells_its_flight_within_a_millisecond(rolled: Rolled, form: str) -> None:
     part = ["--part", "box"] if form in ("matsum", "T01") else []
-    asked = ["suggest", "--no-verify", "--td", str(round(rolled.end - 0.01, 3)), *part, str(rolled.files[form])]
+    asked = ["suggest", "--no-verify", "--td", str(round(rolled.end - 0.01, 3)), *part, rolled.file(form)]
     found = answer(*asked)
     flight = found["flight"]
     assert flight["certain"]
@@ -85,7 +89,7 @@ def test_every_format_of_a_run_tells_its_flight_within_a_millisecond(rolled: Rol
 def test_a_table_with_velocities_tells_the_flight_as_one_with_momenta(
     names: tuple[str, str], options: tuple[str, ...], rolled: Rolled, tmp_path: Path
 ) -> None:
-    table = pd.read_csv(rolled.files["csv"])
+    table = pd.read_csv(rolled.file("csv"))
     mass = table["momentum_x"][0] / table["vx"][0]
     velocities = {name: table[axis] / mass for name, axis in zip(names, ("momentum_x", "momentum_z"), strict=True)}
     kept = table[["time", "internal_energy"]].assign(**velocities, mass=mass)
@@ -93,7 +97,7 @@ def test_a_table_with_velocities_tells_the_flight_as_one_with_momenta(
     td = str(round(rolled.end - 0.01, 3))
     found, expected = (
         answer("suggest", "--no-verify", "--td", td, *asked, str(file))["flight"]
-        for asked, file in ((options, tmp_path / "run.csv"), ((), rolled.files["csv"]))
+        for asked, file in ((options, tmp_path / "run.csv"), ((), rolled.file("csv")))
     )
     assert found == expected
     assert found["source"] == "momentum"
@@ -103,7 +107,7 @@ def test_a_table_with_velocities_tells_the_flight_as_one_with_momenta(
 @pytest.mark.parametrize("form", ["csv", "hdf5", "glstat", "matsum", "T01"])
 def test_td_after_the_contact_is_refused(rolled: Rolled, form: str) -> None:
     part = ["--part", "box"] if form in ("matsum", "T01") else []
-    file, td = str(rolled.files[form]), rolled.end + 0.02
+    file, td = rolled.file(form), rolled.end + 0.02
     result = run("suggest", "--no-verify", "--td", str(td), "-f", "json", *part, file)
     assert result.exit_code == 1
     assert "no free flight at td" in result.stderr
@@ -113,7 +117,7 @@ def test_td_after_the_contact_is_refused(rolled: Rolled, form: str) -> None:
 
 @pytest.mark.slow
 def test_td_after_the_contact_is_refused_by_every_command(rolled: Rolled, tmp_path: Path) -> None:
-    file, td = str(rolled.files["glstat"]), rolled.end + 0.02
+    file, td = rolled.file("glstat"), rolled.end + 0.02
     judged = answer("verify", "--tr", "0.2", "--td", str(td), file)
     assert (judged["verified"], judged["td_ok"]) == (False, False)
     rows = answer("study", "--td", str(td), file)["runs"]
@@ -127,7 +131,7 @@ def test_td_after_the_contact_is_refused_by_every_command(rolled: Rolled, tmp_pa
 
 @pytest.mark.slow
 def test_the_contact_energy_tells_the_flight_where_no_momentum_is_written(rolled: Rolled) -> None:
-    whole = history_of(str(rolled.files["glstat"]))
+    whole = history_of(rolled.file("glstat"))
     written = {name: getattr(whole.balance, name) for name in ("sliding", "external_work")}
     history = table(whole.time, whole.energy, balance=Balance(whole.time, **written))
     flight = examine(history, rolled.end - 0.01, Settings()).flight
@@ -137,7 +141,7 @@ def test_the_contact_energy_tells_the_flight_where_no_momentum_is_written(rolled
 
 
 def test_the_energy_balance_tells_the_flight_where_there_is_neither(rolled: Rolled) -> None:
-    whole = history_of(str(rolled.files["glstat"]))
+    whole = history_of(rolled.file("glstat"))
     written = {name: getattr(whole.balance, name) for name in ("internal", "kinetic", "external_work", "precision")}
     history = table(whole.time, whole.energy, balance=Balance(whole.time, **written))
     flight = examine(history, (rolled.start + rolled.end) / 2, Settings(replay=False)).flight
@@ -149,7 +153,7 @@ def test_the_energy_balance_tells_the_flight_where_there_is_neither(rolled: Roll
 
 
 def test_on_the_energy_alone_nothing_is_certain_and_no_tr_lies_in_the_load(rolled: Rolled) -> None:
-    whole = history_of(str(rolled.files["csv"]))
+    whole = history_of(rolled.file("csv"))
     history = table(whole.time, whole.energy)
     td = rolled.end - 0.01
     found = suggest(history, td, Settings(replay=False))
@@ -295,7 +299,7 @@ def test_a_flight_is_the_same_from_any_td_in_it_and_what_was_seen_before_changes
     rolled: Rolled, form: str
 ) -> None:
     def fresh() -> History:
-        return open_run([str(rolled.files[form])]).history(Selection(parts=("box",) if form == "matsum" else ()))
+        return open_run([rolled.file(form)]).history(Selection(parts=("box",) if form == "matsum" else ()))
 
     history, length = fresh(), rolled.end - rolled.start
     times = [rolled.start + share * length for share in (0.9, 0.02, 0.5, 0.98, 0.3)]

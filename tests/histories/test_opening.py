@@ -1,7 +1,6 @@
 """Recognition by content, where the bytes come from, and the errors of both."""
 
 import gzip
-import hashlib
 import io
 import lzma
 import re
@@ -75,22 +74,6 @@ def test_what_is_no_number_in_a_column_beside_it_does_not_keep_the_energy_from_b
     history = read_history([file(table)])
     assert history.energy.tolist() == [1.0, 2.0, 1.5]
     assert history.balance is None or history.balance.kinetic is None
-
-
-def test_a_gzipped_file_is_read_and_hashed_as_it_lies_there(file: Write) -> None:
-    packed = gzip.compress(CSV)
-    name = file(packed, "history.gz")
-    history = read_history([name])
-    assert history.energy.tolist() == [1.0, 2.0, 1.5]
-    assert history.files[0].sha256() == hashlib.sha256(packed).hexdigest()
-
-
-def test_standard_input_is_read_once_and_still_hashed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(CSV)))
-    history = read_history(["-"])
-    assert history.source == ("-",)
-    assert history.time.tolist() == [0.0, 0.1, 0.2]
-    assert history.files[0].sha256() == hashlib.sha256(CSV).hexdigest()
 
 
 def test_a_given_format_is_not_second_guessed(file: Write) -> None:

@@ -1,6 +1,7 @@
 """Where the bytes come from: files, folders, globs, gzip and standard input, for all formats."""
 
 import gzip
+import hashlib
 import io
 import os
 import time
@@ -15,7 +16,7 @@ import pytest
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.opening import READERS, Selection, open_run
 from d2rpick.histories.source import expand, later_legs, open_files
-from tests.command import run
+from tests.command import refused
 from tests.computed import stored
 from tests.hdf5_files import plain, written
 from tests.made_binout import binout
@@ -34,12 +35,6 @@ CONTENTS = {
 }
 
 
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
 def names(*files: str) -> Sequence[str]:
     for file in files:
         Path(file).parent.mkdir(exist_ok=True)
@@ -53,7 +48,7 @@ def test_there_is_an_example_of_each_format() -> None:
 
 @pytest.mark.parametrize("kind", CONTENTS)
 def test_every_format_is_read_by_its_content_from_a_file_gzip_and_standard_input(
-    kind: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+    kind: str, here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     content = CONTENTS[kind]
     Path("plain").write_bytes(content)
@@ -61,13 +56,14 @@ def test_every_format_is_read_by_its_content_from_a_file_gzip_and_standard_input
     monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(content)))
     histories = [read_history([name]) for name in ("plain", "packed", "-")]
     assert {history.format for history in histories} == {kind}
-    for history in histories:
+    for history, data in zip(histories, (content, Path("packed").read_bytes(), content), strict=True):
         assert history.time.tolist() == histories[0].time.tolist()
         assert history.energy.tolist() == histories[0].energy.tolist()
-    assert read_history([str(folder / "plain")], input_format=kind).energy.tolist() == histories[0].energy.tolist()
+        assert history.files[0].sha256() == hashlib.sha256(data).hexdigest()  # as it lies there
+    assert read_history([str(here / "plain")], input_format=kind).energy.tolist() == histories[0].energy.tolist()
 
 
-@pytest.mark.usefixtures("folder")
+@pytest.mark.usefixtures("here")
 def test_a_folder_holds_the_databases_of_one_run() -> None:
     run = names("run/binout0000", "run/binout0000%001", "run/binout0004", "run/GLSTAT", "run/matsum.gz")
     names("run/d3plot", "run/messag", "run/glstat.txt", "run/nodout", "run/binout.log")
@@ -78,9 +74,9 @@ def test_a_folder_holds_the_databases_of_one_run() -> None:
 
 
 @pytest.mark.parametrize("change", ["replaced", "cut", "written anew", "appended", "taken away"])
-def test_files_of_one_run_are_not_mixed_with_those_of_the_next(change: str, folder: Path) -> None:
-    first, second, whole = folder / "run.glstat", folder / "run.matsum", CONTENTS["glstat"]
-    for name in (first, folder / "next"):
+def test_files_of_one_run_are_not_mixed_with_those_of_the_next(change: str, here: Path) -> None:
+    first, second, whole = here / "run.glstat", here / "run.matsum", CONTENTS["glstat"]
+    for name in (first, here / "next"):
         name.write_bytes(whole)
     os.mkfifo(second)
     time.sleep(0.02)  # above the resolution of the file's times
@@ -103,7 +99,7 @@ def test_files_of_one_run_are_not_mixed_with_those_of_the_next(change: str, fold
     writer.join()
 
 
-@pytest.mark.usefixtures("folder")
+@pytest.mark.usefixtures("here")
 def test_a_glob_takes_what_has_such_a_name() -> None:
     files = names("leg1/binout", "leg2/binout")
     assert expand(["leg*/binout"]) == files
@@ -114,7 +110,7 @@ def test_a_glob_takes_what_has_such_a_name() -> None:
     assert expand(["run[1]"]) == ("run[1]",)  # a file is a file, whatever its name
 
 
-@pytest.mark.usefixtures("folder")
+@pytest.mark.usefixtures("here")
 @pytest.mark.parametrize(
     ("files", "reason"),
     [
@@ -129,7 +125,7 @@ def test_a_folder_of_several_runs_or_none_is_refused(files: Sequence[str], reaso
         expand(["run"])
 
 
-@pytest.mark.usefixtures("folder")
+@pytest.mark.usefixtures("here")
 def test_a_folder_is_read_as_one_run() -> None:
     for name in ("binout", "glstat", "matsum"):
         Path(name).write_bytes(CONTENTS[name])
@@ -161,6 +157,4 @@ def test_legs_are_files_of_the_same_name_with_a_higher_number(
 
 def test_a_td_that_only_a_later_leg_reaches_names_it() -> None:
     first = stored("rollover_r100_T01.gz")
-    result = run("suggest", "--td", "0.4", "--part", "box", first)
-    assert result.exit_code == 2
-    assert first.replace("T01", "T02") in result.stderr
+    assert first.replace("T01", "T02") in refused("suggest", "--td", "0.4", "--part", "box", first)

@@ -4,9 +4,7 @@ import json
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-import jsonschema
 import pytest
-import xmlschema
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -17,9 +15,8 @@ from d2rpick.rules.base import Finding, Severity
 from d2rpick.rules.examples import END, GOOD, HEAD, PARTS, automatic
 from tests.deck.test_radioss_run import place
 from tests.decks import write
-from tests.json_schemas import check_by_schema
+from tests.json_schemas import check_by_schema, junit_is_valid, sarif_is_valid
 
-SCHEMAS = Path(__file__).parents[1] / "schemas"
 BAD = HEAD + PARTS + automatic(1, "0.02", rigid=["1", "2"]) + automatic(2, "0.5", deformable=["1"]) + END
 
 
@@ -59,13 +56,6 @@ def test_github(results: list[Checked], tmp_path: Path) -> None:
     assert lines[0].startswith("::notice file=main.k")
 
 
-JUNIT = xmlschema.XMLSchema(str(SCHEMAS / "junit-10.xsd"))
-
-
-def junit_is_valid(text: str) -> None:
-    JUNIT.validate(text)
-
-
 def test_junit(results: list[Checked], tmp_path: Path) -> None:
     text = report.as_junit(report.Checks(results, str(tmp_path)), Shown())
     junit_is_valid(text)
@@ -77,13 +67,6 @@ def test_junit(results: list[Checked], tmp_path: Path) -> None:
     assert [failure.get("type") for failure in suites.iter("failure")] == ["D2R101"]
     strict = ET.fromstring(report.as_junit(report.Checks(results, str(tmp_path), fail_on=Severity.INFO), Shown()))
     assert len(list(strict.iter("failure"))) == 2
-
-
-SARIF = jsonschema.Draft4Validator(json.loads((SCHEMAS / "sarif-2.1.0.json").read_text("utf-8")))
-
-
-def sarif_is_valid(text: str) -> None:
-    SARIF.validate(json.loads(text))
 
 
 def test_sarif(results: list[Checked], tmp_path: Path) -> None:

@@ -22,6 +22,8 @@ COMMANDS = {
 }
 
 
+pytestmark = pytest.mark.usefixtures("by_level")  # what is found does not matter here
+
 # A scan takes seconds, and a run that is driven a solver: their own tests write each of their forms.
 QUICK = [(result, form) for result in FORMATS for form in FORMATS[result] if result not in ("rollover", "drive")]
 
