@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING, Any, Unpack
 
 from d2rpick.api import arguments
@@ -20,7 +21,7 @@ from d2rpick.rules import RULES, Checked, Configuration, check_deck, configurati
 from d2rpick.rules.base import Unreadable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     import pandas as pd
 
@@ -163,6 +164,7 @@ def findings_of(decks: Sequence[str], rules: Configuration, run: Run | None, req
 def _each(named: Sequence[str], rules: Configuration, judge: HistoryJudge | None) -> Iterator[Checked | Unreadable]:
     """Check each deck once, by one of its spellings, a run by the first of its files; a folder stands for its decks."""
     seen: set[str] = set()
+    configured = cache(lambda folder: configuration_for(os.path.join(folder, ""), rules, SETTINGS))  # noqa: PTH118
     for name in named:
         try:
             decks = main_decks(name) if os.path.isdir(name) else [name]  # noqa: PTH112  Path raises on odd names
@@ -173,14 +175,14 @@ def _each(named: Sequence[str], rules: Configuration, judge: HistoryJudge | None
             real = os.path.realpath(deck)
             if real not in seen:
                 seen.update([real, *map(os.path.realpath, run_files(deck))])
-                yield _found(deck, rules, judge)
+                yield _found(deck, configured, judge)
 
 
-def _found(name: str, rules: Configuration, judge: HistoryJudge | None) -> Checked | Unreadable:
+def _found(name: str, configured: Callable[[str], Configuration], judge: HistoryJudge | None) -> Checked | Unreadable:
     """Check a deck by the configuration nearest to it; what is wrong with either does not hide other decks."""
     source = ""
     try:
-        configuration = configuration_for(name, rules, SETTINGS)
+        configuration = configured(os.path.dirname(name))  # noqa: PTH120  a name with a NUL byte has none
         source = configuration.source
         content = sys.stdin.buffer.read() if name == STDIN else None
         if judge and content is None:

@@ -72,15 +72,17 @@ def unpacked_beyond(packed: int, unpacked: int) -> str:
     return beyond("UNPACKED", unpacked) or beyond("RATIO", ratio)
 
 
-def long_line(data: bytes | Searched) -> int:
+def long_line(data: bytes | Searched, most: float | None = None) -> int:
     r"""Where a line beyond the bound begins, -1 where there is none; of the others little is looked at.
+
+    ``most`` is the bound, where it is known already.
 
     Examples
     --------
     >>> long_line(b"ab\n" * 9), long_line(b"ab\n" + bytes(1_000_001))
     (-1, 3)
     """
-    begin, most = 0, int(min(bound("LINE"), len(data)))
+    begin, most = 0, int(min(bound("LINE") if most is None else most, len(data)))
     while begin + most < len(data):
         end = data.rfind(b"\n", begin, begin + most + 1) + 1
         if not end:

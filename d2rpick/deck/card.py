@@ -15,7 +15,7 @@ from d2rpick.base.graph import reached
 from d2rpick.deck.expression import ExpressionError, Number, evaluate, names_in, number
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from d2rpick.deck.source import Block
 
@@ -62,7 +62,7 @@ class Value(NamedTuple, Generic[T]):
     parameters: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Row:
     """One data line of a card."""
 
@@ -78,16 +78,17 @@ class Row:
 
     def field(self, position: int) -> Field:
         """Field ``position`` from 0, between commas or in fixed columns; empty beyond the end of the line."""
-        start, text = self._pieces[position] if position < len(self._pieces) else (len(self.text), "")
-        found = text.strip()
-        indent = text.index(found[0]) if found else 0
-        return Field(found, self.block, self.distance, start + indent + 1)
+        cells = self._cells
+        text, column = cells[position] if position < len(cells) else ("", len(self.text) + 1)
+        return Field(text, self.block, self.distance, column)
 
     @cached_property
-    def _pieces(self) -> list[tuple[int, str]]:
-        if "," in self.text:
-            return list(_between_commas(self.text))
-        return [(start, self.text[start : start + self.width]) for start in range(0, len(self.text), self.width)]
+    def _cells(self) -> list[tuple[str, int]]:
+        """Text of each field without the blanks around it, and its column; they are asked for one after the other."""
+        line, width = self.text, self.width
+        between = ((at, line[at : at + width]) for at in range(0, len(line), width))
+        pieces = _between_commas(line) if "," in line else between
+        return [(found := text.strip(), 1 + start + (text.index(found[0]) if found else 0)) for start, text in pieces]
 
 
 def _between_commas(text: str) -> Iterator[tuple[int, str]]:
@@ -170,7 +171,7 @@ class Scope:
     def value(self, text: str) -> Number:
         """Value of a field: a number, a reference, or an expression; ExpressionError if it is none."""
         text = text.strip()
-        if text.startswith("<") and text.endswith(">"):
+        if text[:1] == "<" and text[-1:] == ">":
             return evaluate(text[1:-1], self._number)
         if "&" in text:
             return evaluate(text, self._number)
@@ -296,7 +297,7 @@ class Transform(NamedTuple):
         return Transform(node, part, material, set_, rest, self.time * outer.time, scaled, moved)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Card:
     """A keyword block that matters: ``name`` in upper case without ``*`` and format suffix."""
 
@@ -352,24 +353,24 @@ class Card:
 
     def real(self, row: Row, position: int, default: float = 0.0) -> Value[float]:
         """Read a real number; parameters and expressions are evaluated, a blank field is the default."""
-        found = row.field(position)
-        if not found.text:
-            return Value(default, found)
-        names = names_in(found.text)
-        try:
-            return Value(float(self.scope.value(found.text)), found, "", names)
-        except (ExpressionError, OverflowError) as error:
-            return Value(default, found, str(error), names)
+        return self._number(row, position, default, float)
 
     def integer(self, row: Row, position: int, default: int = 0) -> Value[int]:
         """Read an integer; a real without fraction is accepted."""
-        found = self.real(row, position, default)
-        if found.problem:
-            return Value(default, found.field, found.problem, found.parameters)
-        if found.value != int(found.value):
-            problem = f"{found.field.text!r} is not an integer"
-            return Value(default, found.field, problem, found.parameters)
-        return Value(int(found.value), found.field, "", found.parameters)
+        return self._number(row, position, default, int)
+
+    def _number(self, row: Row, position: int, default: T, kind: Callable[[float], T]) -> Value[T]:
+        found = row.field(position)
+        text = found.text
+        if not text:
+            return Value(default, found)
+        try:
+            value = kind(exact := float(self.scope.value(text)))
+        except (ExpressionError, OverflowError) as error:
+            return Value(default, found, str(error), names_in(text))
+        if value != exact:
+            return Value(default, found, f"{text!r} is not an integer", names_in(text))
+        return Value(value, found, "", names_in(text))
 
     def positive(self, row: Row, position: int) -> float | None:
         """Read a positive number, or None; of an include in other units none is known."""

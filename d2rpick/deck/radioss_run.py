@@ -45,7 +45,7 @@ class Flaw(NamedTuple):
     message: str
 
 
-_HEAD = 256 * 1024
+HEAD: Final = 256 * 1024  # bytes in which a file shows what it is
 _KEYWORD: Final = re.compile(rb"^[*/]", re.MULTILINE)
 _STARTER: Final = re.compile(rb"^/BEGIN", re.MULTILINE | re.IGNORECASE)
 _ENGINE: Final = re.compile(rb"^/RUN/", re.MULTILINE | re.IGNORECASE)
@@ -84,7 +84,7 @@ def run_files(path: str) -> list[str]:
         if not os.path.isfile(path):  # noqa: PTH113  start-up
             return []  # a pipe gives its bytes once
         with open(path, "rb", buffering=0) as stream:  # noqa: PTH123
-            head = stream.read(_HEAD)
+            head = stream.read(HEAD)
         if not recognises(head):
             return []
         from pathlib import Path  # not above: start-up
@@ -120,7 +120,7 @@ def read_run(path: str, content: bytes | None = None) -> Run:
     files = run_files(path) if content is None else []
     for name in files or [path]:
         source = SourceFile(name, content)
-        head = source.read(0, _HEAD)
+        head = source.read(0, HEAD)
         if not recognises(head):
             raise DeckError(f"{name}: no /BEGIN or /RUN was found, a file of a Radioss run was expected")
         run.deck.sources.append(source)

@@ -15,7 +15,7 @@ from d2rpick.deck.card import LONG, STANDARD, Card, Field, Problem, Row, Scope, 
 from d2rpick.deck.source import Block, SourceFile
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
 
@@ -156,8 +156,18 @@ class Deck:
 
     def named(self, *names: str) -> list[Card]:
         """Cards whose keyword is one of ``names``, or one of them with an option behind ``_``."""
-        prefixes = tuple(f"{name}_" for name in names)
-        return [card for card in self.cards if card.name in names or card.name.startswith(prefixes)]
+        found = [self._places[name] for name in names if name in self._places]
+        return [self.cards[place] for place in (found[0] if len(found) == 1 else sorted(set().union(*found)))]
+
+    @cached_property
+    def _places(self) -> Mapping[str, Sequence[int]]:
+        """Places of the cards by the first words of their names: every rule asks for some."""
+        found: defaultdict[str, list[int]] = defaultdict(list)
+        for place, card in enumerate(self.cards):
+            words = card.name.split("_")
+            for count in range(1, len(words) + 1):
+                found["_".join(words[:count])].append(place)
+        return found
 
     def silences(self, rule: str, file: str, line: int) -> bool:
         """Whether a comment before the card that holds ``line`` of ``file`` silences ``rule``."""
@@ -185,15 +195,16 @@ class Deck:
         return found
 
 
-def read_deck(path: str, content: bytes | None = None) -> Deck:
+def read_deck(path: str, content: bytes | SourceFile | None = None) -> Deck:
     """Find the cards of a deck and of all its includes.
 
     Parameters
     ----------
     path : str
         The main deck; messages show file names relative to it as it is given here.
-    content : bytes, optional
-        What the main deck holds, where it does not lie in a file; its includes are looked for beside ``path``.
+    content : bytes or SourceFile, optional
+        What the main deck holds, where it does not lie in a file, or the file where it is open already; its includes
+        are looked for beside ``path``.
 
     Returns
     -------
@@ -206,7 +217,7 @@ def read_deck(path: str, content: bytes | None = None) -> Deck:
         If the deck itself cannot be read or is none, or includes multiply without end.
     """
     deck = Deck(path)
-    main = SourceFile(path, content)
+    main = content if isinstance(content, SourceFile) else SourceFile(path, content)
     if next(main.blocks(), None) is None:
         if main.marks:
             found, wanted = "only *END was found, no keyword before it", "*KEYWORD and the cards"

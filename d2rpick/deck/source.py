@@ -19,7 +19,7 @@ from threading import Thread
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import DeckError
-from d2rpick.base.files import FileState, at_rest, beyond, long_line
+from d2rpick.base.files import FileState, at_rest, beyond, bound, long_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, MutableSequence, Sequence
@@ -269,6 +269,7 @@ class SourceFile:
         self.name, self._piece = name, piece
         self._file = stored(name) if content is None else Held(content) if isinstance(content, bytes) else content
         self._counted = [(0, 1)]  # (offset, number of the line that holds it), ascending
+        self._longest = bound("LINE")
 
     @cached_property
     def marks(self) -> Sequence[int]:
@@ -300,7 +301,7 @@ class SourceFile:
             piece = self.read(start, min(start + size, end))
             if start + len(piece) < end:
                 piece = piece[: piece.rfind(b"\n") + 1]
-            if (at := long_line(piece or self.read(start, start + size))) >= 0:
+            if (at := long_line(piece or self.read(start, start + size), self._longest)) >= 0:
                 raise DeckError(f"{self.name}:{self.line_at(start + at)}: the line has {beyond('LINE')}")
             if piece:
                 yield piece
@@ -338,7 +339,7 @@ class SourceFile:
         return line
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Block:
     """A keyword with all lines up to the next one, or an encrypted block: a place in a file."""
 
@@ -364,16 +365,15 @@ class Block:
 
     def lines(self) -> Iterator[tuple[int, str]]:
         """Read the data lines, with their distance to the keyword, without comments."""
-        for distance, line in enumerate(self._lines()):
-            if distance and not line.startswith(self._comment):
-                yield distance, line.rstrip(b"\r").decode("latin-1")
-
-    def _lines(self) -> Iterator[bytes]:
+        distance, comment = -1, tuple(sign.decode() for sign in self._comment)
         for piece in self.source.pieces(self.start, self.end):
-            *lines, rest = piece.split(b"\n")
-            yield from lines
+            *lines, rest = piece.decode("latin-1").split("\n")
             if rest and self.end is None:  # otherwise these are the blanks in front of the next keyword
-                yield rest
+                lines.append(rest)
+            for line in lines:
+                distance += 1
+                if distance and not line.startswith(comment):
+                    yield distance, line.rstrip("\r")
 
     @cached_property
     def silenced(self) -> tuple[str, ...]:

@@ -193,7 +193,7 @@ def _missing(rows: Sequence[Row]) -> str:
 
 
 def _is_of_part(row: Row) -> bool:
-    return not _PTYPES.isdisjoint(row.field(at).text.upper() for at in (1, 2))
+    return row.field(1).text.upper() in _PTYPES or row.field(2).text.upper() in _PTYPES
 
 
 def _lines(count: int) -> str:

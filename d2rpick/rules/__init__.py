@@ -14,6 +14,7 @@ from d2rpick.base.errors import ConfigurationError
 from d2rpick.base.settings import RULE_KEYS, nearest_settings, refuse_unknown
 from d2rpick.deck import radioss_run
 from d2rpick.deck.reader import Deck, read_deck
+from d2rpick.deck.source import SourceFile
 from d2rpick.rules import reading, runs, sets, switched_parts, times
 from d2rpick.rules.base import Case, Finding, Judge, Rule, RunCase, Severity
 
@@ -179,11 +180,10 @@ def check_deck(
 
 def _findings(case: Case, configuration: Configuration) -> Iterator[Finding]:
     """Apply the rules that count to what they look at; what a comment silences is left out."""
-    for rule in RULES.values():
-        if not configuration.selects(rule.id) or case.solver not in rule.solvers:
-            continue
+    solver, silences = case.solver, case.deck.silences
+    for rule in (rule for rule in RULES.values() if solver in rule.solvers and configuration.selects(rule.id)):
         for place, message in rule.check(case):
-            if case.deck.silences(rule.id, place.file, place.line):
+            if silences(rule.id, place.file, place.line):
                 continue
             severity = Severity(configuration.severity.get(rule.id, rule.severity))
             yield Finding(rule.id, severity, message, case.deck.path, place.file, place.line, place.column)
@@ -191,10 +191,12 @@ def _findings(case: Case, configuration: Configuration) -> Iterator[Finding]:
 
 def _read(path: str, content: bytes | None, judge: Judge | None) -> Case:
     """Read a deck by what it is: a run of Radioss, or an LS-DYNA deck."""
-    if radioss_run.recognises(content) if content is not None else radioss_run.run_files(path):
+    source = SourceFile(path, content)
+    given = content is not None or os.path.isfile(path)  # noqa: PTH113  a pipe gives its bytes once
+    if given and radioss_run.recognises(source.read(0, radioss_run.HEAD)):
         run = radioss_run.read_run(path, content)
         return RunCase(run.deck, judge, run=run)
-    return Case(read_deck(path, content), judge)
+    return Case(read_deck(path, source), judge)
 
 
 def _remarks(deck: Deck) -> Iterator[str]:

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, one_line
-from d2rpick.deck.parts import Parts, read_parts, read_sections
+from d2rpick.deck.parts import Constraint, Parts, read_constraints, read_parts, read_sections
 from d2rpick.deck.radioss_run import Flaw, Run, RunWindows, find_run_windows
 from d2rpick.deck.switching import Event, Header, SwitchSet, Window, Windows, find_windows, read_switching
 
@@ -133,6 +133,11 @@ class Case:
     def windows(self) -> Windows:
         """The switching windows of every part."""
         return find_windows(self.sets, self.parts)
+
+    @cached_property
+    def constraints(self) -> Sequence[Constraint]:
+        """What holds nodes together, and may lie in a part that is switched."""
+        return read_constraints(self.deck)
 
     @cached_property
     def made_rigid(self) -> tuple[Event, ...]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import name_units
 from d2rpick.base.graph import reached
-from d2rpick.deck.parts import Constraint, Parts, element_cards, read_constraints
+from d2rpick.deck.parts import Constraint, Parts, element_cards
 from d2rpick.rules.base import BOTH, ERROR, INFO, WARNING, Case, Example, Objection, grouped, rule
 from d2rpick.rules.examples import BACK, PASSES, THERE, automatic, deck
 
@@ -235,8 +235,7 @@ def _together(case: Case, one: Unit, other: Unit) -> bool:
 def _held(case: Case, *, nodal: bool) -> Iterator[Objection]:
     """Constraints on parts that cards make rigid while leaving the constraints active."""
     switched = _left_active(case, nodal=nodal)
-    found = read_constraints(case.deck) if switched else []
-    wanted = [one for one in found if (one.kind == "nodal rigid body") == nodal]
+    wanted = [one for one in (case.constraints if switched else ()) if (one.kind == "nodal rigid body") == nodal]
     owner = _owners(case, switched) if wanted else {}
     for constraint in wanted:
         part = _on(constraint, owner, switched)

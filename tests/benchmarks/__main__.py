@@ -179,6 +179,7 @@ ROWS = (
     Row("parts and elements of a 50 MB deck / loop over its lines", deck("to_loop", "inventory"), most=15.0),
     Row("check of a 50 MB deck / dynars.parse_deck", deck("check_to_dynars"), most=1.0),
     Row("  memory for the cards [MB]", deck("memory"), most=32.0),
+    Row("check of 1000 small decks / finding their cards, CPU", deck("many_to_parse"), most=8.0),
     Row("check / import click: processes", lambda: process_ratio("click", *CHECK), most=1.5),
     Row("loop over lines / glstat, 1e5 states", reading("glstat_to_loop"), least=8.0),
     Row("glstat, 1e5 states / bare read", reading("glstat_to_bare_read"), most=4.0),

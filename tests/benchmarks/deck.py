@@ -1,7 +1,8 @@
-"""Finding the cards in a 50 MB deck against a plain line loop, and the memory it takes."""
+"""Finding the cards in a 50 MB deck against a plain line loop, and the memory it takes; checking many small decks."""
 
 from __future__ import annotations
 
+import os
 import tracemalloc
 from contextlib import contextmanager
 from importlib import import_module
@@ -9,12 +10,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+from d2rpick.api.checking import check as checked
 from d2rpick.deck.parts import read_parts
 from d2rpick.deck.reader import read_deck
 from d2rpick.deck.switching import find_windows, read_switching
 from d2rpick.rules import check_deck
-from d2rpick.rules.examples import BACK, HEAD, PARTS, THERE
-from tests.benchmarks.timing import ratio
+from d2rpick.rules.examples import BACK, GOOD, HEAD, PARTS, THERE
+from tests.benchmarks.timing import own_seconds, ratio
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -105,6 +107,16 @@ def check_to_dynars() -> float | None:
         return None
     with large_deck() as path:
         return ratio(lambda: check(path), lambda: parse(path), 5 * _ROUNDS)  # of milliseconds only
+
+
+def many_to_parse() -> float:
+    """Checking 1000 small decks, as a user asks for it, over finding their cards: CPU of this process."""
+    with TemporaryDirectory() as folder:
+        names = [str(Path(folder) / f"{number}.k") for number in range(1000)]
+        for name in names:
+            Path(name).write_text(GOOD, "ascii")
+            os.utime(name, (1e9, 1e9))
+        return ratio(lambda: checked(names), lambda: [*map(read_deck, names)], _ROUNDS, cost=own_seconds)
 
 
 def memory() -> float:

@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
 from statistics import median
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -23,6 +23,13 @@ def seconds(call: Callable[[], object]) -> float:
     start = perf_counter()
     call()
     return perf_counter() - start
+
+
+def own_seconds(call: Callable[[], object]) -> float:
+    """Processor time of this process for a call."""
+    start = process_time()
+    call()
+    return process_time() - start
 
 
 def processor_seconds(call: Callable[[], object]) -> float:
