@@ -115,7 +115,8 @@ def suggest_in_window(
         last = _last_at_rest(situation, inside)
         td = last if last > inside[0] and look(last).at_rest else td
     elif chosen is not None:
-        td = _unbeaten(td, offered_times(situation, inside, STEPS)[0].tolist() if times is None else times, look)
+        times = offered_times(situation, inside, STEPS)[0].tolist() if times is None else times
+        td = _unbeaten(td, times, look, looking(history, replace(settings, replay=False), since=since))
     found = suggest_at(looking(history, settings, fits, since, quick=False)(td))
     return replace(found, td_window=window, longer=_given_up(longest, found.recommended, inside, look))
 
@@ -151,17 +152,19 @@ def as_printed(error: float | None) -> float:
     return np.inf if error is None else round(error, _READ)
 
 
-def _unbeaten(td: float, times: Iterable[float], look: Look) -> float:
+def _unbeaten(td: float, times: Iterable[float], look: Look, at_level: Look) -> float:
     """Give ``td``, or the one of ``times`` with the longest rigid time whose pair beats its: no worse, and better.
 
-    Peaks were compared as one of them knows the flight; the energy alone shows another one to each td.
+    Peaks were compared as one of them knows the flight; the energy alone shows another one to each td.  Where only
+    pairs ``at_level`` compare with its, an oscillator is sought at no td that is beaten without.
     """
     own = next(iter(_acceptable([look(td)])), None)
     if own is None:
         return td
     seen = look if own[0].flight.source == "energy" else own[0].at
+    first = at_level if seen is look and own[0].basis == "energy" else seen
     error = as_printed(error_of(*own))
-    better = _beating(own, [there for time in times if _may_beat(there := seen(time), own, error)])
+    better = _beating(own, [seen(time) for time in times if _may_beat(first(time), own, error)])
     for there, _ in sorted(better, key=lambda one: (-one[1].rigid_time, as_printed(error_of(*one)))):
         if _beating(own, [look(there.td)]):
             return there.td

@@ -54,8 +54,8 @@ class QuietTime(NamedTuple):
 def quiet_time(history: History, td: float) -> QuietTime | None:
     """Find the window around ``td`` [time] in which the energy stays in its band on one level, or None."""
     start, least = float(history.time[0]), round_off(history)
-    before = np.abs(history.energy[history.time <= td])
-    fallen = least > 0 and before.max() <= least and before.size >= FEWEST
+    before = history.between(start, td)[1]
+    fallen = least > 0 and before.size >= FEWEST and max(before.max(), -before.min()) <= least
     if fallen and td - start >= SHORTEST * (history.time[-1] - start):  # nothing has happened since the start
         return QuietTime(start, _burst(history, start, td), start)
     settled = end_of_load(history, td)
@@ -103,7 +103,10 @@ def end_of_load(history: History, td: float) -> float | None:
         return None
     values = np.append(earlier, latest)
     level = float(values.max() + _BAND_RESERVE * np.ptp(values))
-    times, rising = find_crossings(*history.between(-np.inf, td), level)
+    time, energy = history.between(-np.inf, td)
+    above = np.flatnonzero(energy > level)[-1:]
+    last = int(above[0]) if above.size else 0  # from where it falls into the band, or never was above
+    times, rising = find_crossings(time[last:], energy[last:], level)
     return float(times[~rising][-1]) if not rising.all() else None
 
 
@@ -119,10 +122,12 @@ def _last_excursion(history: History, start: float, td: float) -> float:
 
 def _last_push(history: History, start: float, td: float) -> float:
     """Give the last time from ``start`` to td at which the energy changes much faster than just before td."""
-    time, energy = history.between(start, td)
+    inside = window(history.time, start, td)
+    time = history.time[inside]
     if time.size < FEWEST:
         return start
-    rates = np.abs(np.diff(energy)) / np.diff(time)
+    rates = history.known.once("rates", lambda: np.abs(np.diff(history.energy)) / np.diff(history.time))
+    rates = rates[inside.start : inside.stop - 1]
     usual = rates[time[1:] >= td - _LATEST * (td - start)].max(initial=0.0)
     fast = np.flatnonzero(rates > _FASTER * usual)
     return float(time[fast[-1] + 1]) if fast.size else start
@@ -131,24 +136,23 @@ def _last_push(history: History, start: float, td: float) -> float:
 def _burst(history: History, start: float, td: float) -> float | None:
     """Give the first time after ``td`` at which the energy leaves its band from ``start`` to td upwards, or None."""
     top = _widened(history.between(start, td)[1], _BAND_RESERVE)[1]
-    above = np.flatnonzero((history.time > td) & (history.energy > top))
-    return float(history.time[above[0]]) if above.size else None
+    time, energy = history.between(np.nextafter(td, np.inf), np.inf)
+    above = np.flatnonzero(energy > top)
+    return float(time[above[0]]) if above.size else None
 
 
 def _change_of_level(history: History, start: float, td: float) -> float | None:
     """Give the first time after ``td`` at which the mean energy leaves its band from ``start`` to td, or None."""
-    width = round(_LEVEL * history.between(start, td)[0].size)
-    if width < 1 or history.time.size <= width:
+    inside = window(history.time, start, td)
+    width = round(_LEVEL * (inside.stop - inside.start))
+    if width < 1:
         return None
-    sums = np.append(0.0, np.cumsum(history.energy))
-    means, time = (sums[width:] - sums[:-width]) / width, history.time
-    first, middle, last = time[: time.size - width + 1], time[width // 2 :][: means.size], time[width - 1 :]
-    inside = (first >= start) & (last <= td)
-    if not inside.any():
-        return None
-    low, high = _widened(means[inside], 1.0)
-    off = np.flatnonzero((first > td) & ((means < low) | (means > high)))
-    return float(middle[off[0]]) if off.size else None
+    sums = history.known.once("sums", lambda: np.append(0.0, np.cumsum(history.energy)))[inside.start :]
+    means = (sums[width:] - sums[:-width]) / width
+    after = inside.stop - inside.start  # the first whose states all lie after td
+    low, high = _widened(means[: after - width + 1], 1.0)
+    off = np.flatnonzero((means[after:] < low) | (means[after:] > high))
+    return float(history.time[inside.stop + int(off[0]) + width // 2]) if off.size else None
 
 
 def _widened(values: Samples, share: float) -> tuple[float, float]:
