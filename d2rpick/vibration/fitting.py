@@ -45,6 +45,7 @@ COARSE: Final = 400  # samples on which starts are compared and first refined
 _MEDIUM: Final = 2048  # samples on which a fit is refused before it is refined on more
 _NEAR: Final = 1e-6  # of the sum of squares still to be gained where a fit is refused: nothing beside the structure
 MAX_MISFIT: Final = 0.4  # beyond, more than 16 % of the variance is unexplained and can hide another mode
+_FAR_TOO_MUCH: Final = 1.2  # times that: the variance of two thousand samples is known to a thirtieth
 STARTS: Final = 3  # refined at most: with noise the first in rank may not be the one that ends best
 CERTAIN: Final = 0.01  # of the variance unexplained: no second start need be tried
 _MAX_STEPS: Final = 40  # a good start needs 4 to 8
@@ -77,17 +78,24 @@ def best_of_starts(
 ) -> Samples | None:
     """Return the best fit to all samples from what ``starts`` gives for a few of them; None as for `fit`.
 
-    With a finite ``worst`` one whose misfit stays too large is not brought to its best: noise draws that out.
+    One that leaves far too much of some of the samples is not brought to its best for all of them: it is refused, and
+    would crawl.
     """
     few = _few(s, e)
     best = refine(starts(*few), model, *few, worst)
-    if best is None:
-        return None
     quick = np.isfinite(worst)
-    if quick and (_structured(best, model, *few) or fails(best, model, s, e)):
+    if best is None or (quick and _structured(best, model, *few)):
         return None
-    hopeless = MAX_MISFIT**2 * s.size * float(np.var(e)) if quick else np.inf
-    return best if few[0].size == s.size else minimise(best, model, s, e, hopeless)[0]
+    if few[0].size == s.size:
+        return best
+    some = _few(s, e, _MEDIUM)
+    if some[0].size < s.size:
+        best, left = minimise(best, model, *some, near=_NEAR)
+        if quick and _structured(best, model, *some):
+            return None
+        if left > _FAR_TOO_MUCH * MAX_MISFIT**2 * some[0].size * float(np.var(some[1])):
+            return best
+    return minimise(best, model, s, e)[0]
 
 
 def _few(s: Samples, e: Samples, most: int = COARSE) -> tuple[Samples, Samples]:
@@ -107,15 +115,6 @@ def refine(starts: Sequence[Samples], model: Model, s: Samples, e: Samples, wors
         if least < CERTAIN * variance:
             break
     return best
-
-
-def fails(parameters: Samples, model: Model, s: Samples, e: Samples) -> bool:
-    """Whether the best fit near ``parameters`` to some two thousand samples leaves a structure that refuses it.
-
-    Never where there are no more samples than that: then the fit to all of them costs no more.
-    """
-    some = _few(s, e, _MEDIUM)
-    return some[0].size < s.size and _structured(minimise(parameters, model, *some, near=_NEAR)[0], model, *some)
 
 
 def _structured(parameters: Samples, model: Model, s: Samples, e: Samples) -> bool:

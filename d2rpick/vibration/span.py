@@ -10,10 +10,13 @@ import numpy as np
 
 from d2rpick.histories.history import History, Memory, Samples
 from d2rpick.vibration.identify import Identification, identify
+from d2rpick.vibration.modes import BLOCK
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from typing import Protocol
+
+    from d2rpick.vibration.modes import Mode, Modes
 
     class Fitter(Protocol):
         """Gives the oscillator for some samples; ``quick`` where a refusal needs no more than a few of them."""
@@ -97,20 +100,34 @@ def span_of(history: History, anchor: float, fit: Identification, bounds: Span) 
     period = 2 * np.pi / fit.mode.fastest
     typical = float(np.partition(np.diff(time), (time.size - 1) // 2)[(time.size - 1) // 2])
     width = max(3, round(period / _MEANS_PER_PERIOD / typical))
-    with np.errstate(over="ignore", invalid="ignore"):  # far off, a damped fit grows beyond all numbers
-        least = max(_ERRORS_OFF * fit.rms / np.sqrt(width), _STRUCTURES_OFF * fit.structure)
-        room = np.maximum(_SHARE_OFF * fit.mode.vibration_energy(time), least)
-        off = energy - fit.mode.energy(time)
-        middle = int(np.searchsorted(time, anchor))
-        # outwards from the anchor, so that no sum holds the large errors beyond the end that is to be found
-        behind, ahead = width // 2, (width - 1) // 2
-        after = np.flatnonzero(~(np.abs(_means(off, middle, behind, ahead)) <= room[middle:]))
-        backwards = np.abs(_means(off[::-1], time.size - middle, ahead, behind))
-        before = np.flatnonzero(~(backwards <= room[:middle][::-1]))
+    room = max(_ERRORS_OFF * fit.rms / np.sqrt(width), _STRUCTURES_OFF * fit.structure)
+    middle = int(np.searchsorted(time, anchor))
+    behind, ahead = width // 2, (width - 1) // 2
+    after = _first_off(time, energy, fit.mode, room, middle, behind, ahead)
+    before = _first_off(time[::-1], energy[::-1], fit.mode, room, time.size - middle, ahead, behind)
     # the mean over ``width`` samples reaches half as far beyond its middle
-    left = middle - int(before[0]) + width // 2 if before.size else 0
-    right = middle + int(after[0]) - 1 - width // 2 if after.size else time.size - 1
+    left = 0 if before is None else time.size - before + width // 2
+    right = time.size - 1 if after is None else after - 1 - width // 2
     return Span(float(time[left]), float(time[right])) if left < right else None
+
+
+@np.errstate(over="ignore", invalid="ignore")  # far off, a damped fit grows beyond all numbers
+def _first_off(
+    time: Samples, energy: Samples, mode: Mode | Modes, room: float, first: int, behind: int, ahead: int
+) -> int | None:
+    """Place of the first mean, from the ``first`` on, that is off by more than ``room`` [energy] and the share allowed.
+
+    It goes outwards block by block, so that no sum holds the large errors beyond the end that is to be found.
+    """
+    for begin in range(first, time.size, BLOCK):
+        inside = slice(max(begin - behind, 0), begin + BLOCK + ahead)
+        off = energy[inside] - mode.energy(time[inside])
+        means = np.abs(_means(off, begin - inside.start, behind, ahead)[:BLOCK])
+        loud = np.flatnonzero(~(means <= room))
+        far = loud[~(means[loud] <= _SHARE_OFF * mode.vibration_energy(time[begin + loud]))]
+        if far.size:
+            return begin + int(far[0])
+    return None
 
 
 def _means(values: Samples, first: int, behind: int, ahead: int) -> Samples:
