@@ -112,7 +112,7 @@ def _faint(history: History, start: float) -> float:
     """
     after = history.between(start, float(history.time[-1]))[1]
     fall = float((np.maximum.accumulate(after) - after).max(initial=0.0))
-    highest = float(np.abs(history.energy).max())
+    highest = history.known.once("highest", lambda: float(np.abs(history.energy).max()))
     quantum = history.energy_precision.quantum(float(np.abs(after).max(initial=0.0)))
     return max(_SOLVER_ERROR * highest, _QUANTA * quantum, _FAINT * fall)
 

@@ -104,10 +104,9 @@ def end_of_load(history: History, td: float) -> float | None:
     values = np.append(earlier, latest)
     level = float(values.max() + _BAND_RESERVE * np.ptp(values))
     time, energy = history.between(-np.inf, td)
-    above = np.flatnonzero(energy > level)[-1:]
-    last = int(above[0]) if above.size else 0  # from where it falls into the band, or never was above
-    times, rising = find_crossings(time[last:], energy[last:], level)
-    return float(times[~rising][-1]) if not rising.all() else None
+    above = energy > level
+    falls = np.flatnonzero(above[:-1] & ~above[1:])[-1:]
+    return float(find_crossings(time[falls[0] :][:2], energy[falls[0] :][:2], level)[0][0]) if falls.size else None
 
 
 def _last_excursion(history: History, start: float, td: float) -> float:
