@@ -57,6 +57,12 @@ def run(*args: str, stdin: bytes | None = None, color: bool = False, env: Mappin
     return _ANSWERED[asked]
 
 
+def put(path: Path, content: str | bytes) -> Path:
+    """Write a file, and give its path."""
+    path.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
+    return path
+
+
 def refused(*args: str) -> str:
     """Give the message of a command that could not run; it is one line on stderr and all there is."""
     result = run(*args)

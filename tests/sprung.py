@@ -1,7 +1,5 @@
 """Cubes on springs, as a Radioss deck: masses and stiffness that a test knows."""
 
-from __future__ import annotations
-
 from tests.decks import wide
 
 REAL = 20

@@ -225,8 +225,10 @@ SUGGEST = ("suggest", "--exit-zero", "--quiet", "--td")  # -q costs click diffli
         (*SUGGEST, "0.064", ENERGY),
         *(
             (*asked, str(ROOT / "sample_data" / f"rollover_box{kind}"))
-            for kind in (".matsum", ".binout", "T01")
-            for asked in (("info",), (*SUGGEST, "0.37"))
+            for kind, asked in (
+                (".matsum", ("info",)),
+                *((kind, (*SUGGEST, "0.37")) for kind in (".matsum", ".binout", "T01")),
+            )
         ),
     ],
 )

@@ -18,7 +18,7 @@ import d2rpick as d2
 from d2rpick.api.answer import written
 from d2rpick.report.keys import MEASURES
 from d2rpick.report.plan import sentence as plan_sentence
-from tests.command import BOX, DECK, ENERGY, GLSTAT, MATSUM, ROLLOVER, ROOT, answer, run
+from tests.command import BOX, DECK, ENERGY, GLSTAT, MATSUM, ROLLOVER, ROOT, answer, put, run
 from tests.command import run as run_command
 from tests.sample_deck import DECK as SAMPLE_DECK
 
@@ -231,13 +231,13 @@ def test_an_open_file_is_read() -> None:
 
 
 def test_pictures_and_pages(tmp_path: Path) -> None:
-    found = d2.suggest(d2.read(ENERGY), float(TD))
+    found = d2.suggest(d2.read(ENERGY), float(TD), replay=False)
     assert found.plot().axes
     page = found.report(tmp_path / "choice.html").read_text("utf-8")
     assert '"command":["d2rpick suggest --td "' in page  # what can be explored
     assert "d2rpick suggest --td 0.0687534" in page
     assert found.recommended is not None
-    verdict = d2.verify(d2.read(ENERGY), tr=found.recommended.tr, td=float(TD))
+    verdict = d2.verify(d2.read(ENERGY), tr=found.recommended.tr, td=float(TD), replay=False)
     assert verdict.plot().axes
     assert "Verified" in verdict.report(str(tmp_path / "verdict.html")).read_text("utf-8")
 
@@ -260,8 +260,7 @@ def test_channels_of_unusual_names_tell_the_flight_as_on_the_command_line(tmp_pa
 
 @pytest.mark.slow
 def test_the_format_that_was_named_is_in_the_command_that_repeats_it(tmp_path: Path) -> None:
-    file = tmp_path / "run.csv"
-    file.write_text(f"*Time{Path(ENERGY).read_text()[4:]}")  # by its content this may be a deck
+    file = put(tmp_path / "run.csv", f"*Time{Path(ENERGY).read_text()[4:]}")
     reading: Any = {"time": "*Time", "input_format": "csv"}
     with pytest.raises(d2.D2RPickError, match="this is a deck"):
         d2.read(file, time="*Time")
@@ -288,8 +287,7 @@ def test_a_check_names_the_command_that_repeats_it(asked: dict[str, Any]) -> Non
 def test_a_run_is_shown_by_what_its_files_hold(tmp_path: Path) -> None:
     assert repr(d2.read(ENERGY)) == f"Run({ENERGY!r}: csv, 1501 states, 0 to 0.15)"
     assert repr(d2.read(MATSUM)) == f"Run({MATSUM!r}: matsum, 421 states, 0 to 0.42, 2 parts)"
-    damaged = tmp_path / "run.csv"
-    damaged.write_text("time,energy\n0,0\nx,1\n")
+    damaged = put(tmp_path / "run.csv", "time,energy\n0,0\nx,1\n")
     assert repr(d2.read(damaged)) == f"Run({str(damaged)!r}: csv)"
     assert loose.read(damaged)._repr_html_() is None  # the notebook shows that instead
 
@@ -318,8 +316,7 @@ def test_a_notebook_shows_a_sentence_a_small_table_and_the_picture() -> None:
 
 
 def test_a_table_that_no_energy_is_known_of_is_shown_without_a_picture(tmp_path: Path) -> None:
-    file = tmp_path / "run.csv"
-    file.write_text("time,a,b\n0,0,1\n1,0,1\n")
+    file = put(tmp_path / "run.csv", "time,a,b\n0,0,1\n1,0,1\n")
     shown = loose.read(file)._repr_html_()
     assert "a, b" in shown
     assert "<svg" not in shown
@@ -402,6 +399,17 @@ def test_a_figure_shows_itself() -> None:
         (lambda: loose.suggest(ENERGY, 0.06), TypeError, r"run is .*; give what d2rpick.read"),
         (lambda: loose.suggest(d2.read(ROLLOVER, energy="boxIE_J"), 0.3, parts=1), ValueError, "exclude each other"),
         (lambda: loose.suggest(d2.read(BOX), 0.3, weights="a.toml"), ValueError, "`weights` needs `deck`"),
+        (lambda: loose.parts(d2.read(BOX), tr=0.1), ValueError, "`tr` needs `td`"),
+        (lambda: loose.parts(d2.read(BOX), tr=0.3, td=0.1), ValueError, "tr must lie before td"),
+        (
+            lambda: loose.parts("box.matsum"),
+            TypeError,
+            r"run is 'box\.matsum'; give what d2rpick\.read\(\.\.\.\) makes",
+        ),
+        (lambda: loose.plan(d2.read(ENERGY), min_rigid=-1), ValueError, "min_rigid is -1"),
+        (lambda: loose.plan(d2.read(ENERGY), done=[(0.2, 0.1)]), ValueError, r"done\[0\] is"),
+        (lambda: loose.plan(d2.read(ENERGY), before=d2.read(ENERGY)), ValueError, "name its windows with `done`"),
+        (lambda: loose.plan(d2.read(ENERGY), done=[(0.1, 0.9)]), d2.RangeError, "outside the record"),
         (lambda: loose.suggest(d2.read(BOX), 0.3, deck=3), TypeError, "deck is 3"),
         (lambda: loose.suggest(d2.read(BOX), 0.3, deck=["a.k", "b.k"]), ValueError, "deck names 2 files"),
         (lambda: loose.suggest(d2.read(BOX), 0.3, deck="absent.k"), d2.DeckError, "absent.k"),

@@ -65,21 +65,3 @@ def test_explore_takes_a_deck_as_suggest_does() -> None:
     assert found.recommended.saving == pytest.approx(1 - (best.run_time_share or 0.0))
     assert {"weights-by-analogy"} <= {one.code for one in found.warnings} & {one.code for one in chosen.warnings}
     assert found.answer.endswith("and costs no run time")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "told"),
-    [
-        ({"weights": "site.toml"}, "`weights` needs `deck`"),
-        ({"tr": 0.1}, "`tr` needs `td`"),
-        ({"tr": 0.3, "td": 0.1}, "tr must lie before td"),
-    ],
-)
-def test_wrong_arguments_are_named(arguments: dict[str, object], told: str) -> None:
-    with pytest.raises(ValueError, match=told):
-        d2.parts(d2.read(BOX), **arguments)  # type: ignore[arg-type]
-
-
-def test_what_is_not_a_run_is_named() -> None:
-    with pytest.raises(TypeError, match=r"run is 'box\.matsum'; give what d2rpick\.read\(\.\.\.\) makes of it"):
-        d2.parts("box.matsum")  # type: ignore[arg-type]

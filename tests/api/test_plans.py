@@ -38,14 +38,3 @@ def test_what_is_done_and_where_it_was_planned_is_in_the_command_that_repeats_it
     assert found.command == ("plan", "--done", "-", "--before", ENERGY, ENERGY)
     theirs = json.loads(run(*found.command, "-f", "json", stdin=b"0.0137 0.03\n").stdout)
     assert {**theirs, "command": None} == {**found.to_dict(), "command": None}
-
-
-def test_a_wrong_argument_is_named() -> None:
-    with pytest.raises(ValueError, match="min_rigid is -1"):
-        d2.plan(d2.read(ENERGY), min_rigid=-1)
-    with pytest.raises(ValueError, match=r"done\[0\] is"):
-        d2.plan(d2.read(ENERGY), done=[(0.2, 0.1)])
-    with pytest.raises(ValueError, match="name its windows with `done`"):
-        d2.plan(d2.read(ENERGY), before=d2.read(ENERGY))
-    with pytest.raises(d2.RangeError, match="outside the record"):
-        d2.plan(d2.read(ENERGY), done=[(0.1, 0.9)])

@@ -15,6 +15,7 @@ from d2rpick.choice.situation import Settings
 from d2rpick.choice.study import Question, StudyRow, ask
 from d2rpick.histories.opening import Selection
 from tests import variants
+from tests.command import put
 
 QUESTION = Question(variants.TD, Settings())
 
@@ -79,8 +80,7 @@ def test_a_figure_changes_no_answer_but_needs_the_outline(tmp_path: Path) -> Non
 def test_a_row_of_changed_files_is_not_taken(tmp_path: Path, change: str) -> None:
     folder = tmp_path / "run"
     folder.mkdir()
-    glstat = folder / "glstat"
-    glstat.write_bytes((Path(variants.__file__).parents[1] / "sample_data" / "energy.glstat").read_bytes())
+    glstat = put(folder / "glstat", (Path(variants.__file__).parents[1] / "sample_data" / "energy.glstat").read_bytes())
     ledger = Ledger(str(tmp_path / "ledger.ndjson"), QUESTION)
     ledger.add(ask(QUESTION, str(folder)))
     assert Ledger(ledger.name, QUESTION).find(str(folder))
@@ -124,8 +124,7 @@ def test_a_line_that_was_cut_anywhere_is_passed_over_and_the_next_one_is_whole(t
 
 @pytest.mark.parametrize("content", ["time,energy\n0,1\n", '{"schema": "d2rpick/study/1"}\n', "\n", '{"a": 1}\n'])
 def test_another_file_is_refused_and_stays_as_it_is(tmp_path: Path, content: str) -> None:
-    file = tmp_path / "file"
-    file.write_text(content)
+    file = put(tmp_path / "file", content)
     with pytest.raises(FormatError, match="not a run of a study"):
         Ledger(str(file), QUESTION)
     assert file.read_text() == content

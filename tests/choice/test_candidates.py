@@ -69,15 +69,6 @@ def test_energies_that_do_not_vibrate_give_no_candidate(energy: np.ndarray) -> N
     assert "no-candidate" in codes(answer)
 
 
-@pytest.mark.slow
-def test_a_negative_level_is_never_acceptable() -> None:
-    time = np.arange(0, 4, 0.01)
-    answer = suggest(of(np.sin(2 * np.pi * time) - 0.5, time), 3.5, Settings(after=0.0))
-    assert "no-energy" in codes(answer)
-    assert answer.recommended is None
-    assert all(c.level_error is None and c.energy_ratio is None for c in answer.candidates)
-
-
 def test_candidates_of_many_td_are_those_of_each_also_where_few_fit_together() -> None:
     look = looking(paper.history(), PLAIN)
     situations = [look(td) for td in (0.02, 0.0335, 0.064, 0.0687, 0.11)]

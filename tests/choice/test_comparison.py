@@ -20,14 +20,14 @@ from d2rpick.choice.situation import Settings
 from d2rpick.choice.switched_run import switched_history
 from d2rpick.histories.history import History, Samples, Track
 from d2rpick.histories.opening import Selection, open_run
-from tests.command import BOX, ENERGY, ROLLOVER, answer, refused, run
+from tests.command import BOX, ENERGY, ROLLOVER, answer, put, refused, run
 from tests.command import replayed as motion
 from tests.computed import results, stored
 from tests.energies import sure
 from tests.json_schemas import check_by_schema
 
 TR, TD = 0.0135867, 0.0687534
-VERIFY = ("verify", "--tr", "0.1", "--td", "0.37", "--part", "box")
+VERIFY = ("verify", "--no-verify", "--tr", "0.1", "--td", "0.37", "--part", "box")
 LEGS = stored("rollover_r100_T0*.gz")
 
 
@@ -129,7 +129,8 @@ def test_the_table_sets_the_switched_run_beside_the_reference() -> None:
     ],
 )
 def test_a_run_that_was_switched_at_other_times_is_an_objection(pair: tuple[str, str], said: str) -> None:
-    found = answer("verify", "--tr", pair[0], "--td", pair[1], "--part", "box", BOX, "--switched", LEGS)
+    times = ("--tr", pair[0], "--td", pair[1])
+    found = answer("verify", "--no-verify", *times, "--part", "box", BOX, "--switched", LEGS)
     assert found["verified"] is False
     assert any(said in reason for reason in found["reasons"])
 
@@ -189,8 +190,7 @@ def replayed(tmp_path: Path) -> Callable[..., str]:
     """Write a replay as a matsum: with these options, and with a change of its text."""
 
     def write(name: str, *options: str, change: Callable[[str], str] = str, v0: str = "6") -> str:
-        file = tmp_path / f"{name}.matsum"
-        file.write_text(change(motion("matsum", *options, v0=v0).decode()))
+        file = put(tmp_path / f"{name}.matsum", change(motion("matsum", *options, v0=v0).decode()))
         return str(file)
 
     return write
@@ -283,8 +283,7 @@ def test_csv_and_markdown_hold_the_comparison_too(replayed: Callable[..., str]) 
 def test_what_is_wrong_with_the_switched_file_names_it(
     content: str, says: str, tmp_path: Path, replayed: Callable[..., str]
 ) -> None:
-    bad = tmp_path / "bad.csv"
-    bad.write_text(content)
+    bad = put(tmp_path / "bad.csv", content)
     result = run("verify", *SWITCHES, "--part", "3", replayed("reference"), "--switched", str(bad))
     assert (result.exit_code, result.stdout) == (2, "")
     assert result.stderr.startswith("d2rpick: ")

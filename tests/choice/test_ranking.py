@@ -105,7 +105,7 @@ def fits(_: float) -> Fits:
     return Fits()
 
 
-@pytest.mark.parametrize("limits", [{}, {"max_kinetic_share": 0.9}, {"max_residual": 0.95}, {"tolerance": 1e-3}])
+@pytest.mark.parametrize("limits", [{}, {"max_kinetic_share": 0.9, "max_residual": 0.95}, {"tolerance": 1e-3}])
 @pytest.mark.parametrize(("history", "td"), [(paper.history(), paper.TD), (rollover(), 0.37)])
 def test_candidates_are_kept_together_as_one_by_one(history: History, td: float, limits: dict[str, float]) -> None:
     situation = examine(history, td, Settings(**limits), fits(td))  # type: ignore[arg-type]

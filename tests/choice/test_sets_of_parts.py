@@ -18,7 +18,7 @@ from d2rpick.histories.opening import open_run
 from d2rpick.report.formats import Shown
 from d2rpick.vibration.measures import run_time_share
 from tests import made_car
-from tests.command import ENERGY, ROOT, answer, run
+from tests.command import ENERGY, ROOT, answer, put, run
 from tests.computed import starter, stored
 from tests.energies import sure
 from tests.json_schemas import check_by_schema
@@ -66,7 +66,13 @@ def variant(folder: Path, *changes: tuple[str, str]) -> str:
     return str(folder / "main.k")
 
 
+def changed(folder: Path, *changes: tuple[str, str]) -> Parts:
+    """What is found with the deck that was changed so, in a window that is given: none is searched."""
+    return asked(BOX, variant(folder, *changes), times=TIMES)
+
+
 STEP = "step\n         2         2         1"
+TIMES = (0.1, 0.37)
 PLASTIC = "*MAT_PIECEWISE_LINEAR_PLASTICITY"
 
 
@@ -82,35 +88,35 @@ PLASTIC = "*MAT_PIECEWISE_LINEAR_PLASTICITY"
 def test_a_part_that_must_stay_deformable_is_kept_with_the_reason(
     tmp_path: Path, changes: list[tuple[str, str]], reason: str
 ) -> None:
-    found = asked(BOX, variant(tmp_path, *changes))
+    found = changed(tmp_path, *changes)
     assert found.rows[1].verdict == "keep"
     assert reason in " ".join(found.rows[1].reasons)
     assert found.rows[0].verdict == "switch"
 
 
 def test_a_part_whose_material_is_missing_is_not_judged(tmp_path: Path) -> None:
-    found = asked(BOX, variant(tmp_path, (STEP, "step\n         2         2         5")))
+    found = changed(tmp_path, (STEP, "step\n         2         2         5"))
     assert (found.rows[1].verdict, found.rows[1].reasons) == ("unknown", ("its material is not in the deck",))
 
 
 def test_elements_in_a_file_that_is_missing_are_not_taken_for_none(tmp_path: Path) -> None:
     part = "\nmore\n         4         1         1\n*SECTION_SHELL"
-    whole = asked(BOX, variant(tmp_path, ("\n*SECTION_SHELL", part)))
+    whole = changed(tmp_path, ("\n*SECTION_SHELL", part))
     assert (whole.rows[3].verdict, whole.rows[3].reasons) == ("keep", ("no elements",))
-    found = asked(BOX, variant(tmp_path, ("\n*SECTION_SHELL", part), ("*END", "*INCLUDE\nmesh.k\n*END")))
+    found = changed(tmp_path, ("\n*SECTION_SHELL", part), ("*END", "*INCLUDE\nmesh.k\n*END"))
     assert found.rows[3].verdict == "unknown"
     assert "not in what was read of the deck" in found.rows[3].reasons[0]
     assert found.recommended is None
 
 
 def test_rigid_in_the_deck_but_with_energy_in_the_history_is_not_taken_for_rigid(tmp_path: Path) -> None:
-    found = asked(BOX, variant(tmp_path, (STEP, "step\n         2         2         2")))
+    found = changed(tmp_path, (STEP, "step\n         2         2         2"))
     assert found.rows[1].verdict == "merge"
     assert "rigid in the deck, but it has internal energy in the history" in found.rows[1].reasons
 
 
 def test_a_deck_of_another_run_is_noticed(tmp_path: Path) -> None:
-    found = asked(BOX, variant(tmp_path, (STEP, "step\n        22         2         1")))
+    found = changed(tmp_path, (STEP, "step\n        22         2         1"))
     assert "parts-not-in-deck" in [caution.code for caution in found.cautions]
     assert found.rows[1].verdict == "unknown"
     assert found.recommended is None  # elements of a part that no *PART defines: the cost is not known
@@ -145,8 +151,7 @@ def test_the_step_grows_by_what_stays_deformable() -> None:
 
 @pytest.fixture(scope="module")
 def car(tmp_path_factory: pytest.TempPathFactory) -> Parts:
-    deck = tmp_path_factory.mktemp("car") / "CAR_0000.rad"
-    deck.write_bytes(starter("CAR"))
+    deck = put(tmp_path_factory.mktemp("car") / "CAR_0000.rad", starter("CAR"))
     return asked(stored("carT01.gz"), str(deck), given=[12, 13, 14], times=(0.0496, 0.1464))
 
 
@@ -195,10 +200,10 @@ def test_masses_that_are_written_come_before_those_of_the_deck(car: Parts) -> No
 
 
 def test_a_deck_whose_parts_have_other_titles_is_doubted(tmp_path: Path) -> None:
-    found = asked(BOX, variant(tmp_path, (STEP, STEP.replace("step", "skid"))))
+    found = changed(tmp_path, (STEP, STEP.replace("step", "skid")))
     (told,) = [caution.message for caution in found.cautions if caution.code == "deck-of-another-model"]
     assert told == "part 2 is 'step' in the history and 'skid' in the deck: is this the deck of the run?"
-    same = asked(BOX, variant(tmp_path, (STEP, STEP.replace("step", "STEP  of the frame"))))
+    same = changed(tmp_path, (STEP, STEP.replace("step", "STEP  of the frame")))
     assert "deck-of-another-model" not in [caution.code for caution in same.cautions]
 
 
@@ -255,9 +260,9 @@ def apart(folder: Path, more: str = "") -> str:
 
 
 def test_parts_that_welds_join_are_one_body_and_the_weld_is_named(tmp_path: Path) -> None:
-    found = asked(BOX, apart(tmp_path))
+    found = asked(BOX, apart(tmp_path), times=TIMES)
     assert [(row.verdict, row.shares_nodes) for row in found.rows[:2]] == [("switch", ()), ("switch", ())]
-    welded = asked(BOX, apart(tmp_path, f"*CONSTRAINED_SPOTWELD\n{13:10d}{213:10d}\n"))
+    welded = asked(BOX, apart(tmp_path, f"*CONSTRAINED_SPOTWELD\n{13:10d}{213:10d}\n"), times=TIMES)
     assert [(row.verdict, row.merge_with) for row in welded.rows[:2]] == [("switch", None), ("merge", 1)]
     assert [row.reasons[-1] for row in welded.rows[:2]] == [
         "joined to part 2 (spotweld)", "joined to part 1 (spotweld)"
@@ -267,9 +272,9 @@ def test_parts_that_welds_join_are_one_body_and_the_weld_is_named(tmp_path: Path
 
 def test_ties_that_may_join_parts_are_told_where_these_are_several_bodies(tmp_path: Path) -> None:
     tie = "*CONTACT_TIED_NODES_TO_SURFACE\n         1         2\n"
-    told = {one.code: one.message for one in asked(BOX, apart(tmp_path, tie)).cautions}
+    told = {one.code: one.message for one in asked(BOX, apart(tmp_path, tie), times=TIMES).cautions}
     assert "*CONTACT_TIED_NODES_TO_SURFACE" in told["ties-not-followed"]
-    whole = asked(BOX, variant(tmp_path, ("*END", f"{tie}*END")))
+    whole = changed(tmp_path, ("*END", f"{tie}*END"))
     assert "ties-not-followed" not in [one.code for one in whole.cautions]
 
 

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from d2rpick.base.errors import RangeError
 from d2rpick.choice.answers import suggest, suggest_at
 from d2rpick.choice.of_run import read
 from d2rpick.choice.situation import Settings, examine
@@ -74,13 +73,6 @@ def test_a_given_oscillator_that_does_not_fit_is_not_believed() -> None:
     assert "the given oscillator does not describe the record" in sure(answer.situation.vibration.unknown)
     assert "the oscillator that was asked for does not describe the record at td" in answer.why_none
     assert any("the oscillator that was asked for" in note for c in answer.candidates for note in c.notes)
-
-
-def test_two_states_are_too_few_and_td_must_lie_in_the_record() -> None:
-    with pytest.raises(RangeError, match="at least 3"):
-        suggest(of(np.array([0.0, 1.0]), np.array([0.0, 1.0])), 0.5, PLAIN)
-    with pytest.raises(RangeError, match=r"outside the record, 0 to 0\.15"):
-        suggest(paper.history(), 0.2, PLAIN)
 
 
 @pytest.mark.slow

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.base.errors import RangeError
 from d2rpick.choice.answers import suggest, suggest_at
 from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.expectation import expectation, shortfall
@@ -22,7 +21,7 @@ from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import history_of, simulate
 from d2rpick.report.suggestion import outlook
 from tests import paper
-from tests.command import ENERGY, ROLLOVER, answer, refused, run
+from tests.command import ENERGY, ROLLOVER, answer, run
 from tests.computed import results, stored
 from tests.counted_fits import CountedFits
 from tests.energies import of, sure
@@ -139,12 +138,6 @@ def test_a_known_oscillator_expects_nothing_of_the_energy_alone() -> None:
     assert suggest(paper.history(), paper.TD, PLAIN).expected is None
 
 
-@pytest.mark.parametrize("window", [(0.06, 0.2), (-1.0, 0.07)])
-def test_a_window_outside_the_record_is_refused(window: tuple[float, float]) -> None:
-    with pytest.raises(RangeError, match="outside the record"):
-        suggest_in_window(paper.history(), window, PLAIN)
-
-
 def test_a_window_that_reaches_over_the_next_contact_ends_there() -> None:
     found = suggest_in_window(rollover(), (0.36, 0.43), PLAIN)
     assert found.situation.flight.end == pytest.approx(0.3819, abs=1e-3)
@@ -235,19 +228,6 @@ def test_value_prints_both_times_with_one_blank() -> None:
     found = answer("suggest", "--td-window", "0.06", "0.07", ENERGY)
     assert {"tr": float(tr), "td": float(td)} == found["recommended"]
     assert (result.exit_code, found["td"], found["td_window"]) == (0, float(td), [0.06, 0.07])
-
-
-@pytest.mark.parametrize(
-    ("args", "message"),
-    [
-        (["--td", "0.06", "--td-window", "0.06", "0.07", ENERGY], "--td and --td-window exclude each other"),
-        (["--td-window", "0.07", "0.06", ENERGY], "--td-window 0.07 0.06 is empty"),
-        (["--td", "0.06", "--step-ratio", "2", ENERGY], "--step-ratio needs --cost-share"),
-        (["--td", "0.06", "--cost-share", "2", ENERGY], "at most 1"),
-    ],
-)
-def test_a_td_that_cannot_be_chosen_is_explained(args: list[str], message: str) -> None:
-    assert message in refused("suggest", *args)
 
 
 def test_the_expected_run_time_is_told_by_suggest_and_verify() -> None:

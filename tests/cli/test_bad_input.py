@@ -10,10 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, answer, codes, refused, run
+from tests.command import BOX, DECK, ENERGY, GLSTAT, MATSUM, OSCILLATOR, ROLLOVER, answer, codes, put, refused, run
+from tests.computed import stored
 from tests.json_schemas import check_by_schema
+from tests.sample_deck import DECK as SAMPLE
 
 HEAD = "time,internal_energy\n"
+CAR = stored("carT01.gz")
 
 
 def table(energy: Callable[[float], float], states: int = 101) -> bytes:
@@ -177,6 +180,85 @@ def test_a_usage_that_makes_no_sense_is_explained_in_one_line(line: str, parts: 
 
 
 @pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        (f"explore --td-window 0.07 0.06 {ENERGY}", "the lower time first"),
+        (f"explore --td-window 1 2 {ENERGY}", "outside the record"),
+        (f"explore --td 9 {ENERGY}", "outside the record"),
+        (f"explore --steps 0 {ENERGY}", "--steps"),
+        (f"plan --all {ENERGY}", "--all belongs to -f value, -f card and --write-deck"),
+        (f"plan --before {BOX} {BOX}", "name its windows with --done"),
+        (f"plan -f card {ENERGY}", "needs --part"),
+        (f"plan --node 3 {ENERGY}", "is about the card"),
+        (f"plan --done nowhere.txt {BOX}", "nowhere.txt: no such file; check the name and the folder"),
+        (f"plan --min-rigid -1 {BOX}", "at least 0"),
+        (f"parts --tr 0.1 {MATSUM}", "--tr needs --td"),
+        (f"parts --tr 0.3 --td 0.1 {MATSUM}", "tr must lie before td"),
+        (f"parts --weights site.toml {MATSUM}", "--weights needs --deck"),
+        (f"parts --deck absent.k {MATSUM}", "absent.k"),
+        (f"parts --deck {MATSUM} {MATSUM}", "no keyword was found"),
+        (f"parts --energy 1 {MATSUM}", "--energy names one energy"),
+        (f"parts --part 77 --deck {SAMPLE} {MATSUM}", "no part 77"),
+        (f"parts --part recommended --deck {SAMPLE} {MATSUM}", "name a set that it is compared with"),
+        (f"parts --weights {SAMPLE} --deck {SAMPLE} {MATSUM}", "TOML file of weights was expected"),
+        ("card --part 1 --tr 0.09 --td 0.02", "0 <= tr < td was expected"),
+        ("card --tr 0.01 --td 0.02", "needs --part"),
+        ("card --part 1 --td 0.02", "a card needs --tr"),
+        ("card --part 1 --tr 0.02 --td 0.09 --tr 0.2", "2 --tr and 1 --td"),
+        ("card --part 1 --tr 0.02 --td 0.09 --windows w.txt", "--windows excludes"),
+        ("card --part 1 --windows absent.txt", "absent.txt"),
+        ("card --part 1 --tr 0.02 --td 0.09 --tr 0.05 --td 0.2", "overlaps"),
+        ("card --part 1 --tr 0.2 --td 0.3 --tr 0.05 --td 0.09", "lies before"),
+        ("card --part door --tr 0.01 --td 0.02", "titles need a --history"),
+        ("card --part 1-99999999 --tr 0.01 --td 0.02", "is not a range"),
+        ("card --part 9-3 --tr 0.01 --td 0.02", "is not a range"),
+        ("card --part 0 --tr 0.01 --td 0.02", "does not fit"),
+        ("card --part 1 --node 3 --tr 0.01 --td 0.02", "--node is an option of --solver radioss"),
+        ("card --solver radioss --part 1 --tr 0.01 --td 0.02", "needs --node"),
+        ("card --solver radioss --node 1 --tr 0.01 --td 0.02", "needs --end"),
+        ("card --solver radioss --node 1 --end 0.015 --tr 0.01 --td 0.02", "the run ends at 0.015"),
+        (
+            "card --solver radioss --node 1 --merge 1 --end 1 --tr 0.01 --td 0.02",
+            "--merge is an option of --solver ls-dyna",
+        ),
+        ("card --solver radioss --part 7 --node 1 --end 1 --tr 0.01 --td 0.02", "give a --history with parts"),
+        (
+            f"card --solver radioss --part 7 --node 1 --tr 0.01 --td 0.02 --history {ENERGY}",
+            "give a --history with parts",
+        ),
+        ("card --solver radioss --node 1 --end 1 --name a/b --tr 0.01 --td 0.02", "the name of the run is 'a/b'"),
+        ("card --solver radioss --node 1 --end 1 --name '' --tr 0.01 --td 0.02", "the name of the run is ''"),
+        ("card --part 1 --swset 5 5 --tr 0.01 --td 0.02", "both switch sets are 5"),
+        ("card --part 1 --margin 0 --tr 0.01 --td 0.02", "--margin needs an energy history"),
+        ("card --part 1 --tolerance 0.3 --tr 0.01 --td 0.02", "--tolerance needs an energy history"),
+        ("card --part 1 -F csv --tr 0.01 --td 0.02", "--input-format needs an energy history"),
+        ("card --part 1 --after 0.01 --tr 0.01 --td 0.02", "give one with --history"),
+        (f"card --part 1 --tr 0.01 --td 7 --history {ENERGY}", "lies outside the record"),
+        (f"check {DECK} --select D2R10l", "did you mean D2R1"),
+        (f"check {DECK} --ignore D2R999", "no rule 'D2R999'"),
+        (f"check {DECK} --after 0.03", "give one with --history"),
+        (f"check {DECK} --energy boxIE_J", "give one with --history"),
+        (f"check {DECK} --history absent.csv", "absent.csv"),
+        (f"check {DECK} --history {ENERGY} --after 7", "--after 7 lies outside the record"),
+        (f"check {DECK} --fail-on info", "info"),
+        (f"check {DECK} -f toml", "toml"),
+        (f"follow --once --wait 0.002 {CAR}", "--wait 0.002 is below"),
+        (f"follow --once {GLSTAT}", "neither a momentum nor the energy of contacts"),
+        (f"follow --once --for 3 {CAR}", "--once and --for exclude each other"),
+        (f"follow --once --wait 0 {CAR}", "--wait"),
+        (f"follow --once --part nobody {CAR}", "nobody"),
+        (f"follow --once --deck /nowhere.rad {CAR}", "/nowhere.rad"),
+        (f"suggest --td-window 0.07 0.06 {ENERGY}", "--td-window 0.07 0.06 is empty"),
+        (f"suggest --td 0.06 --step-ratio 2 {ENERGY}", "--step-ratio needs --cost-share"),
+        (f"suggest --td 0.06 --cost-share 2 {ENERGY}", "at most 1"),
+    ],
+)
+@pytest.mark.usefixtures("here")
+def test_what_a_command_cannot_do_is_told_in_one_line(line: str, told: str) -> None:
+    assert told in refused(*shlex.split(line))
+
+
+@pytest.mark.parametrize(
     ("line", "code"),
     [
         ("suggest --td 0.064 --margin 1e308", 1),
@@ -230,8 +312,7 @@ def test_a_record_without_an_answer_is_an_objection_and_says_why(case: str) -> N
 
 @pytest.mark.slow
 def test_where_nothing_flies_a_td_is_asked_for_and_a_plan_is_an_objection(tmp_path: Path) -> None:
-    file = tmp_path / "input"
-    file.write_bytes(table(lambda t: t * t))
+    file = put(tmp_path / "input", table(lambda t: t * t))
     for command in ("suggest", "explore"):
         assert "shows a flight, in which td could be chosen; give --td, and the end of the load as --after" in refused(
             command, str(file)
@@ -249,8 +330,7 @@ def test_a_td_behind_the_next_contact_is_an_objection(tmp_path: Path) -> None:
     lines = Path(ENERGY).read_text().splitlines()
     rows = [line.split(",") for line in lines[1:]]
     hit = [f"{t},{float(e) + max(0.0, float(t) - 0.1) * 1e4!r}" for t, *_, e, _ in rows]
-    file = tmp_path / "hit.csv"
-    file.write_text("\n".join([HEAD.strip(), *hit, ""]))
+    file = put(tmp_path / "hit.csv", "\n".join([HEAD.strip(), *hit, ""]))
     found = answer("suggest", "--td", "0.09", "--margin", "0.02", str(file))
     assert found["flight"]["end"] == pytest.approx(0.1, abs=1e-3)
     assert found["recommended"] is None
@@ -260,8 +340,7 @@ def test_a_td_behind_the_next_contact_is_an_objection(tmp_path: Path) -> None:
 
 
 def test_of_a_time_behind_a_cut_the_cut_is_said_before_a_unit(tmp_path: Path) -> None:
-    file = tmp_path / "glstat"
-    file.write_bytes(Path(GLSTAT).read_bytes()[:100_000])
+    file = put(tmp_path / "glstat", Path(GLSTAT).read_bytes()[:100_000])
     said = run("suggest", "--td", "64", str(file)).stderr
     assert re.search(r"outside the record, 0 to [\d.]+, where the file is cut", said)
     assert "meant" not in said or said.index("cut") < said.index("meant")

@@ -16,7 +16,7 @@ GOOD = ("--tr", "0.0135867", "--td", "0.0687534")
 OPPOSITE = ("--tr", "0.0122659", "--td", "0.064")
 
 
-pytestmark = pytest.mark.usefixtures("here")
+pytestmark = pytest.mark.usefixtures("here", "by_level")
 
 
 def pasted(result: Result) -> list[tuple[int, float, float]]:
@@ -128,42 +128,6 @@ def test_what_a_real_solver_does_at_the_switches_is_told(solver: str) -> None:
     told = comments(run("card", "--solver", *shlex.split(solver), *GOOD).stdout)
     for what in ("first step at or after", "co-rotating", "vibration is lost", "a switched run"):
         assert what in told
-
-
-@pytest.mark.parametrize(
-    ("line", "message"),
-    [
-        ("--part 1 --tr 0.09 --td 0.02", "0 <= tr < td was expected"),
-        ("--tr 0.01 --td 0.02", "needs --part"),
-        ("--part 1 --td 0.02", "a card needs --tr"),
-        ("--part 1 --tr 0.02 --td 0.09 --tr 0.2", "2 --tr and 1 --td"),
-        ("--part 1 --tr 0.02 --td 0.09 --windows w.txt", "--windows excludes"),
-        ("--part 1 --windows absent.txt", "absent.txt"),
-        ("--part 1 --tr 0.02 --td 0.09 --tr 0.05 --td 0.2", "overlaps"),
-        ("--part 1 --tr 0.2 --td 0.3 --tr 0.05 --td 0.09", "lies before"),
-        ("--part door --tr 0.01 --td 0.02", "titles need a --history"),
-        ("--part 1-99999999 --tr 0.01 --td 0.02", "is not a range"),
-        ("--part 9-3 --tr 0.01 --td 0.02", "is not a range"),
-        ("--part 0 --tr 0.01 --td 0.02", "does not fit"),
-        ("--part 1 --node 3 --tr 0.01 --td 0.02", "--node is an option of --solver radioss"),
-        ("--solver radioss --part 1 --tr 0.01 --td 0.02", "needs --node"),
-        ("--solver radioss --node 1 --tr 0.01 --td 0.02", "needs --end"),
-        ("--solver radioss --node 1 --end 0.015 --tr 0.01 --td 0.02", "the run ends at 0.015"),
-        ("--solver radioss --node 1 --merge 1 --end 1 --tr 0.01 --td 0.02", "--merge is an option of --solver ls-dyna"),
-        ("--solver radioss --part 7 --node 1 --end 1 --tr 0.01 --td 0.02", "give a --history with parts"),
-        (f"--solver radioss --part 7 --node 1 --tr 0.01 --td 0.02 --history {ENERGY}", "give a --history with parts"),
-        ("--solver radioss --node 1 --end 1 --name a/b --tr 0.01 --td 0.02", "the name of the run is 'a/b'"),
-        ("--solver radioss --node 1 --end 1 --name '' --tr 0.01 --td 0.02", "the name of the run is ''"),
-        ("--part 1 --swset 5 5 --tr 0.01 --td 0.02", "both switch sets are 5"),
-        ("--part 1 --margin 0 --tr 0.01 --td 0.02", "--margin needs an energy history"),
-        ("--part 1 --tolerance 0.3 --tr 0.01 --td 0.02", "--tolerance needs an energy history"),
-        ("--part 1 -F csv --tr 0.01 --td 0.02", "--input-format needs an energy history"),
-        ("--part 1 --after 0.01 --tr 0.01 --td 0.02", "give one with --history"),
-        (f"--part 1 --tr 0.01 --td 7 --history {ENERGY}", "lies outside the record"),
-    ],
-)
-def test_what_is_no_card_says_why(line: str, message: str) -> None:
-    assert message in refused("card", *shlex.split(line))
 
 
 # suggest -f card.

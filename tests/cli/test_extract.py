@@ -13,7 +13,7 @@ from d2rpick.base.errors import FormatError
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection, format_of, open_run, write_table
 from tests.command import BOX as ROLLOVER_T01
-from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, ROOT, answer, refused, replayed, run
+from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, ROOT, answer, put, refused, replayed, run
 from tests.reading import read_history
 
 SUFFIXES = ["csv", "h5", "hdf5"]
@@ -62,8 +62,7 @@ def test_any_numbers_read_back_bit_for_bit(
 ) -> None:
     columns = {"time": np.sort(times) + 0.0, "internal_energy": np.array(energy[: len(times)]) + 0.0}
     for name, form in {"any.csv": "csv", "any.h5": "hdf5"}.items():
-        file = tmp_path_factory.mktemp("any") / name
-        file.write_bytes(write_table(form, columns))
+        file = put(tmp_path_factory.mktemp("any") / name, write_table(form, columns))
         again = read_history([str(file)])
         assert again.time.tobytes() == columns["time"].tobytes()
         assert again.energy.tobytes() == columns["internal_energy"].tobytes()
@@ -159,8 +158,7 @@ UNUSUAL = "time,IE,E2,M1,M2,M3\n" + "".join(f"{i},{i % 3},{i},1,2,{-i}\n" for i 
 
 
 def test_a_channel_of_an_unusual_name_is_named(tmp_path: Path) -> None:
-    file = tmp_path / "unusual.csv"
-    file.write_text(UNUSUAL)
+    file = put(tmp_path / "unusual.csv", UNUSUAL)
     named = [f"--channel={axis}_momentum=M{number}" for number, axis in enumerate("xyz", 1)]
     text = run("extract", *named, "--channel", "kinetic-energy=3", str(file)).stdout
     assert text.startswith(
@@ -178,15 +176,13 @@ def test_a_channel_of_an_unusual_name_is_named(tmp_path: Path) -> None:
     ],
 )
 def test_a_channel_that_is_none_is_refused(given: tuple[str, ...], reason: str, tmp_path: Path) -> None:
-    file = tmp_path / "unusual.csv"
-    file.write_text(UNUSUAL)
+    file = put(tmp_path / "unusual.csv", UNUSUAL)
     assert reason in refused("info", *(f"--channel={one}" for one in given), str(file))
 
 
 @pytest.mark.slow
 def test_without_a_file_csv_goes_to_standard_output_and_notes_do_not(tmp_path: Path) -> None:
-    file = tmp_path / "matsum"
-    file.write_bytes(replayed("matsum"))
+    file = put(tmp_path / "matsum", replayed("matsum"))
     result = run("extract", str(file))
     assert result.stdout.startswith("time,internal_energy,x_momentum,y_momentum,z_momentum,mass\n0.0,0.0,")
     assert "the energies of all parts were added" in result.stderr
@@ -210,8 +206,7 @@ def test_a_name_that_tells_no_format_is_refused_before_anything_is_read(name: st
 
 
 def test_an_existing_file_and_an_input_are_kept(tmp_path: Path) -> None:
-    file = tmp_path / "energy.csv"
-    file.write_bytes(Path(ENERGY).read_bytes())
+    file = put(tmp_path / "energy.csv", Path(ENERGY).read_bytes())
     assert run("extract", ENERGY, "-o", str(file)).exit_code == 2
     assert run("extract", str(file), "-o", str(file), "--overwrite").exit_code == 2
     assert file.read_bytes() == Path(ENERGY).read_bytes()
@@ -239,8 +234,7 @@ def test_a_replayed_hdf5_holds_the_numbers_of_the_csv(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("switches", [(), ("--tr", "0.0135867", "--td", "0.0687534")])
 def test_a_replayed_matsum_holds_the_motion_to_five_digits(switches: tuple[str, ...], tmp_path: Path) -> None:
-    file = tmp_path / "matsum"
-    file.write_bytes(replayed("matsum", *switches))
+    file = put(tmp_path / "matsum", replayed("matsum", *switches))
     opened = open_run([str(file)])
     table = np.genfromtxt(io.BytesIO(replayed("csv", *switches)), delimiter=",", names=True)
     ids = [part.id for part in opened.parts]
@@ -254,8 +248,7 @@ def test_a_replayed_matsum_holds_the_motion_to_five_digits(switches: tuple[str, 
 
 
 def test_suggest_gives_the_same_pair_on_a_replayed_matsum(tmp_path: Path) -> None:
-    file = tmp_path / "matsum"
-    file.write_bytes(replayed("matsum"))
+    file = put(tmp_path / "matsum", replayed("matsum"))
     found, expected = answer("suggest", "--td", "0.064", "--part", "spring", str(file)), answer(
         "suggest", "--td", "0.064", ENERGY
     )  # fmt: skip

@@ -1,20 +1,15 @@
 """The command ``follow``: lines, ndjson, exit codes, an end that is quiet."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import os
 import signal
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 import d2rpick as d2
-from tests.command import BOX, GLSTAT, ROOT, refused, run, started
-
-if TYPE_CHECKING:
-    from pathlib import Path
+from tests.command import BOX, ROOT, run, started
 
 CAR = str(ROOT / "tests/data/carT01.gz")
 
@@ -43,21 +38,6 @@ def test_a_run_that_flies_exits_with_0(tmp_path: Path) -> None:
     rigid = gzip.decompress((ROOT / "tests/data/drop2_w123_T01.gz").read_bytes())
     (tmp_path / "carT01").write_bytes(rigid[: len(rigid) // 2])
     assert run("follow", "--once", str(tmp_path)).exit_code == 0
-
-
-@pytest.mark.parametrize(
-    ("args", "said"),
-    [
-        (("--once", "--wait", "0.002", CAR), "--wait 0.002 is below"),
-        (("--once", GLSTAT), "neither a momentum nor the energy of contacts"),
-        (("--once", "--for", "3", CAR), "--once and --for exclude each other"),
-        (("--once", "--wait", "0", CAR), "--wait"),
-        (("--once", "--part", "nobody", CAR), "nobody"),
-        (("--once", "--deck", "/nowhere.rad", CAR), "/nowhere.rad"),
-    ],
-)
-def test_what_cannot_be_followed_is_one_line(args: tuple[str, ...], said: str) -> None:
-    assert said in refused("follow", *args)
 
 
 def test_an_interrupt_ends_it_quietly(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 import pytest
 
-from tests.command import ENERGY, GLSTAT, ROOT, TIME_LIMIT, refused, run, started
+from tests.command import ENERGY, GLSTAT, ROOT, TIME_LIMIT, put, refused, run, started
 from tests.made_binout import binout as made_binout
 from tests.made_t01 import t01, value
 from tests.text_files import glstat_text, matsum_text
@@ -107,8 +107,7 @@ def test_a_study_without_a_finished_run_leaves_no_ledger(tmp_path: Path, args: t
 
 
 def test_what_is_packed_beyond_the_memory_ends_in_one_line(tmp_path: Path) -> None:
-    packed = tmp_path / "zeros.gz"
-    packed.write_bytes(50 * gzip.compress(bytes(1 << 24)))
+    packed = put(tmp_path / "zeros.gz", 50 * gzip.compress(bytes(1 << 24)))
     message = one_line(child('ulimit -v 700000; D2RPICK_MAX_RATIO=2e3 d2rpick info "$1"', packed))
     assert "zeros.gz: its unpacked data do not fit into memory" in message
 

@@ -11,7 +11,7 @@ from d2rpick.choice.warnings import cautions_of
 from d2rpick.histories.history import EXACT, Given, History, Momenta
 from d2rpick.histories.names import Part
 from tests.command import BOX as ROLLOVER_T01
-from tests.command import answer, codes, replayed, run
+from tests.command import answer, codes, put, replayed, run
 from tests.json_schemas import check_by_schema
 from tests.records import ENERGY, TIME
 
@@ -96,8 +96,7 @@ def test_parts_that_are_not_there_are_named_with_those_that_are(options: tuple[s
 
 
 def test_a_part_without_energy_is_named(tmp_path: Path) -> None:
-    file = tmp_path / "matsum"
-    file.write_bytes(replayed("matsum"))
+    file = put(tmp_path / "matsum", replayed("matsum"))
     found = answer("suggest", "--td", "0.064", "--part", "1,3", str(file))
     (note,) = found["history"]["notes"]
     assert "frame" in note
@@ -120,8 +119,7 @@ def test_an_oscillator_does_not_overrule_a_momentum_that_shows_no_flight() -> No
 
 
 def test_where_nothing_can_be_chosen_the_table_says_so(tmp_path: Path) -> None:
-    file = tmp_path / "matsum"
-    file.write_bytes(replayed("matsum"))
+    file = put(tmp_path / "matsum", replayed("matsum"))
     result = run("suggest", "--td", "0.064", "--part", "frame", str(file))
     assert result.exit_code == 1
     reason = "before td = 0.064 the energy neither passes its level 0 nor peaks near it"

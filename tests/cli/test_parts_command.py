@@ -11,7 +11,7 @@ import d2rpick as d2
 from d2rpick.report.formats import Shown
 from d2rpick.report.parts import COLUMNS, SET_COLUMNS
 from tests.choice.test_calibration import run_folder
-from tests.command import ROOT, answer, refused, run
+from tests.command import ROOT, answer, put, refused, run
 from tests.json_schemas import check_by_schema
 from tests.sample_deck import DECK
 
@@ -86,35 +86,16 @@ def test_the_page_holds_parts_and_sets(tmp_path: Path) -> None:
     assert "http" not in text.replace("http-equiv", "")
 
 
-@pytest.mark.parametrize(
-    ("args", "told"),
-    [
-        (("--tr", "0.1", BOX), "--tr needs --td"),
-        (("--tr", "0.3", "--td", "0.1", BOX), "tr must lie before td"),
-        (("--weights", "site.toml", BOX), "--weights needs --deck"),
-        (("--deck", "absent.k", BOX), "absent.k"),
-        (("--deck", BOX, BOX), "no keyword was found"),
-        (("--energy", "1", BOX), "--energy names one energy"),
-        (("--part", "77", *WITH_DECK), "no part 77"),
-        (("--part", "recommended", *WITH_DECK), "name a set that it is compared with"),
-        (("--weights", str(DECK), *WITH_DECK), "TOML file of weights was expected"),
-    ],
-)
-def test_wrong_use_is_said_in_one_line(args: tuple[str, ...], told: str) -> None:
-    assert told in refused("parts", *args)
-
-
 def test_where_nothing_can_be_recommended_the_answer_is_an_objection(tmp_path: Path) -> None:
-    other = tmp_path / "main.k"
-    other.write_text(
-        DECK.read_text("utf-8").replace("         1         2       1.0", "         1        99       1.0")
+    other = put(
+        tmp_path / "main.k",
+        DECK.read_text("utf-8").replace("         1         2       1.0", "         1        99       1.0"),
     )
     result = run("parts", "--deck", str(other), BOX)
     assert result.exit_code == 1
     assert "no weight is known for shell (ELFORM 99)" in result.stdout
     assert run("parts", "--exit-zero", "--deck", str(other), BOX).exit_code == 0
-    weights = tmp_path / "site.toml"
-    weights.write_text('[per_element]\n"shell (ELFORM 99)" = 1.0\nQBAT = 1.0\nBT = 1.0\n')
+    weights = put(tmp_path / "site.toml", '[per_element]\n"shell (ELFORM 99)" = 1.0\nQBAT = 1.0\nBT = 1.0\n')
     assert run("parts", "--deck", str(other), "--weights", str(weights), BOX).exit_code == 0
 
 
@@ -140,8 +121,7 @@ def test_a_deck_takes_the_place_of_a_cost_share(command: tuple[str, ...]) -> Non
 
 @pytest.mark.parametrize("command", ["parts", "plan", "suggest"])
 def test_a_deck_is_never_written_over(tmp_path: Path, command: str) -> None:
-    own = tmp_path / "main.k"
-    own.write_bytes(DECK.read_bytes())
+    own = put(tmp_path / "main.k", DECK.read_bytes())
     assert "this is an input" in refused(command, "--part", "1", "--deck", str(own), "-o", str(own), "--overwrite", BOX)
     assert own.read_bytes() == DECK.read_bytes()
 
@@ -154,8 +134,7 @@ def test_recommended_needs_a_deck_and_stands_alone() -> None:
 
 
 def test_a_cost_that_is_not_known_is_a_warning(tmp_path: Path) -> None:
-    cut = tmp_path / "main.k"
-    cut.write_text(DECK.read_text("utf-8").replace("*END", "*INCLUDE\nabsent.k\n*END"))
+    cut = put(tmp_path / "main.k", DECK.read_text("utf-8").replace("*END", "*INCLUDE\nabsent.k\n*END"))
     found = answer("plan", "--part", "1,2", "--deck", str(cut), BOX)
     check_by_schema(found)
     assert found["run_time_share"] is None
@@ -194,8 +173,7 @@ def test_what_is_doubtful_in_a_deck_is_said_wherever_it_counts(asked: tuple[str,
         return {one["code"] for one in answer(*asked, *part, *args)["warnings"]}
 
     assert codes(*WITH_DECK) >= {"weights-by-analogy"}
-    deck = tmp_path / "main.k"
-    deck.write_text(DECK.read_text("utf-8").replace("*END", "*ELEMENT_GENERALIZED_SHELL\n*END"))
+    deck = put(tmp_path / "main.k", DECK.read_text("utf-8").replace("*END", "*ELEMENT_GENERALIZED_SHELL\n*END"))
     doubts = codes("--deck", str(deck), BOX)
     assert "deck-not-followed" in doubts
     if asked[0] != "parts":

@@ -7,11 +7,12 @@ import pytest
 
 import d2rpick as d2
 from d2rpick.report.formats import Shown
-from tests.command import BOX, ENERGY, answer, refused, run
+from tests.command import ENERGY, answer, put, refused, run
 from tests.computed import starter, stored
 from tests.drops import drop, written
 from tests.json_schemas import check_by_schema
 
+pytestmark = pytest.mark.slow
 FINE = 4e-4  # [s] between two states, which tells a landing that comes a little later
 PART = ("--part", "box", "--no-verify")  # no oscillator describes it, and none is sought
 
@@ -21,7 +22,6 @@ def history(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
     return written(drop(interval=FINE), tmp_path_factory.mktemp("run"))
 
 
-@pytest.mark.slow
 def test_all_forms_hold_the_same_windows(history: list[str]) -> None:
     plan = d2.plan(d2.read(history), parts="box", replay=False)
     found = plan.to_dict()
@@ -53,7 +53,6 @@ def csv_rows(text: str) -> list[dict[str, object]]:
     ]
 
 
-@pytest.mark.slow
 def test_a_poor_window_is_called_poor() -> None:
     """A level that matches is not all: most of the vibration may be kinetic at td."""
     box = stored("drop2T01.gz")
@@ -86,7 +85,6 @@ def test_radioss_gets_a_leg_for_each_switch(history: list[str]) -> None:
     assert card.count("/RBODY/OFF") >= len(lines)
 
 
-@pytest.mark.slow
 def test_pictures_and_pages_are_written(history: list[str], tmp_path: Path) -> None:
     plot, page = tmp_path / "plan.svg", tmp_path / "plan.html"
     assert run("plan", "-q", *PART, "--plot", str(plot), "--report", str(page), *history).exit_code == 0
@@ -101,21 +99,6 @@ def test_nothing_to_recommend_is_an_objection(history: list[str]) -> None:
     assert run("plan", "-q", "--min-rigid", "5", "--exit-zero", *PART, *history).exit_code == 0
 
 
-@pytest.mark.parametrize(
-    ("args", "message"),
-    [
-        (("--all", ENERGY), "--all belongs to -f value, -f card and --write-deck"),
-        (("--before", BOX, BOX), "name its windows with --done"),
-        (("-f", "card", ENERGY), "needs --part"),
-        (("--node", "3", ENERGY), "is about the card"),
-        (("--done", "nowhere.txt", BOX), "nowhere.txt: no such file; check the name and the folder"),
-        (("--min-rigid", "-1", BOX), "at least 0"),
-    ],
-)
-def test_what_makes_no_sense_is_refused(args: tuple[str, ...], message: str) -> None:
-    assert message in refused("plan", *args)
-
-
 def test_one_oscillator_is_one_flight() -> None:
     found = answer("plan", ENERGY)
     (row,) = found["windows"]
@@ -123,7 +106,6 @@ def test_one_oscillator_is_one_flight() -> None:
     assert row["residual"] < 1e-3
 
 
-@pytest.mark.slow
 def test_where_nothing_vibrates_no_level_is_held_against_another() -> None:
     file = stored("drop2T01.gz")
     asked = ("--part", "flying", "--tr", "0", "--td", "0.27")
@@ -136,7 +118,6 @@ def test_where_nothing_vibrates_no_level_is_held_against_another() -> None:
     assert "evel error" not in card
 
 
-@pytest.mark.slow
 def test_the_next_window_is_planned_from_the_switched_run(history: list[str], tmp_path: Path) -> None:
     done = tmp_path / "switches.txt"
     run("plan", "-q", "-f", "value", *PART, "-o", str(done), *history)
@@ -157,7 +138,6 @@ def test_the_next_window_is_planned_from_the_switched_run(history: list[str], tm
     assert "said to be done" in refused("plan", "-q", *PART, "--done", str(done), *history)
 
 
-@pytest.mark.slow
 def test_the_cards_of_the_next_run_hold_the_windows_that_are_done(history: list[str], tmp_path: Path) -> None:
     """It is computed from the start; what is done cannot be judged by a run that was rigid there."""
     done, main, folder = tmp_path / "done.txt", tmp_path / "main.k", tmp_path / "next"
@@ -181,12 +161,10 @@ def test_the_cards_of_the_next_run_hold_the_windows_that_are_done(history: list[
     assert (nothing.exit_code, nothing.stdout) == (1, "")
 
 
-@pytest.mark.slow
 def test_a_radioss_run_gets_its_starter_and_a_leg_for_each_switch(tmp_path: Path) -> None:
     """Of the falling box; its first fall is free, so that the run itself stands for one that is switched there."""
     name, node = "DROP2", "535"
-    deck = tmp_path / f"{name}_0000.rad"
-    deck.write_bytes(starter("DROP2"))
+    deck = put(tmp_path / f"{name}_0000.rad", starter("DROP2"))
     engine = f"/RUN/{name}/1\n0.7\n/VERS/2022\n/DT\n0.9 0.0\n/RBODY/OFF\n{node}\n/TFILE/4\n0.0002\n"
     (tmp_path / f"{name}_0001.rad").write_text(engine)
     history, done = stored("drop2T01.gz"), tmp_path / "done.txt"
@@ -228,7 +206,6 @@ step
 """
 
 
-@pytest.mark.slow
 def test_a_copy_of_the_deck_holds_the_cards_and_passes_the_check(history: list[str], tmp_path: Path) -> None:
     main, folder = tmp_path / "main.k", tmp_path / "next"
     main.write_text(DECK)

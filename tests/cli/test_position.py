@@ -12,12 +12,12 @@ from d2rpick.api.request import Request
 from d2rpick.choice.situation import Settings
 from d2rpick.histories.names import Selection
 from d2rpick.report.formats import Shown
-from tests.command import answer, run, unwrapped
+from tests.command import answer, put, run, unwrapped
 from tests.computed import starter, stored
 from tests.json_schemas import check_by_schema
 from tests.sample_deck import DECK
 
-pytestmark = pytest.mark.usefixtures("by_level")
+pytestmark = [pytest.mark.usefixtures("by_level"), pytest.mark.slow]
 
 ONE_BODY = "the parts become one rigid body"
 
@@ -26,10 +26,8 @@ def car() -> str:
     return stored("carT01.gz")
 
 
-@pytest.mark.slow
 def test_the_deck_tells_which_parts_are_springs_where_energies_do_not(tmp_path: Path) -> None:
-    deck = tmp_path / "CAR_0000.rad"
-    deck.write_bytes(starter("CAR"))
+    deck = put(tmp_path / "CAR_0000.rad", starter("CAR"))
     model = model_of(Request(deck=str(deck)))
     silent: Any = SimpleNamespace(springs=(), parts=())
     assert model is not None
@@ -39,7 +37,6 @@ def test_the_deck_tells_which_parts_are_springs_where_energies_do_not(tmp_path: 
     assert alone["history"]["channel"] == told["history"]["channel"] == "internal energy of engine, battery, wheels"
 
 
-@pytest.mark.slow
 def test_suggest_gives_it_for_every_candidate_and_says_it() -> None:
     chosen = d2.suggest(d2.read(car()), 0.1464, parts="1-17", replay=False)
     found = chosen.to_dict()
@@ -61,7 +58,6 @@ def test_suggest_gives_it_for_every_candidate_and_says_it() -> None:
     assert "engine,,the parts become one rigid body" in first
 
 
-@pytest.mark.slow
 def test_verify_warns_where_it_is_large() -> None:
     found = answer("verify", "--tr", "0.0826", "--td", "0.1464", "--part", "1-17", car())
     check_by_schema(found)
@@ -75,7 +71,6 @@ def test_verify_warns_where_it_is_large() -> None:
     assert (alone["position_error"], alone["position_error_part"]) == (None, None)
 
 
-@pytest.mark.slow
 def test_plan_gives_it_for_every_window() -> None:
     found = answer("plan", "--part", "1-17", car())
     check_by_schema(found)
@@ -89,12 +84,10 @@ def test_plan_gives_it_for_every_window() -> None:
 
 @pytest.fixture(scope="module")
 def deck(tmp_path_factory: pytest.TempPathFactory) -> str:
-    file = tmp_path_factory.mktemp("car") / "CAR_0000.rad"
-    file.write_bytes(starter("CAR"))
+    file = put(tmp_path_factory.mktemp("car") / "CAR_0000.rad", starter("CAR"))
     return str(file)
 
 
-@pytest.mark.slow
 def test_of_several_bodies_each_counts_for_itself(deck: str) -> None:
     asked = ("verify", "--tr", "0.0496", "--td", "0.1464", "--part", "12-14", car())
     taken = answer(*asked)
@@ -135,7 +128,6 @@ def test_the_deck_of_another_model_leaves_the_run_time_open() -> None:
     )
 
 
-@pytest.mark.slow
 def test_a_deck_that_does_not_tell_leaves_the_assumption_without_asking_for_a_deck() -> None:
     asked = ("--td", "0.1464", "--no-verify", "--part", "12-14", "--deck", str(DECK), car())
     found = answer("suggest", *asked)
@@ -145,7 +137,6 @@ def test_a_deck_that_does_not_tell_leaves_the_assumption_without_asking_for_a_de
     assert "at td if the parts become one rigid body: engine is frozen elsewhere" in told
 
 
-@pytest.mark.slow
 def test_a_lead_part_makes_one_body_with_a_deck_and_without(deck: str, tmp_path: Path) -> None:
     """What the card merges is the body whose error is given: engine, battery and wheels as one are 2 mm off."""
     page = ("--report", str(tmp_path / "page.html"), "--overwrite")
@@ -157,7 +148,6 @@ def test_a_lead_part_makes_one_body_with_a_deck_and_without(deck: str, tmp_path:
         assert best["position_error_assumes"] is None
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("lead", "known"), [("1", False), ("99", False), ("1", True)])
 def test_a_lead_part_does_not_tell_whether_the_part_hangs_together(tmp_path: Path, lead: str, known: bool) -> None:
     """Nor how a lead that is not among the parts moves against them."""
@@ -167,7 +157,6 @@ def test_a_lead_part_does_not_tell_whether_the_part_hangs_together(tmp_path: Pat
     assert {one["position_error"] for one in found["candidates"] if one["tr"] > 0.1} == {0.0 if known else None}
 
 
-@pytest.mark.slow
 def test_cards_merge_the_bodies_of_the_deck(deck: str) -> None:
     card = ("--no-verify", "-f", "card", "--solver", "ls-dyna")
     asked = ("suggest", "-q", "--td", "0.1464", *card, "--deck", deck, car())

@@ -16,7 +16,7 @@ from d2rpick.models.box_run import Outcome, RigidWindow, history_of, simulate
 from d2rpick.report import figures_models
 from d2rpick.report.formats import Shown, write
 from d2rpick.report.rollover import Scan
-from tests.command import answer, codes, refused, run
+from tests.command import codes, refused, run
 from tests.json_schemas import check_by_schema
 
 SMALL = ("--mesh", "4", "--dt", "5e-4")
@@ -41,14 +41,6 @@ def test_every_format_is_read_back_with_the_energies_of_the_run(name: str, tmp_p
     np.testing.assert_allclose(read["time"], table["time"], rtol=1e-4)
     step = 10.0 if name.endswith("glstat") else 1e-3  # the glstat has the energy of the step as well
     np.testing.assert_allclose(read["internal_energy"], table["internal_energy"], rtol=1e-3, atol=step)
-
-
-def test_the_parts_of_a_matsum_tell_when_they_fly(tmp_path: Path) -> None:
-    file = tmp_path / "run.matsum"
-    run("rollover", *SMALL, "-o", str(file))
-    (flight,) = answer("info", str(file))["flights"]
-    assert [part["title"] for part in flight["parts"]] == ["box", "step"]
-    assert flight["start"] == pytest.approx(0.086, abs=0.003)
 
 
 @pytest.mark.slow

@@ -1,16 +1,11 @@
 """Settings in a file: defaults of options, nearest to the working folder, and where answers name them."""
 
-from __future__ import annotations
-
 import json
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from tests.command import DECK, ENERGY, answer, run
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 ASKED = ("suggest", "--td", "0.064", ENERGY)
 

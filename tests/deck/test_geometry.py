@@ -12,6 +12,7 @@ from d2rpick.deck.geometry import Placement, masses_and_steps
 from d2rpick.deck.mesh import Elements
 from d2rpick.deck.model import Inventory
 from d2rpick.deck.radioss_run import read_run
+from tests.command import put
 from tests.computed import starter, stored
 from tests.deck import test_ls_dyna as dyna
 from tests.deck import test_radioss as rad
@@ -177,8 +178,7 @@ def test_a_starter_that_moves_its_nodes_places_no_part(tmp_path: Path) -> None:
 
 
 def test_the_car_lies_where_its_generator_put_it(tmp_path: Path) -> None:
-    deck = tmp_path / "CAR_0000.rad"
-    deck.write_bytes(starter("CAR"))
+    deck = put(tmp_path / "CAR_0000.rad", starter("CAR"))
     found = Placement(read_inventory(str(deck)))
     np.testing.assert_allclose(found.parts[12].centre, [0.6, 0.0, 0.375], atol=1e-9)  # the engine, 0.6 x 0.6 x 0.45
     np.testing.assert_allclose(found.parts[12].spread, np.diag([0.0281, 0.0281, 0.015]), atol=1e-4)

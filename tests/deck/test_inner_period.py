@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 from d2rpick.deck import read_inventory
 from d2rpick.deck.inner_period import inner_period
+from tests.command import put
 from tests.decks import wide
 from tests.sprung import DENSITY, cubes
 
 
 def period(folder: Path, deck: str) -> tuple[float, ...] | None:
-    name = folder / "box_0000.rad"
-    name.write_text(deck)
+    name = put(folder / "box_0000.rad", deck)
     found = inner_period(read_inventory(str(name)))
     return found and found[:2]
 

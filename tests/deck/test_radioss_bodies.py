@@ -12,6 +12,7 @@ from d2rpick.deck.radioss_bodies import Bodies, bodies_for
 from d2rpick.deck.radioss_run import Run, read_run, rigid_parts
 from d2rpick.deck.writing import write_deck
 from d2rpick.rules import check_deck
+from tests.command import put
 from tests.decks import wide
 
 REAL = 20
@@ -45,8 +46,7 @@ def starter(more: str = "", thickness: tuple[float, ...] = (1.0, 2.0, 1.0)) -> s
 def deck(folder: Path, more: str = "", engine: str = ENGINE) -> str:
     folder.mkdir(exist_ok=True)
     (folder / "box_0001.rad").write_text(engine)
-    main = folder / "box_0000.rad"
-    main.write_text(starter(more))
+    main = put(folder / "box_0000.rad", starter(more))
     return str(main)
 
 

@@ -10,6 +10,7 @@ from d2rpick.base.errors import DeckError
 from d2rpick.deck.radioss_run import find_run_windows, read_run, recognises, run_files
 from d2rpick.deck.radioss_sensors import sensor_cards
 from d2rpick.rules import RULES, check_deck
+from tests.command import put
 from tests.computed import stored
 from tests.decks import write
 
@@ -194,8 +195,7 @@ def test_files_of_a_run_are_found_by_name_or_by_what_they_hold(tmp_path: Path) -
     path = place(tmp_path)
     files = [str(tmp_path / f"box_000{n}.rad") for n in range(4)]
     assert run_files(path) == run_files(files[2]) == files
-    other = tmp_path / "starter.rad"
-    other.write_text(EXAMPLE.deck)
+    other = put(tmp_path / "starter.rad", EXAMPLE.deck)
     (tmp_path / "box_0000.rad").unlink()
     assert run_files(str(other)) == [str(other), *files[1:]]
     assert run_files(str(tmp_path)) == run_files("absent") == run_files("\0") == []

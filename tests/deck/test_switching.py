@@ -1,8 +1,6 @@
 """Parts, part sets and the windows they are rigid in."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
@@ -11,10 +9,7 @@ from d2rpick.deck.parts import element_cards, read_parts
 from d2rpick.rules.examples import PARTS, automatic
 from tests.decks import read, spans, wide, windows
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    Spans = list[tuple[int | None, float, float | None]]
+Spans = list[tuple[int | None, float, float | None]]
 
 
 def there(time: str, *parts: str, swset: int = 1) -> str:

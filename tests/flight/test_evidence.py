@@ -1,6 +1,7 @@
 """When the parts fly, by everything that the files of computed runs tell, against what is known of these runs."""
 
 import json
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,7 +21,7 @@ from d2rpick.histories.opening import open_run
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import Record, simulate
 from d2rpick.models.files import BOX_WRITERS
-from tests.command import BOX, ENERGY, ROLLOVER, answer, codes, run
+from tests.command import BOX, ENERGY, ROLLOVER, answer, codes, put, run
 from tests.computed import columns, stored
 from tests.json_schemas import check_by_schema
 from tests.records import known, table
@@ -123,8 +124,7 @@ def test_td_after_the_contact_is_refused_by_every_command(rolled: Rolled, tmp_pa
     rows = answer("study", "--td", str(td), file)["runs"]
     assert [row["status"] for row in rows] == ["none"]
     assert "after the end of the flight" in rows[0]["message"]
-    deck = tmp_path / "deck.k"
-    deck.write_text(run("card", "--tr", "0.2", "--td", str(td), "--part", "1").stdout)
+    deck = put(tmp_path / "deck.k", run("card", "--tr", "0.2", "--td", str(td), "--part", "1").stdout)
     found = answer("check", str(deck), "--history", file)
     assert "D2R204" in {finding["rule"] for finding in found["findings"]}
 
@@ -163,6 +163,7 @@ def test_on_the_energy_alone_nothing_is_certain_and_no_tr_lies_in_the_load(rolle
     assert suggest(history, td, Settings(replay=False, strict=True)).recommended is None
 
 
+@cache
 def history_of(source: str, *parts: str) -> History:
     return open_run([source]).history(Selection(parts=parts))
 

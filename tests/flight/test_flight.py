@@ -69,7 +69,7 @@ def test_a_flight_begins_a_quarter_of_a_period_after_a_half_sine_load(alpha: flo
     assert flight.end is None
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_the_end_of_the_load_is_found_under_noise(seed: int) -> None:
     assert from_the_load(examine(loaded(noise=0.01, seed=seed), 0.064, Settings()).flight)
 
@@ -156,7 +156,7 @@ def struck() -> History:
     return moved(two_loads, 0.25, alpha=10.0)
 
 
-@pytest.mark.parametrize("td", [0.028, 0.030, 0.034, 0.038, 0.044, 0.1, 0.149])
+@pytest.mark.parametrize("td", [0.028, 0.034, 0.044, 0.1])
 def test_the_whole_flight_is_found_wherever_td_lies_in_it(td: float) -> None:
     situation = examine(struck(), td, Settings())
     assert situation.basis == "oscillator"

@@ -21,6 +21,7 @@ from d2rpick.flight.turning import Flying
 from d2rpick.histories.history import EXACT, Momenta, Samples
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection
+from tests.command import put
 from tests.computed import results, starter, stored
 from tests.records import known
 
@@ -167,8 +168,7 @@ def test_a_body_that_bends_more_than_it_is_said_to_turn_makes_the_angle_a_lower_
 @pytest.mark.slow
 def test_every_switched_run_of_the_car_is_as_far_off_and_turned_as_computed(tmp_path: Path) -> None:
     """Centre and orientation of twelve nodes of the body: within 30 % or 1 mm, and 30 % or 0.1 degrees."""
-    deck = tmp_path / "CAR_0000.rad"
-    deck.write_bytes(starter("CAR"))
+    deck = put(tmp_path / "CAR_0000.rad", starter("CAR"))
     where = Placement(read_inventory(str(deck)))
     with results("car_runs.csv").open() as table:
         rows = [row for row in csv.DictReader(table) if row["run"].startswith(("car_a", "car_b", "car_f", "car_td"))]

@@ -23,6 +23,7 @@ from d2rpick.choice.overview import survey
 from d2rpick.histories.content import Content
 from d2rpick.histories.formats import csv_table
 from d2rpick.histories.opening import Run, Selection
+from tests.command import put
 from tests.hdf5_files import ENERGY, plain, written
 from tests.histories.test_source import CONTENTS, TIMES
 from tests.made_binout import binout
@@ -50,8 +51,7 @@ OPENERS = pytest.mark.parametrize("opened", [run_of_file, run_on_disk], ids=["in
 def test_bytes_on_a_disk_are_those_in_memory(
     tmp_path_factory: pytest.TempPathFactory, data: bytes, places: list[int], width: int, begin: int, size: int
 ) -> None:
-    file = tmp_path_factory.getbasetemp() / "bytes"
-    file.write_bytes(data)
+    file = put(tmp_path_factory.getbasetemp() / "bytes", data)
     held, there = Content(data), on_disk(file)
     addresses = np.array([place % (len(data) - width + 1) for place in places], dtype=np.int64)
     assert there.fields(addresses, width).tolist() == held.fields(addresses, width).tolist()
@@ -91,8 +91,7 @@ def test_threads_that_read_one_file_together_get_each_what_it_asks_for(tmp_path:
 
 @pytest.mark.parametrize("kind", CONTENTS)
 def test_every_format_is_read_alike_from_a_disk_and_from_memory(kind: str, tmp_path: Path) -> None:
-    file = tmp_path / "run"
-    file.write_bytes(CONTENTS[kind])
+    file = put(tmp_path / "run", CONTENTS[kind])
     held, there = run_of_file(file), run_on_disk(file)
     assert (held.notes, held.parts) == (there.notes, there.parts)
     for found, expected in zip(there.databases, held.databases, strict=True):
@@ -107,8 +106,7 @@ def test_every_format_is_read_alike_from_a_disk_and_from_memory(kind: str, tmp_p
 
 
 def test_what_is_appended_does_not_count(tmp_path: Path) -> None:
-    file = tmp_path / "glstat"
-    file.write_bytes(ONE)
+    file = put(tmp_path / "glstat", ONE)
     run = run_on_disk(file)
     with file.open("ab") as more:
         more.write(OTHER)
@@ -120,8 +118,7 @@ def test_what_is_appended_does_not_count(tmp_path: Path) -> None:
 def test_a_file_that_is_appended_to_all_the_time_is_read_as_it_was_at_one_moment(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    file = tmp_path / "glstat"
-    file.write_bytes(ONE)
+    file = put(tmp_path / "glstat", ONE)
     fstat = os.fstat
 
     def growing(number: int) -> os.stat_result:
@@ -149,8 +146,7 @@ def test_a_file_replaced_by_another_is_read_as_it_was(tmp_path: Path) -> None:
     ("rest", "reason"), [(b"", "became shorter|written anew"), (OTHER, "rewritten"), (2 * OTHER, "rewritten")]
 )
 def test_a_file_written_anew_is_an_error_and_never_half_of_each(tmp_path: Path, rest: bytes, reason: str) -> None:
-    file = tmp_path / "glstat"
-    file.write_bytes(ONE)
+    file = put(tmp_path / "glstat", ONE)
     run = run_on_disk(file)
     file.write_bytes(rest)
     with pytest.raises(D2RPickError, match=reason):
@@ -161,8 +157,7 @@ def test_a_file_written_anew_is_an_error_and_never_half_of_each(tmp_path: Path, 
 
 def test_a_write_under_way_is_no_file_written_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The system shows the time of a write before its size."""
-    file = tmp_path / "glstat"
-    file.write_bytes(ONE)
+    file = put(tmp_path / "glstat", ONE)
     there = on_disk(file)
     os.utime(file)
     monkeypatch.setattr(time, "sleep", lambda _: file.write_bytes(ONE + b" "))
@@ -238,8 +233,7 @@ def test_a_file_of_any_format_that_is_written_anew_between_two_readings_gives_wh
     kind: str, tmp_path: Path
 ) -> None:
     assert ANEW[kind] != CONTENTS[kind]
-    file = tmp_path / "run"
-    file.write_bytes(CONTENTS[kind])
+    file = put(tmp_path / "run", CONTENTS[kind])
     whole = read_history([str(file)]).energy.tolist()
     run = run_on_disk(file)
     database = run.databases[0]
@@ -253,8 +247,7 @@ def test_a_file_of_any_format_that_is_written_anew_between_two_readings_gives_wh
 
 @pytest.mark.parametrize("kind", ["binout", "radioss-th", "matsum"])
 def test_what_is_not_there_since_a_file_was_written_anew_is_not_passed_over(kind: str, tmp_path: Path) -> None:
-    file = tmp_path / "run"
-    file.write_bytes(CONTENTS[kind])
+    file = put(tmp_path / "run", CONTENTS[kind])
     run = run_on_disk(file)
     assert run.databases[0].span
     file.write_bytes(ANEW[kind])
@@ -286,8 +279,7 @@ HOUR = 3_600_000_000_001
 def test_a_file_that_did_not_change_lately_is_read_without_a_pause(
     opened: Callable[[Path], Run], modified: int, changed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    file = tmp_path / "run"
-    file.write_bytes(ONE)
+    file = put(tmp_path / "run", ONE)
     pauses = fixed_times(monkeypatch, modified, changed)
     history = opened(file).history(Selection())
     assert history.files[0].sha256() == hashlib.sha256(ONE).hexdigest()
@@ -295,8 +287,7 @@ def test_a_file_that_did_not_change_lately_is_read_without_a_pause(
 
 
 def test_a_small_file_that_changes_later_is_signed_as_it_was_read(tmp_path: Path) -> None:
-    file = tmp_path / "glstat"
-    file.write_bytes(ONE)
+    file = put(tmp_path / "glstat", ONE)
     history = read_history([str(file)])
     file.write_bytes(OTHER)
     assert history.files[0].sha256() == hashlib.sha256(ONE).hexdigest()

@@ -13,6 +13,7 @@ import pytest
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.opening import READERS, Selection
+from tests.command import put
 from tests.reading import read_history
 
 CSV = b"time,internal_energy\n0.0,1.0\n0.1,2.0\n0.2,1.5\n"
@@ -31,8 +32,7 @@ Write = Callable[..., str]
 @pytest.fixture
 def file(tmp_path: Path) -> Write:
     def write(data: bytes, name: str = "history") -> str:
-        path = tmp_path / name
-        path.write_bytes(data)
+        path = put(tmp_path / name, data)
         return str(path)
 
     return write

@@ -17,6 +17,7 @@ from d2rpick.histories.formats import binout, csv_table, glstat, matsum, radioss
 from d2rpick.histories.history import Samples
 from d2rpick.histories.opening import READERS, Run, Selection, open_run, reader
 from d2rpick.histories.source import Source
+from tests.command import put
 from tests.computed import stored
 from tests.made_binout import binout as made_binout
 from tests.made_binout import values
@@ -238,8 +239,7 @@ def test_times_at_random_are_refused_in_every_format(tmp_path: Path) -> None:
 
 
 def test_a_time_column_is_no_choice_where_there_is_one_only(tmp_path: Path) -> None:
-    file = tmp_path / "history"
-    file.write_bytes(GLSTAT)
+    file = put(tmp_path / "history", GLSTAT)
     assert open_run([str(file)], Selection(time="Time")).history(Selection()).time.tolist() == TIMES.tolist()
     with pytest.raises(FormatError, match="no time 'cycle' in glstat, the time is 'time'; leave `time` out"):
         open_run([str(file)], Selection(time="cycle"))
@@ -260,8 +260,7 @@ def test_what_is_in_the_files_is_told_where_no_energy_can_be_chosen() -> None:
 def test_packed_data_that_ends_early_is_read_as_far_as_it_goes(tmp_path: Path, share: float) -> None:
     whole = (SAMPLES / "energy.glstat").read_bytes()
     packed = gzip.compress(whole)
-    file = tmp_path / "glstat.gz"
-    file.write_bytes(packed[: int(share * len(packed))])
+    file = put(tmp_path / "glstat.gz", packed[: int(share * len(packed))])
     history, full = read_history([str(file)]), read_history([str(SAMPLES / "energy.glstat")])
     assert not history.complete
     assert "ends early" in history.notes[0]

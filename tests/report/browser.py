@@ -2,11 +2,11 @@
 
 import base64
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from math import isclose
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import pytest
 from selenium import webdriver
@@ -17,9 +17,10 @@ from selenium.webdriver.support.wait import WebDriverWait
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 DRIVER = shutil.which("chromedriver")
-NEEDS_BROWSER = pytest.mark.skipif(
+_NEEDED = pytest.mark.skipif(
     not (CHROMIUM and DRIVER), reason="Chromium and chromedriver are not installed (Debian: chromium, chromium-driver)"
 )
+Test = TypeVar("Test", bound=Callable[..., None])
 _OPTIONS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking")
 # Everything that shows on the page, reaches over its right edge, and lies in nothing that scrolls.
 _CUT = """
@@ -28,6 +29,13 @@ return [...document.body.querySelectorAll("*")]
   .filter((one) => !scrolls(one) && one.getClientRects().length && one.getBoundingClientRect().right > innerWidth + 0.5)
   .map((one) => one.outerHTML.slice(0, 120));
 """
+
+
+def in_browser(test: Test) -> Test:
+    """Mark a test that takes a browser, and so its time."""
+    for mark in (pytest.mark.slow, _NEEDED):
+        mark(test)
+    return test
 
 
 class Browser:

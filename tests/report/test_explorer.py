@@ -23,7 +23,7 @@ from selenium.webdriver import ActionChains
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.select import Select
 
-from tests.report.browser import NEEDS_BROWSER, Browser, browsing
+from tests.report.browser import Browser, browsing, in_browser
 
 # Where the first and the last td lie in the chart of the energy, in pixels.
 ENDS = """
@@ -107,8 +107,7 @@ def check(browser: Browser) -> float:
     return td
 
 
-@pytest.mark.slow
-@NEEDS_BROWSER
+@in_browser
 def test_td_typed_at_some_places_shows_the_digits_of_suggest(paper: Path, browser: Browser) -> None:
     browser.open(paper)
     known = np.array([row["td"] for row in numbers(paper)])
@@ -121,8 +120,7 @@ def test_td_typed_at_some_places_shows_the_digits_of_suggest(paper: Path, browse
     assert browser.complaints() == []
 
 
-@pytest.mark.slow
-@NEEDS_BROWSER
+@in_browser
 def test_td_dragged_to_some_places_shows_the_digits_of_suggest(paper: Path, browser: Browser) -> None:
     browser.open(paper)
     browser.driver.execute_script("document.querySelector('.energy').scrollIntoView({block: 'center'})")
@@ -142,8 +140,7 @@ def test_td_dragged_to_some_places_shows_the_digits_of_suggest(paper: Path, brow
     assert browser.complaints() == []
 
 
-@pytest.mark.slow
-@NEEDS_BROWSER
+@in_browser
 def test_a_finger_moves_td_too(paper: Path, browser: Browser) -> None:
     browser.open(paper, width=390)
     browser.driver.execute_script("document.querySelector('.energy').scrollIntoView({block: 'center'})")
@@ -157,8 +154,7 @@ def test_a_finger_moves_td_too(paper: Path, browser: Browser) -> None:
     assert browser.complaints() == []
 
 
-@pytest.mark.slow
-@NEEDS_BROWSER
+@in_browser
 def test_keys_and_buttons_move_td(paper: Path, browser: Browser) -> None:
     browser.open(paper)
     rows = numbers(paper)
@@ -190,8 +186,7 @@ def test_keys_and_buttons_move_td(paper: Path, browser: Browser) -> None:
     assert browser.complaints() == []
 
 
-@pytest.mark.slow
-@NEEDS_BROWSER
+@in_browser
 def test_a_click_on_a_point_of_the_trade_off_selects_it(paper: Path, browser: Browser) -> None:
     browser.open(paper)
     over = browser.find(".trade .u-over")
@@ -211,8 +206,7 @@ def words(found: dict[str, Any]) -> str:
     return f"td {short(found['td'])}, tr {short(best['tr'])}, residual {measure(best['residual'])}"
 
 
-@pytest.mark.slow
-@NEEDS_BROWSER
+@in_browser
 def test_who_listens_can_use_it(paper: Path, browser: Browser) -> None:
     browser.open(paper)
     nodes = browser.spoken({"slider", "textbox", "button", "image", "region"})
@@ -229,8 +223,7 @@ def test_who_listens_can_use_it(paper: Path, browser: Browser) -> None:
         assert handle.get_attribute("aria-valuetext") == words(suggested(browser.value("command")))
 
 
-@pytest.mark.slow
-@NEEDS_BROWSER
+@in_browser
 @pytest.mark.parametrize("width", WIDTHS)
 def test_nothing_is_cut_with_and_without_scripts(paper: Path, box: Path, browser: Browser, width: int) -> None:
     for page in (paper, box):
@@ -246,8 +239,7 @@ def test_nothing_is_cut_with_and_without_scripts(paper: Path, box: Path, browser
     assert browser.complaints() == []
 
 
-@pytest.mark.slow
-@NEEDS_BROWSER
+@in_browser
 def test_it_prints_as_the_static_page_also_where_it_is_dark(paper: Path, browser: Browser) -> None:
     browser.open(paper, prefers_color_scheme="dark")
     assert browser.driver.execute_script("return getComputedStyle(document.body).backgroundColor") == "rgb(20, 24, 28)"
@@ -258,8 +250,7 @@ def test_it_prints_as_the_static_page_also_where_it_is_dark(paper: Path, browser
     assert browser.shown(".sign")
 
 
-@pytest.mark.slow
-@NEEDS_BROWSER
+@in_browser
 def test_windows_of_acceptable_tr_follow_td(box: Path, browser: Browser) -> None:
     browser.open(box)
     for _ in range(3):
@@ -272,8 +263,7 @@ def test_windows_of_acceptable_tr_follow_td(box: Path, browser: Browser) -> None
     assert browser.complaints() == []
 
 
-@pytest.mark.slow
-@NEEDS_BROWSER
+@in_browser
 def test_each_flight_of_a_plan_can_be_explored(tmp_path: Path, browser: Browser) -> None:
     motion = str(tmp_path / "tumbling.matsum")
     assert run("rollover", "--mesh", "4", "--dt", "1e-3", "--drop", "0.4", "--tilt", "40", "-o", motion).exit_code == 0

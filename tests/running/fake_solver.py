@@ -5,8 +5,6 @@ restarts, and goes on from them; what it prints is what OpenRadioss prints there
 ``fail`` ends leg 2 with an error, ``slow`` has no state of it before it is told to stop.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import re

@@ -1,7 +1,5 @@
 """A run that switches itself, with a solver that is a script: what is left of it, also after what ends it early."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os

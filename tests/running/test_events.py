@@ -1,11 +1,9 @@
 """Events of a run so far: a made body that swings, is pushed, flies and lands, as long as one likes."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from d2rpick.histories.history import EXACT, Balance, History, Momenta
@@ -55,12 +53,14 @@ def test_a_gap_between_two_pushes_is_no_flight() -> None:
     assert np.allclose(contacts, [PUSHES[0][0], PUSHES[2][0]], atol=3 * STEP)
 
 
+@settings(max_examples=12)
 @given(st.integers(20, int(END / STEP) - 1), st.sampled_from([None, 0.06]))
 def test_the_events_of_a_run_so_far_are_the_first_of_all(state: int, wait: float | None) -> None:
     whole, now = told(made(), wait), float(made().time[state])
     assert told(until(made(), now), wait) == [one for one in whole if one[2] is not None and one[2] <= now]
 
 
+@settings(max_examples=12)
 @given(st.integers(0, int(END / STEP) - 1))
 def test_a_switch_is_advised_where_the_energy_is_high_and_nothing_acts(state: int) -> None:
     history = until(made(), float(made().time[state])) if state > 20 else made()

@@ -1,31 +1,22 @@
 """When no force acts, and how long it must not: on computed runs, and on made ones whose law is known."""
 
-from __future__ import annotations
-
+from collections.abc import Sequence
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.situation import Settings
 from d2rpick.choice.windows import bounds, flights_of
-from d2rpick.histories.history import EXACT, Momenta, rows_of
+from d2rpick.histories.history import EXACT, History, Momenta, rows_of
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run
-from d2rpick.running.evidence import contact_after, highest_energy, quiet_times
+from d2rpick.running.evidence import Quiet, contact_after, highest_energy, quiet_times
 from d2rpick.running.wait import InnerMotion, Wait
 from tests.command import ROOT
 from tests.records import until
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from d2rpick.histories.history import History
-    from d2rpick.running.evidence import Quiet
 
 # Windows of flights [s]: car with contacts at 2.3-11.8, 28.1-38.5 and 150.4 ms, box that lands at 285.8, 338.4 ms ...
 CAR, BOX = "carT01.gz", "drop2T01.gz"

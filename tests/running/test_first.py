@@ -1,7 +1,5 @@
 """A first run that switches itself: what its legs and switches say, and what is refused."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

@@ -1,6 +1,6 @@
 """What is said of parts that still swing as a body becomes rigid: by the flight so far, without td."""
 
-from __future__ import annotations
+from functools import cache
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ import pytest
 from d2rpick.deck import read_inventory
 from d2rpick.flight.flight import Flight
 from d2rpick.flight.position_error import drift_in_flight
-from d2rpick.histories.history import EXACT, Momenta
+from d2rpick.histories.history import EXACT, History, Momenta
 from d2rpick.histories.names import Part, Selection
 from d2rpick.histories.opening import open_run
 from d2rpick.running.look import Looks
@@ -21,9 +21,14 @@ CAR = ROOT / "tests" / "data" / "carT01.gz"
 FREE, TD = 0.0385, 0.1464
 
 
+@cache
+def car() -> History:
+    return open_run([str(CAR)]).history(Selection())
+
+
 @pytest.mark.parametrize("tr", [0.0605, 0.0676, 0.075, 0.09])
 def test_what_a_flight_shows_up_to_tr_is_about_the_error_at_td(tr: float) -> None:
-    history = open_run([str(CAR)]).history(Selection())
+    history = car()
     (momenta,) = (one for one in history.momenta if one.parts is not None)
     moving = tuple(known(momenta.parts)[i] for i in momenta.moving)
     whole = known(drift_in_flight(history, Flight(FREE, TD, "momentum", moving)))

@@ -1,23 +1,17 @@
 """A run that is watched: it has not begun, grows, is cut in a record, goes silent, starts again, ends."""
 
-from __future__ import annotations
-
 import gzip
 import os
 import time
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from d2rpick.base.errors import D2RPickError
 from d2rpick.histories.names import Selection
+from d2rpick.running.events import Event
 from d2rpick.running.watch import Watch, follow
 from tests.command import ROOT
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from d2rpick.running.events import Event
 
 LEGS = [gzip.decompress((ROOT / f"tests/data/drop2_w123_T0{leg}.gz").read_bytes()) for leg in (1, 2, 3)]
 WHOLE = Selection()

@@ -170,7 +170,7 @@ def test_without_the_repository_a_line_says_what_is_missing(tmp_path: Path, monk
     assert not (tmp_path / "paper").exists()
 
 
-@pytest.mark.parametrize("form", PLAIN)
+@pytest.mark.parametrize("form", ["table", *(pytest.param(one, marks=pytest.mark.slow) for one in PLAIN[1:])])
 def test_every_form_is_written(form: str, tmp_path: Path) -> None:
     written = run("reproduce", "--section", "5", "--output-dir", str(tmp_path), "-f", form, env={"COLUMNS": "80"})
     assert written.exit_code == 0, written.stderr

@@ -57,7 +57,7 @@ def test_no_single_oscillator_is_hopeless_and_five_modes_are(preload: float, pla
     assert not any(
         gives_up(plastic + (preload + np.exp(-S / 2) * np.sin(rate * S + phase)) ** 2)
         for rate in (9.0, 40.0, 300.0)
-        for phase in (0.0, 1.0, 2.0)
+        for phase in (0.0, 2.0)
     )
     rates = 2 * np.pi * np.array([15.5, 28.5, 46.5, 69.5, 106.0])
     assert gives_up(np.sum(np.sin(rates[:, np.newaxis] * S + np.arange(5)[:, np.newaxis]) ** 2, axis=0))

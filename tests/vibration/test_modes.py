@@ -207,7 +207,7 @@ def test_the_residual_is_predicted_from_the_total_energy(count: int, noise: floa
 @pytest.mark.parametrize("count", [5, 12])
 def test_more_modes_are_refused(count: int) -> None:
     rng = np.random.default_rng(count)
-    for _ in range(4):
+    for _ in range(2):
         energy = random_modes(rng, count).energy(TIME)
         for found in (identify(TIME, energy), identify_several(TIME, energy)):
             assert not found.describes_record

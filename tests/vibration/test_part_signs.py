@@ -1,6 +1,7 @@
 """Deformations of single parts: their signs, what they say of a pair, and where they say nothing."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -44,6 +45,12 @@ def of(deformation: np.ndarray, time: np.ndarray) -> History:
         time, energies.sum(axis=1), source=("test",), format="csv", channel="sum", part_names=names,
         part_energies=energies,
     )  # fmt: skip
+
+
+@cache
+def seen(td: float) -> Situation:
+    """The chain from a td."""
+    return examine(chain.history(), td, PLAIN)
 
 
 # ---- signs
@@ -134,7 +141,7 @@ def predicted(situation: Situation, tr: float) -> float:
 def test_the_residual_of_switched_runs_is_predicted(estimated: bool) -> None:
     errors, some = [], chain.scan()[::3]
     for td in (chain.TD_PEAK, chain.TD_LATE):
-        situation = examine(chain.history(), td, PLAIN)
+        situation = seen(td)
         assert situation.basis == "parts"
         if estimated:
             situation = replace(situation, evidence=situation.evidence._replace(fit=None, span=None))
@@ -146,7 +153,7 @@ def test_the_residual_of_switched_runs_is_predicted(estimated: bool) -> None:
 
 
 def test_parts_that_vibrate_no_more_than_a_solver_errs_have_no_residual() -> None:
-    situation = examine(chain.history(), chain.TD_LATE, PLAIN)
+    situation = seen(chain.TD_LATE)
     parts = known(situation.evidence.parts)
     started = Waves(
         np.array([-300 + 900j]), np.array([101 * np.sqrt(parts.vibration_energy(chain.TD_LATE))]), parts.time[0]
@@ -162,7 +169,7 @@ def test_parts_that_vibrate_no_more_than_a_solver_errs_have_no_residual() -> Non
 
 
 def test_the_signs_of_both_springs_are_right_in_every_switched_run() -> None:
-    parts = known(examine(chain.history(), chain.TD_LATE, PLAIN).evidence.parts)
+    parts = known(seen(chain.TD_LATE).evidence.parts)
     for run in chain.scan():
         product = np.prod(deformations(parts, np.array([run["tr_s"], run["td_s"]])), axis=1)
         assert (product > 0).tolist() == [run["sign1"] > 0, run["sign2"] > 0]
@@ -199,7 +206,7 @@ def test_the_recommended_run_is_among_the_best_of_the_scan(source: str) -> None:
 
 
 def test_the_parts_that_contribute_most_are_named() -> None:
-    situation = examine(chain.history(), chain.TD_PEAK, PLAIN)
+    situation = seen(chain.TD_PEAK)
     (candidate,) = judge(situation, [0.1])
     assert candidate.part_mismatch is not None
     shares = [part.share for part in candidate.parts]

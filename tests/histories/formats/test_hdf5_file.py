@@ -4,7 +4,7 @@ import io
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 
 import h5py
@@ -35,6 +35,16 @@ def saved(file: io.BytesIO) -> SavedBinout:
     return leg
 
 
+def of(columns: Mapping[str, object]) -> io.BytesIO:
+    """A file of these columns by their paths."""
+
+    def write(file: h5py.File) -> None:
+        for name, values in columns.items():
+            file[name] = values
+
+    return written(write)
+
+
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_every_layout_gives_the_numbers_put_in(layout: str) -> None:
     file = written(LAYOUTS[layout])
@@ -59,10 +69,7 @@ def test_lasso_branches_have_each_their_own_time_and_parts_by_number() -> None:
 
 
 def test_a_single_part_or_state_may_lack_its_axis() -> None:
-    def one_part(file: h5py.File) -> None:
-        file["matsum/time"], file["matsum/internal_energy"], file["matsum/ids"] = TIME, ENERGY, np.array([3])
-
-    run = saved(written(one_part))
+    run = saved(of({"matsum/time": TIME, "matsum/internal_energy": ENERGY, "matsum/ids": np.array([3])}))
     assert run.part_channel("internal_energy", [3])[:, 0].tolist() == ENERGY.tolist()
     with pytest.raises(FormatError, match="no glstat in this saved binout"):
         run.channel("internal_energy")
@@ -79,13 +86,12 @@ def test_matrix_of_another_shape_is_refused() -> None:
 
 
 def test_several_candidates_are_listed() -> None:
-    def two(file: h5py.File) -> None:
-        file["a/time"], file["a/internal_energy"] = TIME, ENERGY
-        file["b/time"], file["b/internal_energy"] = TIME[:3], ENERGY[:3]
-
+    two = of(
+        {"a/time": TIME, "a/internal_energy": ENERGY, "b/time": TIME[:3], "b/internal_energy": ENERGY[:3]},
+    )
     with pytest.raises(FormatError, match=r"2 columns .* a/internal_energy \(4\), b/internal_energy \(3\)"):
-        read(written(two))
-    assert read(written(two), "/b/internal_energy").time.tolist() == TIME[:3].tolist()
+        read(two)
+    assert read(two, "/b/internal_energy").time.tolist() == TIME[:3].tolist()
 
 
 def test_explicit_paths_win() -> None:
@@ -97,12 +103,10 @@ def test_explicit_paths_win() -> None:
 
 
 def test_unnamed_columns_have_to_be_named_by_the_user() -> None:
-    def unnamed(file: h5py.File) -> None:
-        file["data"] = np.column_stack([TIME, ENERGY])
-
+    unnamed = of({"data": np.column_stack([TIME, ENERGY])})
     with pytest.raises(FormatError, match=r"no column .* data\[0\] \(4\), data\[1\] \(4\)"):
-        read(written(unnamed))
-    assert read(written(unnamed), "data[1]", time="data[0]").energy.tolist() == ENERGY.tolist()
+        read(unnamed)
+    assert read(unnamed, "data[1]", time="data[0]").energy.tolist() == ENERGY.tolist()
 
 
 @pytest.mark.parametrize(
@@ -110,31 +114,21 @@ def test_unnamed_columns_have_to_be_named_by_the_user() -> None:
     [(ENERGY[:3], "has 3 values, time has 4"), (np.array([1, np.nan, 2, 3]), "is nan at state 2")],
 )
 def test_what_makes_no_history_is_refused(energy: object, message: str) -> None:
-    def write(file: h5py.File) -> None:
-        file["time"], file["internal_energy"] = TIME, energy
-
     with pytest.raises(FormatError, match=message):
-        read(written(write))
+        read(of({"time": TIME, "internal_energy": energy}))
 
 
 @pytest.mark.parametrize(("time", "refused"), [([0, 2, 1, 3], False), ([0, 3, 2, 1], True), ([0, 1, 0, 1], True)])
 def test_times_that_step_back_are_those_of_one_restart(time: list[float], refused: bool) -> None:
-    def write(file: h5py.File) -> None:
-        file["time"], file["internal_energy"] = np.array(time, float), ENERGY
-
     with (
         pytest.raises(FormatError, match=r"steps back from .* one restart were expected") if refused else nullcontext()
     ):
-        read(written(write))
+        read(of({"time": np.array(time, float), "internal_energy": ENERGY}))
 
 
 def test_links_into_other_files_are_not_followed() -> None:
-    def write(file: h5py.File) -> None:
-        file["time"] = TIME
-        file["internal_energy"] = h5py.ExternalLink("other.h5", "/internal_energy")
-
     with pytest.raises(FormatError, match="no column for the internal energy"):
-        read(written(write))
+        read(of({"time": TIME, "internal_energy": h5py.ExternalLink("other.h5", "/internal_energy")}))
 
 
 def test_shape_far_too_large_for_the_file_is_refused() -> None:
@@ -247,10 +241,7 @@ def test_numbers_of_no_standard_type_are_refused(kind: Callable[[], h5py.h5t.Typ
 
 @pytest.mark.parametrize("kind", [">f8", "<f4", ">f4", "<f2", "i1", ">i2", "<i4", ">i8", "u1", "<u2", ">u4", "<u8"])
 def test_numbers_of_every_standard_type_are_read(kind: str) -> None:
-    def write(file: h5py.File) -> None:
-        file["time"], file["internal_energy"] = np.arange(9).astype(kind), (np.arange(9) % 5).astype(kind)
-
-    history = read(written(write))
+    history = read(of({"time": np.arange(9).astype(kind), "internal_energy": (np.arange(9) % 5).astype(kind)}))
     assert (history.time.tolist(), history.energy.tolist()) == ([*range(9)], [i % 5 for i in range(9)])
 
 
@@ -301,12 +292,10 @@ def test_a_line_end_in_a_name_does_not_break_the_message() -> None:
 
 
 def test_the_only_column_of_another_quantity_has_to_be_asked_for() -> None:
-    def other(file: h5py.File) -> None:
-        file["time"], file["kinetic_energy"] = TIME, KINETIC
-
+    other = of({"time": TIME, "kinetic_energy": KINETIC})
     with pytest.raises(FormatError, match="by its name not an internal energy"):
-        read(written(other))
-    assert read(written(other), "kinetic_energy").energy.tolist() == KINETIC.tolist()
+        read(other)
+    assert read(other, "kinetic_energy").energy.tolist() == KINETIC.tolist()
 
 
 def test_without_its_library_a_file_is_refused_with_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ from d2rpick.base.errors import D2RPickError, FormatError
 from d2rpick.histories.formats import csv_table, radioss_th
 from d2rpick.histories.formats.radioss_th import TimeHistory, recognises
 from d2rpick.histories.opening import Selection, open_run
-from tests.command import BOX, ROLLOVER
+from tests.command import BOX, ROLLOVER, put
 from tests.computed import stored, unpacked
 from tests.faults import cases, some
 from tests.histories.formats.test_faults_binary import bounded_memory, t01_value, true_columns
@@ -187,8 +187,7 @@ def test_a_packed_text_is_read_like_one_on_a_disk(tmp_path: Path) -> None:
 
 
 def test_what_a_running_solver_appends_to_a_file_on_its_disk_does_not_count(tmp_path: Path) -> None:
-    file = tmp_path / "runT01"
-    file.write_bytes(DATA[:-10])
+    file = put(tmp_path / "runT01", DATA[:-10])
     run = run_on_disk(file)
     with file.open("ab") as end:
         end.write(DATA[-10:])

@@ -12,6 +12,7 @@ from d2rpick.histories import content
 from d2rpick.histories.content import OnDisk
 from d2rpick.histories.formats.text import Portions, Text
 from d2rpick.histories.source import Source
+from tests.command import put
 from tests.reading import on_disk
 
 CONTENTS = st.lists(st.sampled_from([b"0.125,17", b"\n", b"\r\n", b"\xc2\xb5s", b"\xb5", b""]), max_size=40).map(
@@ -41,8 +42,7 @@ def lines_of(data: bytes) -> list[str]:
 def test_a_text_has_its_lines_from_a_disk_and_from_memory(
     tmp_path_factory: pytest.TempPathFactory, data: bytes, skipped: int, rest: bool
 ) -> None:
-    file = tmp_path_factory.getbasetemp() / "text"
-    file.write_bytes(data)
+    file = put(tmp_path_factory.getbasetemp() / "text", data)
     *ended, last = lines_of(data)
     skipped = min(skipped, len(ended))
     lines = [*ended, last][skipped:] if rest and last else ended[skipped:]
@@ -65,8 +65,7 @@ def test_a_big_plain_text_is_not_taken_into_memory(tmp_path: Path) -> None:
         def __bytes__(self) -> bytes:
             raise MemoryError
 
-    file = tmp_path / "text"
-    file.write_bytes(b"time,IE\n" + b"0.125,17\n" * 50)
+    file = put(tmp_path / "text", b"time,IE\n" + b"0.125,17\n" * 50)
     found = Text(Source("text", on_disk(file, content.Portions(), TooBig)), SMALL)
     assert [*found.lines(found.place(1))] == ["0.125,17"] * 50
 
@@ -74,8 +73,7 @@ def test_a_big_plain_text_is_not_taken_into_memory(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("new_files")
 @pytest.mark.parametrize("read", [lambda found: [*found.lines(0)], lambda found: found.sample(0)])
 def test_a_text_written_anew_since_it_was_opened_is_an_error(read: Callable[[Text], object], tmp_path: Path) -> None:
-    file = tmp_path / "text"
-    file.write_bytes(b"0.125,17\n" * 50)
+    file = put(tmp_path / "text", b"0.125,17\n" * 50)
     found = on_a_disk(file)
     file.write_bytes(b"0.125,18\n" * 50)
     with pytest.raises(ChangedError, match="rewritten"):
