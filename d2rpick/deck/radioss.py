@@ -1,19 +1,21 @@
-"""Parts and elements of a Radioss starter deck.
+"""Parts and elements of a Radioss starter deck, and what acts on them: gravity, supports, imposed motion, joints.
 
-Columns: Altair's public help for the elements, properties and materials, and the solver's published source.
+Columns: Altair's public help for the elements, properties and materials, /GRAV, /FUNCT, /BCS, /IMPVEL, /IMPDISP,
+/IMPACC and /INTER/TYPE2, and the solver's published source.
 """
 
 from __future__ import annotations
 
+from math import inf
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.deck import formulations, radioss_loads
+from d2rpick.deck import formulations, model
 from d2rpick.deck.expression import ExpressionError, number
 from d2rpick.deck.mesh import KINDS, NOT_COUNTED, Mesh, elements_of, nodes_of
-from d2rpick.deck.model import Formulation, Inventory, Material, PartData, Section, placed
-from d2rpick.deck.radioss_deck import SOLIDS, Starter, below_title, card_of, kept_off, number_of
+from d2rpick.deck.model import Formulation, Inventory, Material, PartData, Section
+from d2rpick.deck.radioss_deck import SOLIDS, Starter, below_title, blocks, kept_off, keyword, number_of, reals, whole
 from d2rpick.deck.radioss_flaws import flaws_of
 from d2rpick.deck.radioss_run import Run, find_run_windows, left_rigid
 from d2rpick.deck.reader import cuts, holds_mesh
@@ -60,53 +62,47 @@ def read(run: Run) -> Inventory:
     starter = run.starter
     if starter is None:
         return Inventory("radioss", {}, (), np.empty((0, 3)), ("no starter deck (NAME_0000.rad) was found",), False)
-    cards = [card_of(block) for block in starter.blocks]
     ids, coordinates = nodes_of(starter.named("NODE"))
     mesh = Mesh.of([one for card in starter.named(*KINDS) for one in elements_of(card)], ids, coordinates)
-    notes = (*_notes(run, cards, starter), *mesh.doubts(starter.parts.keys(), "/"))
+    notes = (*_notes(run, starter), *mesh.doubts(starter.parts.keys(), "/"))
     windows = find_run_windows(run).windows.windows if run.legs else ()
-    joints = radioss_loads.joints_of(run, starter, cards)
+    joints = _joints(run, starter)
     switched = run.named if run.legs else {body.node.value for body in starter.bodies}  # all without an engine file
     return Inventory(
-        "radioss", _parts(starter, cards, mesh, _always_rigid(windows)), mesh.elements, mesh.coordinates, notes,
-        not notes, joints=placed(joints.found, mesh.table), switched=placed(joints.switched, mesh.table),
-        ties=joints.unknown, watched=mesh.table.known(_watched(cards)),
-        moved=any(card.words[0] == "TRANSFORM" for card in cards), files=tuple(run.deck.sources),
-        history_groups=frozenset(number_of(card, -1) for card in cards if card.words[0] == "THPART"),
+        "radioss", _parts(starter, mesh, _always_rigid(windows)), mesh.elements, mesh.coordinates, notes,
+        not notes, joints=model.placed(joints.found, mesh.table), switched=model.placed(joints.switched, mesh.table),
+        ties=joints.unknown, watched=mesh.table.known(_watched(starter)),
+        moved=starter.transformed, files=tuple(run.deck.sources),
+        history_groups=frozenset(number_of(card, -1) for card in starter.named("THPART")),
         kept_off=kept_off(run.legs), flaws=flaws_of(run, switched),
-        boundary=radioss_loads.read(run, starter, cards).placed(mesh.table), left_rigid=left_rigid(run, windows),
+        boundary=_boundary(run, starter).placed(mesh.table), left_rigid=left_rigid(run, windows),
     )  # fmt: skip
 
 
-def _watched(cards: Sequence[Card]) -> Integers:
+def _watched(starter: Starter) -> Integers:
     """Ids of the nodes of /TH/NODE, below a line of a title and one of variables."""
-    rows = [row for card in cards if card.words[:2] == ("TH", "NODE") for row in below_title(card)]
+    rows = [row for card in starter.named("TH") if card.words[1:2] == ("NODE",) for row in below_title(card)]
     ids = (row.text[:_WIDTH].strip() for row in rows)
     return np.unique(np.array([int(one) for one in ids if one.isdecimal() and int(one)], np.int64))
 
 
-def _notes(run: Run, cards: Sequence[Card], starter: Starter) -> Iterator[str]:
+def _notes(run: Run, starter: Starter) -> Iterator[str]:
     """Say what may be missing."""
-    for card in cards:
-        if card.words[0] in NOT_COUNTED:
-            yield f"{card.at}: elements of /{card.name} are not followed"
+    yield from (f"{card.at}: elements of /{card.name} are not followed" for card in starter.named(*NOT_COUNTED))
     yield from (f"{block.source.name}: {told}" for block, told in cuts(run.deck) if holds_mesh(block))
     yield from (f"{one.name.at}: {one.name.text} was not read: {one.reason}" for one in run.deck.unread)
     if starter.moved:
         yield "ids of a //SUBMODEL may be moved, which is not followed"
 
 
-def _parts(starter: Starter, cards: Sequence[Card], mesh: Mesh, rigid: set[int]) -> Mapping[int, PartData]:
-    materials, properties = dict(_materials(cards)), dict(_properties(cards))
+def _parts(starter: Starter, mesh: Mesh, rigid: set[int]) -> Mapping[int, PartData]:
+    materials, properties = dict(_materials(starter)), dict(_properties(starter))
     kinds, unturned = mesh.kinds, starter.unturned
     found: dict[int, PartData] = {}
-    for card in cards:
-        rows = below_title(card) if card.words[0] == "PART" else ()
-        if rows:
-            part, prop, material = number_of(card), *(card.integer(rows[0], at).value for at in (0, 1))
-            section = _section(properties.get(prop), kinds.get(part, set()), turns=part not in unturned)
-            made_of = _material(materials.get(material), properties.get(prop), part in rigid)
-            found[part] = PartData(part, card.rows[0].text.strip(), made_of, section)
+    for part, line in starter.parts.items():
+        section = _section(properties.get(line.prop), kinds.get(part, set()), turns=part not in unturned)
+        made_of = _material(materials.get(line.material), properties.get(line.prop), part in rigid)
+        found[part] = PartData(part, line.title, made_of, section)
     return found
 
 
@@ -124,9 +120,9 @@ def _always_rigid(windows: Sequence[Window]) -> set[int]:
     return {one.unit.id for one in windows if not one.unit.is_body and one.tr == 0 and one.td is None}
 
 
-def _materials(cards: Sequence[Card]) -> Iterator[tuple[int, Material]]:
-    for card in cards:
-        if card.words[0] != "MAT" or len(card.words) < 3:
+def _materials(starter: Starter) -> Iterator[tuple[int, Material]]:
+    for card in starter.named("MAT"):
+        if len(card.words) < 3:
             continue
         rows, law = [row.text for row in below_title(card)], card.words[1]
         known = law in _ELASTIC
@@ -135,14 +131,12 @@ def _materials(cards: Sequence[Card]) -> Iterator[tuple[int, Material]]:
         yield number_of(card, 2), Material(f"MAT/{law}", kind, _at(rows, 0, 0), modulus, poisson)
 
 
-def _properties(cards: Sequence[Card]) -> Iterator[tuple[int, _Property]]:
-    defaults = {
-        card.words[0]: _flags(card, card.lines) for card in cards if card.words[0] in ("DEF_SHELL", "DEF_SOLID")
-    }
+def _properties(starter: Starter) -> Iterator[tuple[int, _Property]]:
+    defaults = {card.words[0]: _flags(card, card.lines) for card in starter.named("DEF_SHELL", "DEF_SOLID")}
     shell, _, triangle = defaults.get("DEF_SHELL", [0, 0, 0])[:3]
     solid = defaults.get("DEF_SOLID", [0])[0]
-    for card in cards:
-        if card.words[0] != "PROP" or len(card.words) < 3:
+    for card in starter.named("PROP"):
+        if len(card.words) < 3:
             continue
         below, type_ = below_title(card), card.words[1]
         flags, rows = _flags(card, below), [row.text for row in below]
@@ -204,3 +198,166 @@ def _at(rows: Sequence[str], row: int, start: int) -> float | None:
     except ExpressionError:
         return None
     return value if value > 0 else None
+
+
+# Keywords that hold parts together too.
+_OTHER_TIES: Final = ("RBE2", "RBE3", "RLINK", "MPC")
+_MOTIONS: Final = ("IMPVEL", "IMPDISP", "IMPACC")
+_AXES: Final = "XYZ"
+_TRANSLATIONS, _ROTATIONS = slice(3, 6), slice(7, 10)  # codes of /BCS
+
+
+def _boundary(run: Run, starter: Starter) -> model.Boundary:
+    """Collect what acts on the model from outside."""
+    if starter.moved and starter.named("GRAV", "BCS", *_MOTIONS):
+        return model.Boundary(
+            notes=("ids of a //SUBMODEL may be moved: supports and gravity of the deck are not followed",)
+        )
+    found = [*_holds(run, starter)]
+    found += [*_of_bodies(run, starter, [one for one in found if isinstance(one, model.Hold)])]
+    return model.Boundary.of(found, [*_gravity(starter)], whole=not run.deck.unread)
+
+
+def _name(card: Card) -> str:
+    return f"/{card.name} ({card.at})"
+
+
+# Supports and imposed motion.
+
+
+def _holds(run: Run, starter: Starter) -> Iterator[model.Hold | str]:
+    engine = [source for source in run.deck.sources if source not in starter.sources]
+    lifted = any(keyword(block)[:1] == ("BCSR",) for source in engine for block in blocks(source))
+    for card in starter.named("BCS", *_MOTIONS):
+        words, rows = card.words, below_title(card)
+        if not rows:
+            continue
+        if words[0] == "BCS" and lifted:
+            yield f"{_name(card)}: an engine file lifts supports (/BCSR), which is not followed"
+        elif words[1:2] == ("FGEO",):
+            group = frozenset({card.integer(rows[0], 1).value} - {0})
+            nodes = model.ids({whole(row.text[:_WIDTH]) for row in rows[2:]} - {0})
+            yield model.Hold(_name(card), nodes, group, counts=True)
+        else:
+            held = _support(card, rows) if words[0] == "BCS" else _motion(card, rows)
+            members = starter.group_members(card.integer(rows[0], 2 if words[0] == "BCS" else 4).value)
+            if members is None:
+                yield f"{_name(card)}: the nodes of its group are not followed"
+            elif held:
+                yield held._replace(nodes=model.ids(members[0]), parts=frozenset(members[1]))
+
+
+def _support(card: Card, rows: Sequence[Row]) -> model.Hold | None:
+    """Give what a /BCS fixes; along the axes of a skew it counts in any case, unless it fixes all."""
+    moves, turns = (rows[0].text[at].ljust(3) for at in (_TRANSLATIONS, _ROTATIONS))
+    axes = frozenset(axis for axis, code in enumerate(moves) if code == "1")
+    if not axes and "1" not in turns:
+        return None
+    skewed = bool(card.integer(rows[0], 1).value) and 0 < len(axes) < len(_AXES)
+    return model.Hold(_name(card), model.ids(()), axes=axes, counts=skewed)
+
+
+def _motion(card: Card, rows: Sequence[Row]) -> model.Hold:
+    """Give the times of an imposed motion; with a sensor, or units of its own, these are all."""
+    timed = len(rows) > 1 and not card.integer(rows[0], 3).value and not number_of(card, 2)
+    start, stop = reals(rows[1], 4)[2:] if timed else (0.0, 0.0)
+    known = np.isfinite([start, stop]).all()
+    return model.Hold(
+        _name(card), model.ids(()), counts=True, start=start if known else 0.0, end=stop if known and stop else inf
+    )
+
+
+def _of_bodies(run: Run, starter: Starter, holds: Sequence[model.Hold]) -> Iterator[model.Hold]:
+    """What holds the main node of a rigid body that is on holds all of its nodes."""
+    for body in starter.bodies:
+        members = None if body.sensor or body.node.value in run.named else starter.group_members(body.group)
+        for one in holds if members else ():
+            if members and body.node.value in one.nodes:
+                yield one._replace(nodes=model.ids(members[0]), parts=frozenset(members[1]))
+
+
+# Gravity.
+
+
+def _gravity(starter: Starter) -> Iterator[model.Gravity | str]:
+    loads = [card for card in starter.named("GRAV") if below_title(card)]
+    functions = dict(_functions(starter)) if loads else {}
+    units = next((card.rows[2:4] for card in starter.named("BEGIN") if len(card.words) == 1), ())
+    converted = len(units) > 1 and units[0].text.split() != units[1].text.split() and units[1].text.strip() != ""
+    for card in loads:
+        found = None if converted or number_of(card, 2) else _of_card(card, starter, functions)
+        yield found or f"{_name(card)} is not followed: whether gravity acts is seen in the run alone"
+
+
+def _of_card(card: Card, starter: Starter, functions: Mapping[int, tuple[float, ...]]) -> model.Gravity | None:
+    """Give the values and nodes of a /GRAV, None where they are not known; before its sensor it is off."""
+    row = below_title(card)[0]
+    function, skew, sensor, group = (card.integer(row, at).value for at in (0, 2, 3, 4))
+    scale = reals(row, 5)[4] or 1.0
+    values = model.plateaus(functions.get(function, ()), scale) if function else (scale,)
+    members = starter.group_members(group) if group else (set[int](), set[int]())
+    direction = row.text[_WIDTH : 2 * _WIDTH].strip().upper() or "Z"
+    if not values or not np.isfinite(values).all() or members is None or direction not in _AXES:
+        return None
+    axis = None if skew else _AXES.index(direction)
+    values = (0.0, *values) if sensor else values
+    return (
+        model.Gravity(axis, values, model.ids(members[0]), frozenset(members[1]))
+        if group
+        else model.Gravity(axis, values)
+    )
+
+
+def _functions(starter: Starter) -> Iterator[tuple[int, tuple[float, ...]]]:
+    """Ordinates of the functions, none of those that the deck scales."""
+    moved = {number_of(card) for card in starter.named("MOVE_FUNCT") if card.words[1:]}
+    for card in starter.named("FUNCT"):
+        number = number_of(card)
+        yield number, () if number in moved else tuple(reals(row, 2)[1] for row in below_title(card))
+
+
+# Joints hold parts together that share no nodes: ties, and rigid bodies that are always on.  While a part is rigid,
+# they must be off: a node cannot obey two (Altair's help on incompatible kinematic conditions).
+
+
+def _joints(run: Run, starter: Starter) -> model.Joints:
+    """Collect the tied interfaces (/INTER/TYPE2) of a starter deck whose main surface is one part, and rigid bodies.
+
+    A rigid body that no engine file and no sensor switches is always on, and joins what it has nodes of.  Without
+    engine files all are taken for those that are switched.
+    """
+    of_parts = (card for card in starter.named("SURF") if card.words[1:2] == ("PART",) and card.words[2:])
+    surfaces = {number_of(card, -1): card for card in of_parts}
+    found, switched, unknown = list[model.Joint](), list[model.Joint](), list[str]()
+    for card in starter.named("INTER", *_OTHER_TIES):
+        interface = card.words[:2] == ("INTER", "TYPE2")
+        tie = _of_interface(card, starter, surfaces) if interface else None
+        if tie:
+            found.append(tie)
+        elif interface or card.words[0] != "INTER":
+            unknown.append(_name(card))
+    for body in starter.bodies:
+        always = bool(run.legs) and not body.sensor and body.node.value not in run.named
+        members = starter.group_members(body.group)
+        if members:
+            held = model.Joint("rigid body", model.ids(members[0] | {body.node.value}), frozenset(members[1]))
+            (found if always else switched).append(held)
+        elif always:
+            unknown.append(f"/RBODY/{body.id} ({body.card.at})")
+    return model.Joints(tuple(found), tuple(unknown), tuple(switched))
+
+
+def _of_interface(card: Card, starter: Starter, surfaces: dict[int, Card]) -> model.Joint | None:
+    rows = below_title(card)
+    group, surface = (card.integer(rows[0], at).value for at in range(2)) if rows else (0, 0)
+    members = starter.group_members(group)
+    main = frozenset(_listed(surfaces[surface]) if surface in surfaces else ())
+    if members is None or len(main) != 1:
+        return None
+    return model.Joint("tied interface", model.ids(members[0]), frozenset(members[1]) | main)
+
+
+def _listed(card: Card) -> Iterator[int]:
+    """Ids below the title of a surface."""
+    for row in below_title(card):
+        yield from (value for at in range(10) if (value := card.integer(row, at).value) > 0)

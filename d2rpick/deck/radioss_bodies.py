@@ -193,7 +193,7 @@ class _Made:
     def _moving(self, parts: Sequence[int], alone: int) -> Iterator[str]:
         """Give the main node what moves or pulls the nodes of its body."""
         own = _nodes(parts, self._groups)
-        for card in self._starter.velocities:
+        for card in self._starter.named("INIVEL"):
             column = _GROUP_OF_VELOCITY.get("".join(card.words[1:2]))
             reached = own & self._reached(card, column)
             if reached and (column is None or reached != own):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.graph import reached
@@ -16,7 +17,7 @@ from d2rpick.deck.expression import ExpressionError, number
 from d2rpick.deck.source import Block, SourceFile
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 
 _INCLUDE = b"#include"
@@ -183,9 +184,7 @@ def _integer(value: Value[float]) -> Value[int]:
 
 WITHOUT_FRAME: Final = {"TETRA4", "TETRA10", "BRIC20", "SHEL16"}  # their stresses do not turn with a rigid body
 _WIDTH: Final = 10
-_BRICK: Final = "BRICK"
-_SUBMODEL: Final = ""  # before the second slash of //SUBMODEL
-_GROUP_FIELD: Final = 6  # of the first line of /RBODY, in columns of 10: the mass before it takes two
+_OF_BODY: Final = (0, 1, 6, 7)  # main node, sensor, group, Ikrem in columns of 10: the mass between takes two
 _ICOROTATIONAL: Final = 2  # Iframe
 _NOT_TURNED: Final = {1, 2, 12}  # Isolid of bricks without a co-rotating frame; 12 by the help up to 2017
 _DEFAULT_ISOLID: Final = 1
@@ -211,100 +210,95 @@ class PartLine(NamedTuple):
 
     title: str
     prop: int
+    material: int
     subset: int
 
 
 @dataclass(eq=False)
 class Starter:
-    """What a starter deck says about its rigid bodies; ``sources`` are its files.
+    """What a starter deck says about its rigid bodies; by its ``blocks`` from the files ``sources``."""
 
-    ``walls`` and ``velocities`` are its cards /RWALL and /INIVEL, ``sensors`` those /SENSOR by id.
-    """
-
-    name: str = ""
-    version: int = 0  # of the format
-    bodies: list[Body] = field(default_factory=list)
-    parts: dict[int, PartLine] = field(default_factory=dict)
-    subsets: dict[int, tuple[int, ...]] = field(default_factory=dict)
-    groups: dict[int, tuple[str, tuple[int, ...]]] = field(default_factory=dict)
-    sensors: dict[int, Card] = field(default_factory=dict)
-    solids: dict[int, tuple[int, int]] = field(default_factory=dict)  # properties: Isolid, Iframe
-    default_solid: tuple[int, int] | None = None
-    bricks: set[int] = field(default_factory=set)  # parts of 8-node bricks
-    unturned_parts: set[int] = field(default_factory=set)  # of other elements without a co-rotating frame
-    walls: list[Card] = field(default_factory=list)
-    velocities: list[Card] = field(default_factory=list)
-    moved: bool = False  # whether a submodel may offset its ids
-    transformed: bool = False  # whether nodes are moved
     sources: list[SourceFile] = field(default_factory=list)
-    blocks: list[Block] = field(default_factory=list)  # all of them, in reading order
+    blocks: list[Block] = field(default_factory=list)
 
-    def named(self, *keywords: str) -> Iterator[Card]:
-        """Cards whose first word is one of these; read anew each time, since there may be much in them."""
-        return (card_of(block) for block in self.blocks if keyword(block)[0] in keywords)
+    @cached_property
+    def cards(self) -> Sequence[Card]:
+        """All blocks as cards, in reading order."""
+        return [card_of(block) for block in self.blocks]
 
-    def take(self, block: Block) -> None:
-        """Keep what a block says."""
-        self.blocks.append(block)
-        first, *words = keyword(block)
-        if first not in _KEPT:
-            return
-        card = card_of(block)
-        id_ = number_of(card, _ID_AT.get(first, 1))
-        if first == _SUBMODEL:
-            self.moved = True
-        elif first == "TRANSFORM":
-            self.transformed = True
-        elif first == _BRICK:
-            self.bricks.add(id_)
-        elif first in WITHOUT_FRAME:
-            self.unturned_parts.add(id_)
-        elif first == "RWALL":
-            self.walls.append(card)
-        elif first == "INIVEL":
-            self.velocities.append(card)
-        elif first == "SENSOR" and words:
-            self.sensors[id_] = card
-        elif first == "DEF_SOLID":
-            if card.rows and self.default_solid is None:  # the first one counts
-                self.default_solid = _isolid_and_iframe(card, card.rows[0])
-        elif first == "PROP":
-            if words and words[0] in SOLIDS and len(card.rows) > 1:
-                self.solids[id_] = _isolid_and_iframe(card, card.rows[1])  # the line may be blank
-        else:
-            self._take_rows(card, id_, below_title(card))
+    def named(self, *keywords: str) -> list[Card]:
+        """Cards whose first word is one of these."""
+        return [card for card in self.cards if card.words[0] in keywords]
 
-    def _take_rows(self, card: Card, id_: int, rows: Sequence[Row]) -> None:
-        """Keep what the lines below a title say."""
-        first, *words = card.words
-        if first == "BEGIN" and card.rows:
-            self.name = card.rows[0].text.strip()
-            self.version = card.integer(rows[0], 0).value if rows else 0
-        elif first == "SUBSET":
-            self.subsets[id_] = _ids(rows)
-        elif first == "GRNOD" and words:
-            self.groups[id_] = words[0], _ids(rows)
-        elif not rows:
-            return
-        elif first == "RBODY" and id_:  # one of /RBODY/LAGMUL is never switched
-            sensor, group, keeps = (card.integer(rows[0], at).value for at in (1, _GROUP_FIELD, _GROUP_FIELD + 1))
-            self.bodies.append(Body(id_, card.integer(rows[0], 0), sensor, group, card, bool(sensor or keeps)))
-        elif first == "PART":
-            prop, subset = card.integer(rows[0], 0).value, card.integer(rows[0], 2).value
-            self.parts[id_] = PartLine(card.rows[0].text.strip(), prop, subset)
+    @cached_property
+    def version(self) -> int:
+        """That of the format."""
+        found = [card for card in self.named("BEGIN") if card.rows]
+        rows = below_title(found[-1]) if found else ()
+        return found[-1].integer(rows[0], 0).value if rows else 0
+
+    @cached_property
+    def bodies(self) -> Sequence[Body]:
+        """Rigid bodies; one of /RBODY/LAGMUL, whose keyword has no id there, is never switched."""
+        return [
+            Body(number_of(card), node, sensor.value, group.value, card, bool(sensor.value or keeps.value))
+            for card in self.named("RBODY")
+            for row in below_title(card)[: number_of(card) > 0]
+            for node, sensor, group, keeps in [[card.integer(row, at) for at in _OF_BODY]]
+        ]
+
+    @cached_property
+    def parts(self) -> Mapping[int, PartLine]:
+        """What /PART says, by the ids of the parts."""
+        return {
+            number_of(card): PartLine(card.rows[0].text.strip(), *(card.integer(row, at).value for at in range(3)))
+            for card in self.named("PART")
+            for row in below_title(card)[:1]
+        }
+
+    @cached_property
+    def subsets(self) -> Mapping[int, tuple[int, ...]]:
+        """Ids of the subsets in each."""
+        return {number_of(card): _ids(below_title(card)) for card in self.named("SUBSET")}
+
+    @cached_property
+    def groups(self) -> Mapping[int, tuple[str, tuple[int, ...]]]:
+        """What a group of nodes is made of, and the ids of that."""
+        found = (card for card in self.named("GRNOD") if card.words[1:])
+        return {number_of(card, 2): (card.words[1], _ids(below_title(card))) for card in found}
+
+    @cached_property
+    def sensors(self) -> Mapping[int, Card]:
+        """Cards of the sensors by id."""
+        return {number_of(card, 2): card for card in self.named("SENSOR") if card.words[1:]}
+
+    @property
+    def moved(self) -> bool:
+        """Whether a submodel may offset its ids."""
+        return bool(self.named(""))  # before the second slash of //SUBMODEL
+
+    @property
+    def transformed(self) -> bool:
+        """Whether nodes are moved."""
+        return bool(self.named("TRANSFORM"))
 
     @property
     def unturned(self) -> dict[int, str]:
         """Parts of solids whose stresses do not turn with a rigid body, and of which kind these are."""
-        isolid, iframe = self.default_solid or (0, 0)
+        defaults = [_isolid_and_iframe(card, card.rows[0]) for card in self.named("DEF_SOLID") if card.rows]
+        isolid, iframe = defaults[0] if defaults else (0, 0)  # the first one counts
+        solids = (card for card in self.named("PROP") if card.words[1:2] and card.words[1] in SOLIDS and card.rows[1:])
+        flags = {number_of(card, 2): _isolid_and_iframe(card, card.rows[1]) for card in solids}  # it may be blank
         props = {
             prop
-            for prop, (own, frame) in self.solids.items()
+            for prop, (own, frame) in flags.items()
             if (own or isolid or _DEFAULT_ISOLID) in _NOT_TURNED and (frame or iframe) != _ICOROTATIONAL
         }
-        bricks = [part for part, line in self.parts.items() if part in self.bricks and line.prop in props]
-        found = dict.fromkeys(bricks, "bricks with Isolid 1, 2 or 12 without Iframe 2")
-        return found | dict.fromkeys(self.unturned_parts, "tetrahedra, 20-node bricks or 16-node shells")
+        bricks = {number_of(card) for card in self.named("BRICK")}
+        turned = [part for part, line in self.parts.items() if part in bricks and line.prop in props]
+        found = dict.fromkeys(turned, "bricks with Isolid 1, 2 or 12 without Iframe 2")
+        others = map(number_of, self.named(*WITHOUT_FRAME))
+        return found | dict.fromkeys(others, "tetrahedra, 20-node bricks or 16-node shells")
 
     def parts_in(self, subset: int) -> set[int]:
         """Parts of a subset and of those below it."""
@@ -331,14 +325,6 @@ class Starter:
     def _groups_in(self, group: int) -> tuple[int, ...]:
         kind, ids = self._group(group)
         return ids if kind == "GRNOD" else ()
-
-
-_ID_AT: Final = {"GRNOD": 2, "SENSOR": 2, "PROP": 2}  # where a keyword has its id; others behind their name
-# Keywords of the cards that say what a `Starter` keeps.
-_KEPT: Final = {
-    *(*WITHOUT_FRAME, _BRICK, _SUBMODEL, "BEGIN", "RBODY", "PART", "SUBSET", "GRNOD", "SENSOR", "PROP", "DEF_SOLID"),
-    *("RWALL", "INIVEL", "TRANSFORM"),
-}
 
 
 def _isolid_and_iframe(card: Card, row: Row) -> tuple[int, int]:

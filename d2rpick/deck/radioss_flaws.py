@@ -73,7 +73,7 @@ def flaws_of(run: Run, switched: Collection[int]) -> tuple[Flaw, ...]:
     bodies = [body for body in starter.bodies if body.node.value in switched] if starter else []
     if starter is None or not bodies:
         return ()
-    if not (starter.walls or starter.velocities or any(leg.starts for leg in run.legs)):
+    if not (starter.named("RWALL") or starter.named("INIVEL") or any(leg.starts for leg in run.legs)):
         return ()
     if starter.moved:
         why = "ids of a //SUBMODEL may be moved: what its rigid walls and initial velocities do to /RBODY is not known"
@@ -81,7 +81,7 @@ def flaws_of(run: Run, switched: Collection[int]) -> tuple[Flaw, ...]:
     groups = NodeGroups(starter)
     unknown = [body for body in bodies if groups.members(body.group) is None]
     found = [_unknown(body.group, _numbered([body]), body.card.here) for body in unknown]
-    found += [flaw for wall in starter.walls for flaw in _of_wall(wall, starter, groups, bodies)]
+    found += [flaw for wall in starter.named("RWALL") for flaw in _of_wall(wall, starter, groups, bodies)]
     found += [*_of_starts(run, groups, bodies)]
     if not run.deck.unread:  # else a velocity may stand in what was not read
         found += _of_velocities(run, starter, groups, bodies)
@@ -184,7 +184,7 @@ def _of_velocities(run: Run, starter: Starter, groups: NodeGroups, bodies: Seque
     The starter gives all nodes of a body the velocity of its main node, also where the first leg puts the body off.
     """
     given: list[tuple[Card, int, frozenset[int]]] = []
-    for card in starter.velocities:
+    for card in starter.named("INIVEL"):
         group, nodes = _moved(card)
         members = nodes or groups.members(group)
         if members is None:

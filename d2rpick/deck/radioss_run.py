@@ -148,7 +148,7 @@ def _read_starter(source: SourceFile, run: Run, chain: tuple[str, ...]) -> None:
         if not words:
             _include(card_of(block), source, run, chain)
         else:
-            run.starter.take(block)
+            run.starter.blocks.append(block)
             if words[0] == "RBODY":
                 run.deck.cards.append(card_of(block))
 

@@ -168,9 +168,7 @@ def _sensed(name: str, content: bytes, card: PrintedCard) -> bytes:
 
 def _refuse_sensors(starter: Starter, card: PrintedCard) -> None:
     """Raise DeckError where sensors of a card have the ids of others, or there is no body for them."""
-    added = Starter()
-    for block in blocks(SourceFile("the card", card.starter.encode())):
-        added.take(block)
+    added = Starter(blocks=[*blocks(SourceFile("the card", card.starter.encode()))])
     for number in sorted(added.sensors.keys() & starter.sensors.keys()):
         raise DeckError(f"{starter.sensors[number].at}: the deck has sensor {number} of the cards already; rename it")
     mains = {body.node.value for body in (*starter.bodies, *added.bodies)}

@@ -255,7 +255,7 @@ class RunCase(Case):
         starter, legs = self.run.starter, self.run.legs
         if not self.run.named or starter is None:
             return ()
-        if not (starter.walls or starter.velocities or any(leg.starts for leg in legs)):
+        if not (starter.named("RWALL") or starter.named("INIVEL") or any(leg.starts for leg in legs)):
             return ()
         from d2rpick.deck.radioss_flaws import flaws_of  # loads numpy
 

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import ArgumentError, DeckError, name_units
 from d2rpick.deck import read_inventory
-from d2rpick.deck.inner_period import inner_period
 from d2rpick.deck.parts import read_entities
-from d2rpick.deck.pieces import supports_of
+from d2rpick.deck.pieces import inner_period, supports_of
 from d2rpick.deck.printed_card import PHYSICS, PrintedCard, Printing, check_ids, comments, shortest
 from d2rpick.deck.printing import Waiting, capped, header, listed, off, to_deformable, to_rigid
 from d2rpick.deck.radioss_bodies import bodies_for
@@ -150,7 +149,7 @@ def _radioss(path: str, inventory: Inventory, parts: Sequence[int], wait: Wait, 
         files[f"{leg.name}_{number:04d}.rad"] = "\n".join(lines) + "\n"
     how = f"at rest in free fall: rigid from 0; then {_waited(wait)}" if at_rest else _waited(wait)
     told = (note.format(cap=cap) for note in _OF_RADIOSS)
-    notes = (how, *bodies.notes, *_OF_ALL, *told, *((_OF_WALLS,) if run.starter.walls else ()))
+    notes = (how, *bodies.notes, *_OF_ALL, *told, *((_OF_WALLS,) if run.starter.named("RWALL") else ()))
     head = "".join(f"# {line}\n" for line in comments([*notes, *PHYSICS]))
     return First(PrintedCard(head, (), files, starter=bodies.cards + sensors), wait, notes)
 
@@ -165,14 +164,14 @@ def _forces(starter: Starter) -> Iterator[tuple[str, int]]:
     for card in starter.named("INTER"):
         if card.words[1:] and card.words[1] not in _NO_FORCE:
             yield "INTER", next(number for at in (2, 3) if (number := number_of(card, at)) or at == 3)
-    for card in starter.walls:
+    for card in starter.named("RWALL"):
         yield "RWALL", number_of(card, -1)
 
 
 def _falls(run: Run, inventory: Inventory, parts: Collection[int]) -> bool:
     """Whether the parts are at rest at first and gravity acts on them; nothing holds them."""
     starter = run.starter
-    still = starter is not None and not starter.velocities and not any(leg.starts for leg in run.legs)
+    still = starter is not None and not starter.named("INIVEL") and not any(leg.starts for leg in run.legs)
     return still and bool(inventory.boundary.gravity) and bool(parts)
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import RangeError
-from d2rpick.deck.inner_period import inner_period
+from d2rpick.deck.pieces import inner_period
 from d2rpick.flight.momentum import believed
 from d2rpick.flight.window import FEWEST
 from d2rpick.histories.samples import window

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from d2rpick.deck import read_inventory
-from d2rpick.deck.inner_period import inner_period
+from d2rpick.deck.pieces import inner_period
 from tests.command import put
 from tests.decks import wide
 from tests.sprung import DENSITY, cubes
