@@ -121,16 +121,23 @@ def _quotient(x: Number, y: Number) -> Number:
     return x / y
 
 
-_OPERATIONS: Final[dict[str, Callable[[Number, Number], Number]]] = {
-    "+": operator.add,
-    "-": operator.sub,
-    "*": operator.mul,
-    "/": _quotient,
+def _power(x: Number, y: Number) -> Number:
+    result = math.pow(x, y)
+    return int(result) if isinstance(x, int) and isinstance(y, int) else result
+
+
+# How tightly an operation binds, and what it does.
+_OPERATIONS: Final[dict[str, tuple[int, Callable[[Number, Number], Number]]]] = {
+    "+": (1, operator.add),
+    "-": (1, operator.sub),
+    "*": (2, operator.mul),
+    "/": (2, _quotient),
+    "**": (3, _power),
 }
 
 
 class _Parser:
-    """Recursive descent: sum = product {± product}; product = power {*/ power}; power = signed [** power]."""
+    """Precedence climbing: a value, and the operations behind it that bind at least so tightly."""
 
     def __init__(self, text: str, lookup: Callable[[str], Number]) -> None:
         self.text = text
@@ -139,39 +146,22 @@ class _Parser:
         self.depth = 0
 
     def whole(self) -> Number:
-        value = self.sum()
+        value = self.value()
         if self.tokens[0]:
             raise self.unexpected()
         return value
 
-    def sum(self) -> Number:
+    def value(self, least: int = 1) -> Number:
         self.depth += 1
         if self.depth > _DEEPEST:
             raise ExpressionError(f"an expression is nested deeper than {_DEEPEST} levels")
-        value = self.chain(self.product, "+", "-")
-        self.depth -= 1
-        return value
-
-    def product(self) -> Number:
-        return self.chain(self.power, "*", "/")
-
-    def chain(self, operand: Callable[[], Number], *signs: str) -> Number:
-        value = operand()
-        while self.tokens[0] in signs:
+        value = self.signed()
+        while (operation := _OPERATIONS.get(self.tokens[0])) and operation[0] >= least:
             sign = self.tokens.pop(0)
-            value = _checked(_OPERATIONS[sign](value, operand()))
-        return value
-
-    def power(self) -> Number:
-        base = self.signed()
-        if self.tokens[0] != "**":
-            return base
-        self.tokens.pop(0)
-        self.depth += 1
-        exponent = self.power() if self.depth <= _DEEPEST else self.signed()
+            # those of one kind are taken from the left, powers from the right
+            value = _checked(operation[1](value, self.value(operation[0] + (sign != "**"))))
         self.depth -= 1
-        result = math.pow(base, exponent)
-        return _checked(int(result) if isinstance(base, int) and isinstance(exponent, int) else result)
+        return value
 
     def signed(self) -> Number:
         negative = False
@@ -183,7 +173,7 @@ class _Parser:
     def atom(self) -> Number:
         token = self.tokens.pop(0)
         if token == "(":
-            value = self.sum()
+            value = self.value()
             self.expect(")")
             return value
         if token[:1].isdigit() or token[:1] == ".":
@@ -203,10 +193,10 @@ class _Parser:
             raise ExpressionError(f"{name!r} is not a function of *PARAMETER_EXPRESSION")
         arity, function = _FUNCTIONS[name]
         self.expect("(")
-        arguments = [self.sum()]
+        arguments = [self.value()]
         while self.tokens[0] == ",":
             self.tokens.pop(0)
-            arguments.append(self.sum())
+            arguments.append(self.value())
         self.expect(")")
         if len(arguments) != arity:
             raise ExpressionError(f"{name}() takes {arity} values, found {len(arguments)}")
