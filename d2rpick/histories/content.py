@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     Addresses = NDArray[np.int64]
 
 _HELD: Final = 1 << 24  # a file up to this size is held in memory
+_LINES: Final = 1 << 16  # bytes in which line ends are counted at a time
 _END: Final = 1 << 12  # bytes at both ends of what counts, by which a file that has grown is known again
 
 
@@ -247,6 +248,12 @@ def stored(name: str) -> bytes | OnDisk:
             return state
         on_disk = OnDisk(name, os.dup(file.fileno()), state)
     return bytes(on_disk) if len(on_disk) <= _HELD else on_disk
+
+
+def line_at(data: Content, address: int) -> int:
+    """Number of the line at an address, from 1."""
+    pieces = (data[at : min(at + _LINES, address)] for at in range(0, address, _LINES))
+    return 1 + sum(piece.count(b"\n") for piece in pieces)
 
 
 def _gathered(data: Bytes, addresses: Addresses, width: int) -> Bytes:

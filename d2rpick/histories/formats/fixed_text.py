@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import FormatError
-from d2rpick.histories.content import content_of
-from d2rpick.histories.formats.blocks import CHUNK, UNSURE, BlockLayout, Grammar, Stretch, like_example
+from d2rpick.histories.content import content_of, line_at
+from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, Stretch, like_example
 from d2rpick.histories.formats.printed import decode
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable, Iterator, Mapping, Sequence
+    from collections.abc import Hashable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     Fields = NDArray[np.bytes_]
 
-_RECENT: Final = 4  # layouts tried before a block is taken apart
+_RECENT: Final = 12  # layouts tried before a block is taken apart
 _LINE: Final = 1 << 10  # no first line of a block is longer
 _NEAR: Final = 1 << 12  # fields closer than this are compared in one piece
 
@@ -39,12 +39,10 @@ class Portions(NamedTuple):
     """How much of a text is looked at together."""
 
     many: int = 64  # of so many blocks it is remembered what differs between them, a small share of the file
-    chunk: int = CHUNK  # bytes in which the beginning of a line is looked for
     batch: int = 1 << 14  # numbers that are converted: they stay in the cache
 
 
 PORTIONS: Final = Portions()
-_NOTHING: Final[Mapping[int, Fields]] = {}
 
 
 class Blocks:
@@ -120,22 +118,27 @@ class Blocks:
         if anchors and not self._compared and (self._trusted or not self._alike(names, anchors)):
             self._compare_in_full(names)  # who asks again will go on asking: one comparison is for all
         self._trusted = self._trusted or bool(anchors)
-        if self._ahead and tuple(names) == self._asked_ahead:
-            taken, self._ahead = self._ahead, {}  # who asks again has them
-            return self._table(names, taken)
-        moving = self._moving(names)
-        if 2 * np.count_nonzero(moving) > moving.size:
-            return self._table(names)
+        taken: dict[int, Fields] = {}
+        if tuple(names) == self._asked_ahead:
+            taken, self._ahead = self._ahead, taken  # who asks again has them
         values = np.zeros((self.states, len(names)))  # memory that is never written costs nothing
-        still = [name for name, moves in zip(names, moving.tolist(), strict=True) if not moves]
-        row = 0
+        few, row = np.ones(self.states, bool), 0
         for run in self:
-            first = (run.start + self._offsets(run, still)).view(np.float64)
-            self._fetch(first, still)
-            if first.view(np.int64).any():
-                values[row : row + run.repeats, ~moving] = first
-            row += run.repeats
-        values[:, moving] = self._table([name for name, moves in zip(names, moving.tolist(), strict=True) if moves])
+            rows = slice(row, row := row + run.repeats)
+            offsets = self._offsets(run, names)
+            if run.start in self._varied:
+                self._read(values[rows], run, offsets, taken.get(run.start))
+                few[rows] = False
+            else:  # each address gives way to the number found there
+                np.add(_starts(run, 0, run.repeats), offsets, out=values[rows].view(np.int64))
+        together = values if few.all() else values[few]
+        flat, batch = together.reshape(-1), self._portions.batch
+        for at in range(0, flat.size, batch):
+            flat[at : at + batch] = self._decoded(flat[at : at + batch].view(np.int64))
+        if together is not values:
+            values[few] = together
+        self._data.check()
+        self._refuse_odd(values, names)
         return values
 
     def admit_rest(self, names: Sequence[Hashable]) -> None:
@@ -150,85 +153,58 @@ class Blocks:
         self.states += 1
         self.notes = (*self.notes[:-1], "the file ends within its last state, after the lines that were needed")
 
-    def line(self, address: int) -> int:
-        """Find the number of the line at ``address``, from 1."""
-        chunk = self._portions.chunk
-        return 1 + sum(self._data[at : min(at + chunk, address)].count(b"\n") for at in range(0, address, chunk))
-
     def text(self, start: int, size: int) -> bytes:
         """Copy a piece of the whole lines of the file."""
         return self._data[start : min(start + size, self._end)]
 
-    def _fetch(self, values: Samples, names: Sequence[Hashable]) -> None:
-        """Replace the addresses in ``values`` by the numbers that stand there."""
-        grammar, batch = self._grammar, self._portions.batch
-        addresses = values.view(np.int64)
-        for at in range(0, values.size, batch):
-            where = addresses[at : at + batch].copy()
-            fields = self._data.fields(where, grammar.width).view(f"S{grammar.width}").ravel()
-            found = decode(fields, grammar.decimals)
-            values[at : at + batch] = found
-            if np.isnan(found).any():
-                self._data.check()
-                bad = int(np.argmax(np.isnan(found)))
-                address, name = int(where[bad]), names[(at + bad) % len(names)]
-                text = self.text(address, grammar.width).decode("latin-1").strip()
-                what = f"{self.source}:{self.line(address)}: {_spoken(name)} is {text!r}"
-                raise FormatError(f"{what}, a number in its columns was expected; cut the file before this state")
-        self._data.check()
+    def _read(self, values: Samples, run: Stretch, offsets: Addresses, taken: Fields | None) -> None:
+        """Read the numbers of a run of many blocks, which may have been taken; what never changes is read once."""
+        before = np.append(0, np.cumsum(self._varied[run.start] != 0))
+        moves = before[offsets + self._grammar.width] > before[offsets]
+        still = self._decoded(run.start + offsets[~moves])
+        if still.view(np.int64).any():
+            values[:, ~moves] = still
+        moving = slice(None) if moves.all() else np.flatnonzero(moves)  # without copies, as mostly
+        step = max(1, self._portions.batch // max(1, offsets[moving].size))
+        for at in range(0, run.repeats if moves.any() else 0, step):
+            end = min(at + step, run.repeats)
+            if taken is None:
+                found = self._decoded((_starts(run, at, end) + offsets[moving]).ravel())
+            else:
+                found = decode(taken[at:end, moving].ravel(), self._grammar.decimals)
+            values[at:end, moving] = found.reshape(end - at, -1)
 
-    def _moving(self, names: Sequence[Hashable]) -> NDArray[np.bool_]:
-        """Tell of each number whether it may differ from state to state, shape (len(names),)."""
-        moving = np.full(len(names), not self._varied)
+    def _decoded(self, addresses: Addresses) -> Samples:
+        """Numbers at these addresses, NaN for what is none."""
+        fields = self._data.fields(addresses, self._grammar.width)
+        return decode(fields.view(f"S{self._grammar.width}").ravel(), self._grammar.decimals)
+
+    def _refuse_odd(self, values: Samples, names: Sequence[Hashable]) -> None:
+        """FormatError with the line of the first of values (states, len(names)) that is no number."""
+        odd = np.isnan(values)
+        if not odd.any():
+            return
+        state, place = divmod(int(odd.argmax()), len(names))
+        run, state = self._run_of(state)
+        address = run.start + state * run.stride + int(self._offsets(run, names)[place])
+        text = self.text(address, self._grammar.width).decode("latin-1").strip()
+        what = f"{self.source}:{line_at(self._data, address)}: {_spoken(names[place])} is {text!r}"
+        raise FormatError(f"{what}, a number in its columns was expected; cut the file before this state")
+
+    def _run_of(self, state: int) -> tuple[Stretch, int]:
+        """Find the run that a state belongs to, and its place there."""
         for run in self:
-            if run.repeats == 1:
-                continue
-            if run.start not in self._varied:
-                return np.ones_like(moving)
-            moving |= self._moves(run, names)
-        return moving
-
-    def _moves(self, run: Stretch, names: Sequence[Hashable]) -> NDArray[np.bool_]:
-        """Tell the same of the blocks of a run whose differences are known."""
-        before = np.concatenate([[0], np.cumsum(self._varied[run.start] != 0)])
-        offsets = self._offsets(run, names)
-        return np.asarray(before[offsets + self._grammar.width] > before[offsets])
-
-    def _table(self, names: Sequence[Hashable], taken: Mapping[int, Fields] = _NOTHING) -> Samples:
-        """Numbers of all states, shape (states, len(names)): of some runs they are at hand, the others are fetched."""
-        values, left = np.empty((self.states, len(names))), np.ones(self.states, bool)
-        addresses = values.view(np.int64)  # each address gives way to the number found there
-        row = 0
-        for run in self:
-            rows = slice(row, row := row + run.repeats)
-            if run.start in taken:
-                values[rows] = self._converted(taken[run.start][: run.repeats], self._moves(run, names))
-                left[rows] = np.isnan(values[rows]).any()  # it is fetched again to say where
-            if left[rows.start]:
-                starts = run.start + run.stride * np.arange(run.repeats)
-                np.add(starts[:, None], self._offsets(run, names), out=addresses[rows])
-        fetched = values if left.all() else values[left]
-        self._fetch(fetched.reshape(-1), names)
-        if fetched is not values:
-            values[left] = fetched
-        return values
-
-    def _converted(self, fields: Fields, moving: NDArray[np.bool_]) -> Samples:
-        """Numbers of fields (states, names), NaN for what is none; what is the same in all states only once."""
-        values, decimals = np.empty(fields.shape), self._grammar.decimals
-        values[:, ~moving] = decode(fields[0, ~moving], decimals)
-        step = max(1, self._portions.batch // max(1, int(moving.sum())))
-        for at in range(0, len(fields), step):
-            some = fields[at : at + step, moving]
-            values[at : at + step, moving] = decode(some.ravel(), decimals).reshape(some.shape)
-        return values
+            if state < run.repeats:
+                return run, state
+            state -= run.repeats
+        raise AssertionError("there is such a state")
 
     def _offsets(self, run: Stretch, names: Sequence[Hashable]) -> Addresses:
         layout = self.layout(run.example, run.stride)
         for name in names:
             if layout.fields.get(name, UNSURE) == UNSURE:
                 raise FormatError(
-                    f"{self.source}:{self.line(run.start)}: {_spoken(name)} is missing, cut or doubled in "
+                    f"{self.source}:{line_at(self._data, run.start)}: {_spoken(name)} is missing, cut or doubled in "
                     "the state that begins here, each state should have it once; leave it out or cut the file"
                 )
         return np.array([layout.fields[name] for name in names], dtype=np.int64)
@@ -266,15 +242,14 @@ class Blocks:
         if is_last:
             self.complete, self.rest = False, block
         where = "the file" if is_last else "a leg of the run"
-        self.notes += (f"{where} ends within the state of line {self.line(block.start)}, which was left out",)
+        self.notes += (f"{where} ends within the state of line {line_at(self._data, block.start)}, which was left out",)
 
     def _known(self, position: int, recent: list[tuple[int, int]]) -> tuple[int, int, int] | None:
         """Try the recent layouts: example, stride and count of the blocks that follow one of them."""
-        for example, stride in recent:
-            count = self._count(position, example, stride)
-            if count:
-                return example, stride, count
-        return None
+        start = self._grammar.start
+        fitting = (one for one in recent if self.text(position + one[1], len(start)) == start)
+        counted = ((*one, self._count(position, *one)) for one in fitting)
+        return next((found for found in counted if found[2]), None)
 
     def _new(self, position: int, recent: list[tuple[int, int]]) -> tuple[int, int, int]:
         """Take the block apart: the same for a layout not met before."""
@@ -378,14 +353,16 @@ class Blocks:
 
     def _find(self, position: int) -> int | None:
         """Address of the next line that begins a block."""
-        start, chunk = self._grammar.start, self._portions.chunk
+        start = self._grammar.start
         if position == 0 and self.text(0, len(start)) == start:
             return 0
-        for at in range(max(0, position - 1), self._end, chunk):
-            found = self.text(at, chunk + len(start)).find(b"\n" + start)
-            if found >= 0:
-                return at + found + 1
-        return None
+        found = self._data.find(b"\n" + start, max(0, position - 1)) + 1
+        return found if 0 < found < self._end else None
+
+
+def _starts(run: Stretch, first: int, behind: int) -> Addresses:
+    """Addresses of some blocks of a run, shape (behind - first, 1)."""
+    return run.start + run.stride * np.arange(first, behind)[:, np.newaxis]
 
 
 def _spoken(name: Hashable) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import FormatError
 from d2rpick.base.files import beyond, long_line
-from d2rpick.histories.content import Content, OnDisk
+from d2rpick.histories.content import Content, OnDisk, line_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -121,10 +121,9 @@ class Text:
         return lines
 
     def _check_lines(self) -> None:
-        at, piece = long_line(self._data), self._portions.piece
+        at = long_line(self._data)
         if at >= 0:
-            line = 1 + sum(self._data[begin : min(begin + piece, at)].count(b"\n") for begin in range(0, at, piece))
-            raise FormatError(f"{self.name}:{line}: the line has {beyond('LINE')}")
+            raise FormatError(f"{self.name}:{line_at(self._data, at)}: the line has {beyond('LINE')}")
 
     def _text(self, data: bytes) -> str:
         return data.decode(self._encoding)

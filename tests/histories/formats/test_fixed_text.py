@@ -54,7 +54,7 @@ def answer(read: Callable[[bytes, Portions], tuple[bytes, ...]], data: bytes, po
 
 
 # Where these blocks are many, numbers are taken ahead.
-SIZES = st.builds(Portions, st.integers(1, 4), st.sampled_from([64, 3000, 1 << 20]), st.integers(1, 12))
+SIZES = st.builds(Portions, st.integers(1, 4), st.integers(1, 12))
 
 
 @given(damaged(parts=False), SIZES)
@@ -82,7 +82,7 @@ def test_what_is_taken_ahead_is_not_fetched() -> None:
     data = Noted(glstat_text(states, states**2))
     run = Glstat(data, "glstat", ["internal energy"])
     assert run.channel("internal energy").tolist() == (states**2).tolist()
-    assert data.taken == 3  # with that of the springs, of the last state, behind which no other one begins
+    assert data.taken == 4  # of the springs, which never change, and of the last state, behind which no other begins
 
 
 def test_all_other_columns_are_read_in_one_pass_and_a_damaged_one_is_refused_alone() -> None:
