@@ -13,7 +13,7 @@ from d2rpick.histories.database import Database
 from d2rpick.histories.formats import printed
 from d2rpick.histories.formats.curves import Curves, find_curves
 from d2rpick.histories.formats.layout import Layout, find_layout, is_skipped, split
-from d2rpick.histories.formats.table_values import checked_values, line_of, plain_values
+from d2rpick.histories.formats.table_values import columns_of, line_of
 from d2rpick.histories.formats.text import UTF16, Text
 from d2rpick.histories.names import internal_energies, is_time, meant, near_miss, quantity_of, refuse_other_quantity
 
@@ -125,7 +125,7 @@ class Table(Database):
         self._begin = text.place(layout.start)
         self._needed = self._asked(selection)
         self._read: dict[int, Samples] = {}
-        self._plain = True  # until a line shows otherwise
+        self._together = True  # until a line shows otherwise
         if not is_skipped(text.unended):
             self.complete = _is_whole(text.unended, self._sample(), layout, self._needed)
             if self.complete:
@@ -163,10 +163,10 @@ class Table(Database):
         own = column - 1 if column - 1 in self._own_times else self._time
         if own == self._time:
             return self._values(column)
-        curve = checked_values(self._text, self._begin, self._layout, (own, column))
-        if not np.array_equal(curve[:, 0], self.time):
+        times, values = columns_of(self._text, self._begin, self._layout, (own, column))
+        if not np.array_equal(times, self.time):
             raise FormatError(f"{self.source}: {name!r} has other times than the first curve that is asked for")
-        return np.ascontiguousarray(curve[:, 1])
+        return values
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
         """How finely the times and these columns were printed."""
@@ -196,22 +196,24 @@ class Table(Database):
         return [row for line in lines if len(row := split(line, layout.separator)) >= layout.columns]
 
     def _values(self, column: int) -> Samples:
-        if column not in self._read and self._plain:
+        if column not in self._read and self._together:
             # first what was asked for, and what tells of the flight; who wants more mostly wants all the others
-            others = {*range(self._layout.columns)} - self._read.keys()
             telling = [own for name, own in self._columns.items() if quantity_of(name)]
-            wanted = sorted(others if self._read else {*self._needed, *telling, column})
-            columns = plain_values(self._text, self._begin, self._layout, wanted)
-            self._plain = columns is not None
-            found = zip(wanted, columns or (), strict=self._plain)
-            kept = {one: values for one, values in found if np.isfinite(values).all()}
-            for values in kept.values():
-                values.flags.writeable = False  # so that nobody needs a copy of his own
-            self._read |= kept
+            others = (
+                {*range(self._layout.columns)} - self._read.keys() if self._read else {*self._needed, *telling, column}
+            )
+            try:
+                self._keep([self._time, *(others - {self._time})])
+            except FormatError:  # which may be of a column that nobody needs
+                self._together = False
         if column not in self._read:
-            values = checked_values(self._text, self._begin, self._layout, (self._time, column))
-            self._read |= {self._time: values[:, 0].copy(), column: values[:, 1].copy()}
+            self._keep([self._time, column])
         return self._read[column]
+
+    def _keep(self, columns: Sequence[int]) -> None:
+        for column, values in zip(columns, columns_of(self._text, self._begin, self._layout, columns), strict=True):
+            values.flags.writeable = False  # so that nobody needs a copy of his own
+            self._read[column] = values
 
 
 def _is_whole(line: str, sample: Sequence[Sequence[str]], layout: Layout, used: Sequence[int]) -> bool:

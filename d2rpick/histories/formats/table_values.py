@@ -21,21 +21,8 @@ if TYPE_CHECKING:
     Cuts = tuple[NDArray[np.intp], NDArray[np.intp]]  # from where to where rows are looked at
 
 
-def plain_values(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> list[Samples] | None:
-    """Columns ``used`` of the rows from byte ``begin`` on, each of shape (rows,).
-
-    None unless each row has its number of cells and no line stands between them.
-    """
-    tables = []
-    for piece in text.pieces(begin):
-        values = _plain_piece(text, piece, layout, used)
-        if values is None:
-            return None
-        tables.append(values)
-    return [np.concatenate([table[:, place] for table in tables]) for place in range(len(used))] if tables else None
-
-
 def _plain_piece(text: Text, piece: bytes, layout: Layout, used: Sequence[int]) -> Samples | None:
+    """Columns of a piece, shape (rows, len(used)); None unless all rows have all cells and no line is between them."""
     if layout.decimal == ",":
         if b"." in piece:
             return None
@@ -106,14 +93,14 @@ def _separators(piece: bytes, layout: Layout) -> tuple[NDArray[np.intp], NDArray
     return (np.append(0, table[:-1, -1] + 1), table[:, :-1]) if whole else None
 
 
-def checked_values(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> Samples:
-    """Values with comments and blank lines between the rows, shape (rows, len(used)).
+def columns_of(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> list[Samples]:
+    """Columns ``used`` of the rows from byte ``begin`` on, that of the times first, each of shape (rows,).
 
-    Where all cells are empty the curve has ended: another one beside it goes on.  FormatError with the line that is
-    wrong.
+    Between the rows may be comments and blank lines.  Where all cells are empty the curve has ended: another one beside
+    it goes on.  FormatError with the line that is wrong.
     """
-    tables = [table for _, table in _tables(text, begin, layout, used)]
-    return np.concatenate(tables) if tables else np.empty((0, len(used)))
+    tables = [table for _, table in _tables(text, begin, layout, used)] or [np.empty((0, len(used)))]
+    return [np.concatenate([table[:, place] for table in tables]) for place in range(len(used))]
 
 
 def line_of(text: Text, begin: int, layout: Layout, time: int, state: int) -> int:
@@ -132,13 +119,15 @@ def _tables(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> Iter
     for piece in text.pieces(begin):
         table = _plain_piece(text, piece, layout, used)
         if table is not None and np.isfinite(table).all() and not curve.stops_before(float(table[0, 0])):
-            yield range(number, number + len(table)), table
+            rows = len(table)
+            yield range(number, number + rows), table
             curve.before, curve.gap = float(table[-1, 0]), False
         else:
+            rows = piece.count(b"\n")
             states = list(curve.states(text.rows(piece), number))
             if states:
                 yield [line for line, _ in states], np.array([state for _, state in states])
-        number += piece.count(b"\n")
+        number += rows
 
 
 class _Curve:
