@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from d2rpick.base.errors import HistoryError as HistoryError
     from d2rpick.base.errors import RangeError as RangeError
     from d2rpick.choice.cost import Weights as Weights
-    from d2rpick.running.events import Event as Event
+    from d2rpick.running.watch import Event as Event
     from d2rpick.vibration.oscillator import Oscillator as Oscillator
 
 _HOME = {
@@ -73,7 +73,7 @@ _HOME = {
     **dict.fromkeys(("FirstRun", "first", "follow"), "api.running"),
     **dict.fromkeys(("Run", "from_frame", "read"), "api.runs"),
     **dict.fromkeys(("Study", "study"), "api.studies"),
-    "Event": "running.events",
+    "Event": "running.watch",
     "Oscillator": "vibration.oscillator",
     "Weights": "choice.cost",
 }

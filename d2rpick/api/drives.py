@@ -16,10 +16,8 @@ from d2rpick.choice.deck_of_run import doubts_of_solver
 from d2rpick.deck import read_inventory
 from d2rpick.deck.writing import driven_deck
 from d2rpick.histories.opening import open_run
-from d2rpick.running.drive import JOURNAL, Driven, Driver
+from d2rpick.running.drive import JOURNAL, Driven, Driver, Journal, Looks
 from d2rpick.running.engine import Commands, Solver, alone
-from d2rpick.running.journal import Journal
-from d2rpick.running.look import Looks
 from d2rpick.running.sequence import Limits, windows
 from d2rpick.running.wait import check_wait, wait_of_deck
 

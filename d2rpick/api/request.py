@@ -79,7 +79,7 @@ CHOOSING: Final = (*LIMITS, "cost_share", "step_ratio")
 _IN_MEMORY: Final = "<weights in memory>"
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Request:
     """What is asked about a run, times in the unit of the history; ArgumentError where it contradicts itself.
 

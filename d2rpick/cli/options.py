@@ -13,6 +13,7 @@ from click.core import ParameterSource
 from d2rpick.api.cards import Cards
 from d2rpick.api.request import CHOOSING, JUDGING, OSCILLATOR, READING, TIME, Option, Request, dashed, options_of
 from d2rpick.base.errors import ArgumentError
+from d2rpick.base.settings import nearest_settings
 from d2rpick.cli import Documented, documented
 from d2rpick.cli.output import Output, tell, text_bytes, with_options
 from d2rpick.cli.values import CARDS, click_type, settings_of, spelled, words_of
@@ -65,10 +66,12 @@ class Command(Documented):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Read the command line; what neither it nor the environment gives, the settings may."""
-        if not ctx.resilient_parsing:
+        table, source = ({}, "") if ctx.resilient_parsing else nearest_settings(os.curdir)
+        ctx.meta["d2rpick.settings"] = source
+        if table:
             without = click.Context(self, ctx.parent, ctx.info_name, resilient_parsing=True)
             super().parse_args(without, list(args))
-            ctx.default_map, ctx.meta["d2rpick.settings"] = settings_of(ctx, without)
+            ctx.default_map = settings_of(ctx, without, table, source)
         rest = super().parse_args(ctx, args)
         if words := words_of(ctx):
             ctx.meta["d2rpick.command"] = inserted(ctx.meta["d2rpick.command"], words)

@@ -13,7 +13,7 @@ from click.core import ParameterSource
 from d2rpick.api.cards import SETTINGS, Cards
 from d2rpick.api.request import JUDGING, UNLIMITED, Number, options_of, typed
 from d2rpick.base.errors import ConfigurationError
-from d2rpick.base.settings import RULE_KEYS, nearest_settings, refuse_unknown
+from d2rpick.base.settings import RULE_KEYS, refuse_unknown
 from d2rpick.cli import COMMANDS
 
 if TYPE_CHECKING:
@@ -196,8 +196,8 @@ _BESIDE: Final[dict[str | None, tuple[str, ...]]] = {
 }
 
 
-def settings_of(ctx: click.Context, without: click.Context) -> tuple[dict[str, Any], str]:
-    """Values of options by name, as the settings nearest to the working folder give them, and their file.
+def settings_of(ctx: click.Context, without: click.Context, table: Mapping[str, object], source: str) -> dict[str, Any]:
+    """Values of options by name, as the ``table`` of settings gives them that was read from ``source``.
 
     Keys of all commands stand above, those of one command in a table of its name.  ``without`` holds what the command
     line and the environment give: what they exclude counts for nothing.
@@ -207,11 +207,10 @@ def settings_of(ctx: click.Context, without: click.Context) -> tuple[dict[str, A
     ConfigurationError
         For a key that is no option, or a value that is none of it.
     """
-    table, source = nearest_settings(os.curdir)
     own = {option: _value(ctx, option, value, place) for option, value, place in _given(ctx.command, table, source)}
     given = {name: one for name, one in without.params.items() if _source(without, name) is not ParameterSource.DEFAULT}
     asked = {**{option.name: value for option, value in own.items()}, **given}
-    return {option.name or "": value for option, value in own.items() if _counts(ctx, option, given, asked)}, source
+    return {option.name or "": value for option, value in own.items() if _counts(ctx, option, given, asked)}
 
 
 def _given(

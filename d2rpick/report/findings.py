@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import textwrap
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
@@ -307,8 +306,10 @@ def as_list() -> str:
 
 def as_text(rule: Rule, width: int) -> str:
     """One rule: what it finds, why that matters, and decks that pass and fail, which are as wide as their cards."""
+    from textwrap import wrap  # not above: findings do without it
+
     title = f"{rule.id} ({rule.severity}): {rule.summary}"
-    lines = [tables.wrapped(title, width), "", *textwrap.wrap(rule.explanation, width)]
+    lines = [tables.wrapped(title, width), "", *wrap(rule.explanation, width)]
     for title, examples in (("Passes", rule.passing), ("Fails", rule.failing)):
         for example in examples:
             lines += ["", *_example(title, example, width)]

@@ -7,7 +7,7 @@ hit a block twice, nothing acted for 14 ms between the two (docs/first-run.md, "
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -17,23 +17,19 @@ from d2rpick.flight.window import FEWEST, TOLERANCE, Constant, farthest
 from d2rpick.histories.history import rows_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from d2rpick.flight.window import Law
     from d2rpick.histories.history import Balance, History, Momenta, Precision, Samples
     from d2rpick.histories.names import Part
 
+    # Wait [time] by what was written up to now, without force since a start: (start, now); None: not known yet.
+    Needed = Callable[[float, float], float | None]
+
 # Of the largest momentum, or contact energy, so far: single precision adds up to a tenth of it.
 CONSTANT: Final = 1e-4
 # A state at which a force was taken for another one than gravity is tried again after so much of the time before it.
 _AGAIN: Final = 0.25
-
-
-class Waiting(Protocol):
-    """How long nothing must have acted at a state."""
-
-    def needed(self, start: float, now: float) -> float | None:
-        """Wait [time] by what was written up to ``now``, without force since ``start``; None: not known yet."""
 
 
 class Quiet(NamedTuple):
@@ -109,14 +105,14 @@ class _Witness:
         return float(self.time[first]) + risen if risen > lasted else None
 
 
-def quiet_times(history: History, waiting: Waiting) -> tuple[Quiet, ...]:
+def quiet_times(history: History, needed: Needed) -> tuple[Quiet, ...]:
     """Find all times without force that lasted for a wait, ascending.
 
     What is found up to a state rests on what was written up to it: as long as the run goes on the answer only grows,
     but for the ``end`` of its last member.
     """
     found = [
-        (one, float(witness.time[-1])) for witness in _witnesses(history) for one in _quiet(history, witness, waiting)
+        (one, float(witness.time[-1])) for witness in _witnesses(history) for one in _quiet(history, witness, needed)
     ]
     kept: list[Quiet] = []
     for one, reach in sorted(found, key=lambda q: q[0].seen):
@@ -161,19 +157,19 @@ def highest_energy(history: History, start: float, end: float) -> float:
     return float(time[energy.size - 1 - int(np.argmax(energy[::-1]))])
 
 
-def _quiet(history: History, witness: _Witness, waiting: Waiting) -> Iterator[Quiet]:
+def _quiet(history: History, witness: _Witness, needed: Needed) -> Iterator[Quiet]:
     for first, last in witness.stretches():
-        if found := _seen(history, witness, waiting, first, last):
+        if found := _seen(history, witness, needed, first, last):
             yield found
 
 
-def _seen(history: History, witness: _Witness, waiting: Waiting, first: int, last: int) -> Quiet | None:
+def _seen(history: History, witness: _Witness, needed: Needed, first: int, last: int) -> Quiet | None:
     """Look at the states from ``first`` to ``last``, between which the law holds, for one at which a wait is over."""
     time, state = witness.time, first + FEWEST - 1
     start = float(time[first])
     while state <= last:
         now = float(time[state])
-        wait = waiting.needed(start, now)
+        wait = needed(start, now)
         if wait is None or now - start < wait:
             state += 1
             continue

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from d2rpick.histories.history import EXACT, Balance, History, Momenta
-from d2rpick.running.events import events_of
 from d2rpick.running.wait import InnerMotion
+from d2rpick.running.watch import events_of
 from tests.records import table, until
 
 # Pushes [s] of half a sine, and the period of what swings inside from the first on [s].

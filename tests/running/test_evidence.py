@@ -43,7 +43,7 @@ def test_flights_of_computed_runs_are_seen_and_gaps_in_the_load_are_not(
     name: str, expected: list[tuple[float, float]]
 ) -> None:
     history = record(name)
-    found = quiet_times(history, InnerMotion(history))
+    found = quiet_times(history, InnerMotion(history).needed)
     assert spans(found)[: len(expected)] == pytest.approx(np.array(expected), abs=5e-4)
     assert all(one.seen - one.start >= one.wait and one.left <= 1e-4 for one in found)
     assert all(one.gravity == pytest.approx(9.81, rel=5e-3) for one in found)
@@ -52,7 +52,7 @@ def test_flights_of_computed_runs_are_seen_and_gaps_in_the_load_are_not(
 def test_a_swing_with_a_push_in_it_makes_no_wait_longer() -> None:
     """In the box the longest swing was pushed at 302 ms and took 24 ms, half of the period of the springs is 17 ms."""
     for before in (None, Wait(0.018, "record", "as in the flight before")):
-        waits = [one.wait for one in quiet_times(record(BOX), InnerMotion(record(BOX), None, before))]
+        waits = [one.wait for one in quiet_times(record(BOX), InnerMotion(record(BOX), None, before).needed)]
         assert all(0.016 <= one <= 0.021 for one in waits[1:])
 
 
@@ -60,12 +60,12 @@ def test_a_swing_with_a_push_in_it_makes_no_wait_longer() -> None:
 def test_a_wait_below_half_of_a_known_period_is_refused(name: str) -> None:
     history = record(name)
     with pytest.raises(RangeError, match=r"`wait` 0\.002 is below"):
-        quiet_times(history, InnerMotion(history, 0.002))
+        quiet_times(history, InnerMotion(history, 0.002).needed)
 
 
 def test_the_wait_that_was_measured_in_the_car_is_not_refused() -> None:
     history = until(record(CAR), 0.14)
-    last = quiet_times(history, InnerMotion(history, 0.022))[-1]
+    last = quiet_times(history, InnerMotion(history, 0.022).needed)[-1]
     assert last.start == pytest.approx(0.0383, abs=5e-4)
     assert last.wait == 0.022
 
@@ -73,10 +73,10 @@ def test_the_wait_that_was_measured_in_the_car_is_not_refused() -> None:
 @pytest.mark.parametrize("name", [CAR, BOX])
 def test_what_is_seen_rests_on_no_later_state(name: str) -> None:
     history = record(name)
-    found = quiet_times(history, InnerMotion(history))
+    found = quiet_times(history, InnerMotion(history).needed)
     for time in history.time[[300, 560, 640, 900]].tolist():
         early = until(history, time)
-        seen = quiet_times(early, InnerMotion(early))
+        seen = quiet_times(early, InnerMotion(early).needed)
         assert [one[:2] for one in seen] == [one[:2] for one in found if one.seen <= time]
 
 
@@ -88,7 +88,7 @@ def test_a_rigid_leg_shows_its_contact_by_the_model_alone() -> None:
 
 def test_flights_are_seen_before_between_and_in_rigid_legs() -> None:
     switched = record(*(f"drop2_w123_T0{leg}.gz" for leg in (1, 2, 3, 4)))
-    found = quiet_times(switched, InnerMotion(switched))
+    found = quiet_times(switched, InnerMotion(switched).needed)
     assert spans(found)[:2] == pytest.approx(np.array([(0.0, 0.2858), (0.3022, 0.3386)]), abs=1e-3)
 
 
@@ -102,7 +102,7 @@ def test_the_highest_energy_is_that_of_a_state_in_the_span() -> None:
 def test_flights_begin_and_end_where_info_and_plan_find_them() -> None:
     history = record(BOX)
     listed = np.array([bounds(history, one) for one in flights_of(history, Settings())])
-    for one in quiet_times(history, InnerMotion(history)):
+    for one in quiet_times(history, InnerMotion(history).needed):
         found = one.start, history.time[-1] if one.end is None else one.end
         if found[1] - one.start < 2 * one.wait:
             continue  # info lists none that is so short beside the others
@@ -112,10 +112,10 @@ def test_flights_begin_and_end_where_info_and_plan_find_them() -> None:
 def test_a_flight_that_rises_says_when_it_is_level_again() -> None:
     """The rollover box rises by 1.5 m/s; it lands 6 % before that, turned."""
     rising = open_run([str(ROOT / "sample_data" / "rolloverT01.gz")]).history(Selection(parts=("box",)))
-    (one,) = (q for q in quiet_times(rising, InnerMotion(rising)) if q.start < 0.2)
+    (one,) = (q for q in quiet_times(rising, InnerMotion(rising).needed) if q.start < 0.2)
     assert one.level is not None
     assert one.level - one.start == pytest.approx(0.31, rel=0.02)
-    assert all(q.level is None for q in quiet_times(record(BOX), InnerMotion(record(BOX))) if q.start < 0.6)
+    assert all(q.level is None for q in quiet_times(record(BOX), InnerMotion(record(BOX)).needed) if q.start < 0.6)
 
 
 def test_a_record_of_as_many_states_as_parts_keeps_the_masses_of_all() -> None:

@@ -11,7 +11,7 @@ from d2rpick.flight.position_error import drift_in_flight
 from d2rpick.histories.history import EXACT, History, Momenta
 from d2rpick.histories.names import Part, Selection
 from d2rpick.histories.opening import open_run
-from d2rpick.running.look import Looks
+from d2rpick.running.drive import Looks
 from d2rpick.running.sequence import Window
 from d2rpick.running.swing import swing_in
 from tests.command import ROOT, run

@@ -9,8 +9,7 @@ import pytest
 
 from d2rpick.base.errors import D2RPickError
 from d2rpick.histories.names import Selection
-from d2rpick.running.events import Event
-from d2rpick.running.watch import Watch, follow
+from d2rpick.running.watch import Event, Watch, follow
 from tests.command import ROOT
 
 LEGS = [gzip.decompress((ROOT / f"tests/data/drop2_w123_T0{leg}.gz").read_bytes()) for leg in (1, 2, 3)]
