@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from math import floor
 from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
@@ -256,6 +258,8 @@ def energy_and_jacobian(parameters: Samples, s: Samples, size: int) -> tuple[Sam
 # Points per period of the fastest mode on which sign changes are looked for: an extremum of the energy lasts a quarter
 # of that period at least, but for shallow ones that are no use as switch times.
 _POINTS_PER_PERIOD: Final = 32
+_POINTS: Final = 2048  # at a time
+_OFF_THE_GRID: Final = 1e-4  # of them: modes that begin together stand still together, on points
 _ROUNDING: Final = 1e-6  # of a radian: where an end of a window is itself an extremum, one is found this near to it
 
 
@@ -340,10 +344,9 @@ class Modes:
 
     def extrema(self, start: float, end: float) -> tuple[float, ...]:
         """Find the times in (start, end), ascending, where the energy turns [time]."""
-        step = 2 * np.pi / self.fastest / _POINTS_PER_PERIOD
-        edges = np.linspace(start, end, max(2, int(np.ceil((end - start) / step)) + 1))
-        times = _roots(lambda t: self.energy_slopes(t)[0], lambda t: self.energy_slopes(t)[1], edges)
-        return tuple(t for t in times if min(t - start, end - t) > _ROUNDING / self.fastest)
+        first, last = (floor((t - self.modes[0].origin) / _block_length(self) - _OFF_THE_GRID) for t in (start, end))
+        times = np.concatenate([np.zeros(0), *(_turns(self, block) for block in range(first, last + 1))])
+        return tuple(times[np.minimum(times - start, end - times) > _ROUNDING / self.fastest].tolist())
 
     def peaks(self, start: float, end: float) -> tuple[float, ...]:
         """Find the times in (start, end), ascending, of the local maxima of the energy [time]."""
@@ -355,6 +358,19 @@ class Modes:
         level = self.energy(td)
         edges = np.array([start, *self.extrema(start, td), td])  # in between the energy is monotone
         return _roots(lambda t: self.energy(t) - level, lambda t: self.energy_slopes(t)[0], edges, but=td)
+
+
+def _block_length(modes: Modes) -> float:
+    return _POINTS * 2 * np.pi / modes.fastest / _POINTS_PER_PERIOD
+
+
+@lru_cache(maxsize=256)
+@np.errstate(over="ignore", invalid="ignore")  # long before its record a damped vibration was beyond all numbers
+def _turns(modes: Modes, block: int) -> tuple[float, ...]:
+    """Find the times where the energy turns in a block of so many points: every td asks for the same."""
+    grid = block + _OFF_THE_GRID + np.linspace(0.0, 1.0, _POINTS + 1)
+    edges = modes.modes[0].origin + grid * _block_length(modes)
+    return _roots(lambda t: modes.energy_slopes(t)[0], lambda t: modes.energy_slopes(t)[1], edges)
 
 
 def sum_and_jacobian(parameters: Samples, s: Samples) -> tuple[Samples, Samples]:

@@ -164,6 +164,20 @@ def test_crossings_and_extrema_are_where_the_energy_says() -> None:
     assert set(TWO.peaks(0.0, td)) < set(turns)
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_no_window_hides_an_extremum_whichever_are_looked_for_first(seed: int) -> None:
+    """Over some hundred periods, in which they are found part by part; before the origin too."""
+    rng = np.random.default_rng(seed)
+    modes = random_modes(rng, 2 + seed % 2)
+    windows = np.sort(rng.uniform(-40, 150, (5, 2)))
+    parts = [modes.extrema(*window) for window in windows.tolist()]
+    whole = np.array(modes.extrema(-40.0, 150.0))
+    for (start, end), part in zip(windows, parts, strict=True):
+        assert part == tuple(whole[(whole > start) & (whole < end)])
+    fine = modes.energy_slopes(np.arange(-40.0, 150.0, 1 / 32 / 4 / 8))[0]
+    assert 0.98 * np.count_nonzero(np.sign(fine[1:]) != np.sign(fine[:-1])) <= whole.size  # all but shallow ones
+
+
 def test_the_jacobian_is_that_of_the_energy() -> None:
     parameters = np.array([0.3, 5.0, 1.0, -0.4, 8.0, 0.2, 0.7])
     for at in (0.0, 0.4, 1.0):
