@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from contextlib import suppress
 from functools import cached_property
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -102,8 +102,8 @@ class Database:
 class Branched(Database):
     """A database that has the whole model in one branch, as of a glstat, and the parts in another, as of a matsum."""
 
-    def branch(self, name: str) -> Branch:
-        """Give the branch ``glstat`` or ``matsum``; FormatError where it is not there."""
+    def branch(self, name: str) -> Database:
+        """Give the branch ``glstat`` or ``matsum``, each with its own times; FormatError where it is not there."""
         raise NotImplementedError
 
     @cached_property
@@ -123,20 +123,6 @@ class Branched(Database):
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
         """One quantity of some parts, shape (m, len(ids))."""
         return self.branch("matsum").part_channel(quantity, ids)
-
-
-class Branch(Protocol):
-    """Columns with times of their own."""
-
-    @property
-    def time(self) -> Samples:
-        """Times of the columns, shape (n,) [time]."""
-
-    def channel(self, name: str) -> Samples:
-        """One column, shape (n,)."""
-
-    def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """One quantity of some parts, shape (n, len(ids))."""
 
 
 # An interval so many times the median one is no output interval.

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.errors import FormatError, listing
-from d2rpick.histories.database import DIGITS, Branched
+from d2rpick.histories.database import DIGITS, Branched, Database
 from d2rpick.histories.formats.lsda import DirectoryLayout, Lsda, Variable, recognises
 from d2rpick.histories.names import Part, Selection, plain_text
 
@@ -66,17 +66,17 @@ class Group:
 
 def _start(file: Lsda, branch: str) -> float:
     """Time of the first state of a branch in a file; before all others where it has none."""
-    visits = file.visits[branch]
-    variable = file.layouts[visits.layouts[0]].variables.get("time")
+    _, start, layout = file.visits[branch][:3]
+    variable = file.layouts[layout].variables.get("time")
     if variable is None or not variable.count:
         return -np.inf
-    return float(file.read(np.array([visits.starts[0] + variable.offset]), variable.dtype)[0])
+    return float(file.read(np.array([start + variable.offset]), variable.dtype)[0])
 
 
 def _is_unfinished(file: Lsda, branch: str) -> bool:
     """Whether the file ends in a state of this branch that differs from the one before."""
-    layouts = file.visits[branch].layouts
-    return file.unfinished == branch and len(layouts) > 1 and layouts[-1] != layouts[-2]
+    layouts = file.visits[branch][2::3][-2:]
+    return file.unfinished == branch and len({*layouts}) > 1
 
 
 def _damages(numbers: Indices, layouts: Sequence[DirectoryLayout], where: str) -> Iterator[str]:
@@ -100,7 +100,7 @@ def _groups(layouts: Sequence[tuple[Lsda, DirectoryLayout]], kinds: Indices, sta
         yield Group(file, layout, rows, starts[rows])
 
 
-class Branch:
+class Branch(Database):
     """The states of one branch in all files of a family; false when no file knows the branch.
 
     A solver numbers its states one by one.  Where a file begins higher than the last one ended, a member of
@@ -125,7 +125,7 @@ class Branch:
 
     def __init__(self, name: str, files: Sequence[Lsda], *, by_part: bool) -> None:
         self.name, self._by_part, self._files = name, by_part, files
-        visited = sorted((file for file in files if file.visits[name].numbers), key=lambda file: _start(file, name))
+        visited = sorted((file for file in files if file.visits[name]), key=lambda file: _start(file, name))
         self._unfinished = [file.source for file in visited if _is_unfinished(file, name)]  # less their last state
         damages = [
             f"{file.source}: {name} has {file.odd[name][0]!r}, which is not a state" for file in files if file.odd[name]
@@ -133,12 +133,11 @@ class Branch:
         numbers, starts, kinds = np.empty((3, 0), dtype=np.int64)
         layouts: list[tuple[Lsda, DirectoryLayout]] = []
         for file in visited:
-            visits = file.visits[name]
-            whole = slice(len(visits.numbers) - (file.source in self._unfinished))
-            here, used = np.array(visits.numbers[whole]), visits.layouts[whole]
-            damages += _damages(here, [file.layouts[kind] for kind in set(used)], f"{file.source}: {name}")
-            numbers, starts = np.append(numbers, here), np.append(starts, np.array(visits.starts[whole]))
-            kinds = np.append(kinds, np.array(used) + len(layouts))
+            states = file.states(name)
+            here, begin, used = states[: len(states) - (file.source in self._unfinished)].T
+            damages += _damages(here, [file.layouts[kind] for kind in {*used.tolist()}], f"{file.source}: {name}")
+            numbers, starts = np.append(numbers, here), np.append(starts, begin)
+            kinds = np.append(kinds, used + len(layouts))
             layouts += [(file, layout) for layout in file.layouts]
         self.damage = damages[-1] if damages else ""
         self._numbers = numbers
@@ -146,23 +145,14 @@ class Branch:
         self._variables = [group.layout.variables for group in self._groups]
         holes = np.flatnonzero(np.diff(numbers) > 1)
         self._missing = tuple(f"{numbers[i] + 1} to {numbers[i + 1] - 1}" for i in holes)
+        self.source = f"{', '.join(file.source for file in files if name in file.names)}: {name}"
+        self.complete = not (self._missing or self._unfinished or self.damage)
+        self.notes = self._remarks()
 
     def __bool__(self) -> bool:
         return any(self.name in file.names for file in self._files)
 
-    @property
-    def source(self) -> str:
-        """The files that hold this branch, and the branch, for messages."""
-        holders = [file.source for file in self._files if self.name in file.names]
-        return f"{', '.join(holders)}: {self.name}"
-
-    @property
-    def complete(self) -> bool:
-        """Whether no state is missing and the last one is whole."""
-        return not (self._missing or self._unfinished or self.damage)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
+    def _remarks(self) -> tuple[str, ...]:
         """What was left out, what is missing, what only some states hold."""
         notes = [f"{name}: the last state of {self.name} is not whole and was left out" for name in self._unfinished]
         if self.damage:
@@ -225,7 +215,7 @@ class Branch:
                 return plain_text(file.raw(start, layout.variables[name]))
         return ""
 
-    @property
+    @cached_property
     def time(self) -> Samples:
         """Times of the states, shape (n,) [time]."""
         return self.channel("time")

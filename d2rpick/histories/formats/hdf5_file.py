@@ -141,18 +141,16 @@ class SavedBinout(Branched):
         return self._branches[name]
 
 
-class PartGroup:
+class PartGroup(Database):
     """The glstat or matsum branch of a file that lasso-python saved."""
 
     def __init__(self, file: BinaryIO, source: str, opened: h5py.File, name: str) -> None:
-        self._file, self._source, self.name = file, source, name
+        self._file, self.source, self.name = file, source, name
         group = opened[name]
         self.title = _line(group, "title")
         self.version = " ".join(text for text in (_line(group, "version"), _line(group, "revision")) if text)
         check_data(group["time"], source)
         self.time: Samples = finite(group["time"][()], f"{name}/time", source).reshape(-1)
-        self.channels: tuple[str, ...] = ()
-        self.parts: tuple[Part, ...] = ()
         if "ids" in group:
             self.parts = _parts(group, source)
         else:
@@ -165,8 +163,8 @@ class PartGroup:
     def channel(self, name: str) -> Samples:
         """Values of the dataset ``name``, shape (n,)."""
         if name not in self.channels:
-            raise FormatError(f"{self._source}: {self.name} has no channel {name!r}, only {', '.join(self.channels)}")
-        with _opened(self._file, self._source) as opened:
+            raise FormatError(f"{self.source}: {self.name} has no channel {name!r}, only {', '.join(self.channels)}")
+        with _opened(self._file, self.source) as opened:
             return self._load(opened[self.name], name, (self.time.size,))
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
@@ -174,22 +172,22 @@ class PartGroup:
         known = [part.id for part in self.parts]
         missing = [id_ for id_ in ids if known.count(id_) != 1]
         if missing:
-            found = f"{self._source}: {self.name} has not exactly one part {', '.join(map(str, missing))}"
+            found = f"{self.source}: {self.name} has not exactly one part {', '.join(map(str, missing))}"
             raise FormatError(f"{found}; choose from {', '.join(map(str, known)) or 'none'}")
-        with _opened(self._file, self._source) as opened:
+        with _opened(self._file, self.source) as opened:
             group = opened[self.name]
             if quantity not in group:
-                raise FormatError(f"{self._source}: {self.name} has no {quantity}")
+                raise FormatError(f"{self.source}: {self.name} has no {quantity}")
             values = self._load(group, quantity, (self.time.size, len(known)))
         return values[:, [known.index(id_) for id_ in ids]]
 
     def _load(self, group: h5py.Group, name: str, shape: tuple[int, ...]) -> Samples:
         """Dataset ``name``, which may lack the axes of length 1 of ``shape``."""
         dataset = group[name]
-        check_data(dataset, self._source)
+        check_data(dataset, self.source)
         if [size for size in dataset.shape if size != 1] != [size for size in shape if size != 1]:
-            raise FormatError(f"{self._source}: {dataset.name} has shape {dataset.shape}, {shape} was expected")
-        return finite(dataset[()], dataset.name, self._source).reshape(shape)
+            raise FormatError(f"{self.source}: {dataset.name} has shape {dataset.shape}, {shape} was expected")
+        return finite(dataset[()], dataset.name, self.source).reshape(shape)
 
 
 def _parts(group: h5py.Group, source: str) -> tuple[Part, ...]:

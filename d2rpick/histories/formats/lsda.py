@@ -17,7 +17,7 @@ from __future__ import annotations
 import re
 import struct
 from array import array
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -80,39 +80,6 @@ class _Form(NamedTuple):
     fixed: int
 
 
-@dataclass
-class Visits:
-    """Every time the file enters a numbered directory of one branch, in the order of the file.
-
-    Three plain arrays, since there may be a million: the number of the state, the byte where its records
-    start, and which of `Lsda.layouts` it has.
-    """
-
-    numbers: array[int] = field(default_factory=lambda: array("q"))
-    starts: array[int] = field(default_factory=lambda: array("q"))
-    layouts: array[int] = field(default_factory=lambda: array("i"))
-
-    def append(self, number: int, start: int, layout: int) -> None:
-        """Add one visit."""
-        self.numbers.append(number)
-        self.starts.append(start)
-        self.layouts.append(layout)
-
-    def repeat(self, steps: dict[int, int], stride: int, times: int) -> None:
-        """Add the last visits ``times`` more, each ``stride`` bytes on.
-
-        ``steps`` says which they are: by how much the number of the state that starts at a byte grows.
-        """
-        tail = sum(1 for start in self.starts[-len(steps) :] if start in steps)
-        if not tail:
-            return
-        growth = np.array([steps[start] for start in self.starts[-tail:]])
-        ahead = np.arange(1, times + 1)[:, None]
-        for column, advance in ((self.numbers, growth), (self.starts, stride), (self.layouts, 0)):
-            last = np.array(column[-tail:])
-            column.frombytes((last + advance * ahead).astype(last.dtype).tobytes())
-
-
 class Lsda:
     """The directories of one file, as a walk over its records finds them.
 
@@ -127,8 +94,9 @@ class Lsda:
 
     Attributes
     ----------
-    visits : dict of str to Visits
-        The numbered directories of each wanted branch.
+    visits : dict of str to array of int
+        Every time the file enters a numbered directory of each wanted branch, in the order of the file: the number of
+        the state, the byte where its records start, and which of ``layouts`` it has; packed, there may be a million.
     metadata : dict of str to list of (int, int)
         Start and layout of each visit to the directory ``metadata`` of a wanted branch.
     odd : dict of str to list of str
@@ -150,7 +118,7 @@ class Lsda:
     def __init__(self, content: bytes | Content, source: str, branches: Collection[str]) -> None:
         self.data = content_of(content)
         self.source = source
-        self.visits = {branch: Visits() for branch in branches}
+        self.visits = {branch: array("q") for branch in branches}
         self.metadata: dict[str, list[tuple[int, int]]] = {branch: [] for branch in branches}
         self.odd: dict[str, list[str]] = {branch: [] for branch in branches}
         self.layouts: list[DirectoryLayout] = []
@@ -166,6 +134,10 @@ class Lsda:
         found = self.data.fields(positions.ravel(), dtype.itemsize)
         self.data.check()
         return np.asarray(found.view(dtype).reshape(positions.shape))
+
+    def states(self, branch: str) -> NDArray[np.int64]:
+        """Number, start and layout of each visit to a state of a branch, shape (n, 3)."""
+        return np.array(self.visits[branch], np.int64).reshape(-1, 3)
 
     def raw(self, start: int, variable: Variable) -> bytes:
         """Bytes of one variable in the directory that starts at byte ``start``."""
@@ -246,7 +218,7 @@ class Lsda:
             layout = self._known[key] = len(self.layouts)
             self.layouts.append(self._layout(records))
         if number >= 0:
-            self.visits[path[0]].append(number, start, layout)
+            self.visits[path[0]].extend((number, start, layout))
             if self._forms.get(path[0], (-1,))[0] != layout:
                 self._forms[path[0]] = layout, self._form(key)
         elif path[1] == "metadata":
@@ -304,9 +276,13 @@ class Lsda:
         if times < 2:
             return 0
         # A number ends its record: the next byte is where the state's records start.
-        starts = [previous + at + width for at, width in pattern.numbers]
+        growth = {previous + at + width: step for (at, width), step in zip(pattern.numbers, steps, strict=True)}
+        ahead = np.arange(1, times)[:, None, None]
         for visits in self.visits.values():
-            visits.repeat(dict(zip(starts, steps, strict=True)), stride, times - 1)
+            known = np.array(visits[-3 * len(growth) :]).reshape(-1, 3)
+            repeated = known[np.isin(known[:, 1], [*growth])]
+            more = [[growth[start], stride, 0] for start in repeated[:, 1].tolist()]
+            visits.frombytes((repeated + ahead * np.array(more, np.int64).reshape(-1, 3)).tobytes())
         return (times - 1) * stride
 
     def _alike(self, previous: int, position: int) -> bool:
