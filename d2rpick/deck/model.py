@@ -155,8 +155,10 @@ class Material(NamedTuple):
     poisson: float | None = None
 
 
-@dataclass(frozen=True)
-class Section:
+_NO_FORMULATIONS: Final[Mapping[str, Formulation]] = {}
+
+
+class Section(NamedTuple):
     """Section of a part: formulations by kind of element, thickness of shells, area of beams, damping of springs.
 
     ``turns`` False: stresses of its solids do not turn with a rigid body.  ``damped`` is None where it is not known;
@@ -164,7 +166,7 @@ class Section:
     integration points through the thickness of shells.
     """
 
-    formulations: Mapping[str, Formulation] = field(default_factory=dict)
+    formulations: Mapping[str, Formulation] = _NO_FORMULATIONS
     thickness: float | None = None
     area: float | None = None
     damped: bool | None = None

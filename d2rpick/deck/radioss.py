@@ -38,8 +38,7 @@ _AIRBAG: Final = {"FABRI", "FABR_A", "LAW19", "LAW58"}
 _PLAIN_SHELLS: Final = {"SHELL", "TYPE1", "SH_ORTH", "TYPE9"}  # with their thickness in the same columns
 _SHELLS: Final = {*_PLAIN_SHELLS, "SH_COMP", "TYPE10", "SH_SANDW", "TYPE11", "SH_FABR", "TYPE16", "STACK", "TYPE17",
                   "TYPE51"}  # fmt: skip
-_BEAMS: Final = {"BEAM", "TYPE3"}
-_TRUSSES: Final = {"TRUSS", "TYPE2"}
+_AREA_LINE: Final = {"BEAM": 2, "TYPE3": 2, "TRUSS": 0, "TYPE2": 0}  # below the title
 _SPRING: Final = {"SPRING", "TYPE4"}
 _OTHER_SPRINGS: Final = {"SPR_GENE", "TYPE8", "SPR_BEAM", "TYPE13", "SPR_PUL", "TYPE12", "SPR_AXI", "TYPE25", "KJOINT",
                          "TYPE33", "KJOINT2", "TYPE45"}  # fmt: skip
@@ -111,7 +110,7 @@ def _material(found: Material | None, prop: _Property | None, rigid: bool) -> Ma
     if prop and prop.type in _OF_SPRINGS:
         return Material(f"PROP/{prop.type}", "spring")
     if found and rigid:
-        return Material(found.name, "rigid", found.density, found.modulus, found.poisson)
+        return found._replace(kind="rigid")
     return found
 
 
@@ -140,21 +139,19 @@ def _properties(starter: Starter) -> Iterator[tuple[int, _Property]]:
             continue
         below, type_ = below_title(card), card.words[1]
         flags, rows = _flags(card, below), [row.text for row in below]
-        found = _Property(type_)
-        if type_ in _SHELLS:
-            found = _Property(
-                type_, flags[0] or shell or _DEFAULT_SHELL, flags[2] or triangle or _DEFAULT_TRIANGLE,
-                section=_of_plain_shells(rows) if type_ in _PLAIN_SHELLS else Section(),
-            )  # fmt: skip
-        elif type_ in SOLIDS:
-            found = _Property(type_, solid=flags[0] or solid or _DEFAULT_SOLID)
-        elif type_ in _BEAMS:
-            found = _Property(type_, section=Section(area=_at(rows, 2, 0)))
-        elif type_ in _TRUSSES:
-            found = _Property(type_, section=Section(area=_at(rows, 0, 0)))
-        elif type_ in _SPRING:
-            found = _Property(type_, section=_of_springs(rows))
-        yield number_of(card, 2), found
+        shells = (flags[0] or shell or _DEFAULT_SHELL, flags[2] or triangle or _DEFAULT_TRIANGLE)
+        bricks = flags[0] or solid or _DEFAULT_SOLID
+        found = _Property(type_, *(shells if type_ in _SHELLS else (0, 0)), bricks if type_ in SOLIDS else 0)
+        yield number_of(card, 2), found._replace(section=_section_of(type_, rows))
+
+
+def _section_of(type_: str, rows: Sequence[str]) -> Section:
+    """Read what the lines of a property say of thickness, area or springs."""
+    if type_ in _PLAIN_SHELLS:
+        return _of_plain_shells(rows)
+    if type_ in _AREA_LINE:
+        return Section(area=_at(rows, _AREA_LINE[type_], 0))
+    return _of_springs(rows) if type_ in _SPRING else Section()
 
 
 def _section(prop: _Property | None, kinds: set[str], *, turns: bool) -> Section:
@@ -167,8 +164,7 @@ def _section(prop: _Property | None, kinds: set[str], *, turns: bool) -> Section
         one = formulations.radioss(kind, *flags) if needed else None
         if one:
             found[kind] = one
-    own = prop.section
-    return Section(found, own.thickness, own.area, own.damped, own.mass, turns, own.layers, own.stiffness)
+    return prop.section._replace(formulations=found, turns=turns)
 
 
 def _of_springs(rows: Sequence[str]) -> Section:

@@ -24,14 +24,6 @@ _FACTORS, _OF_TIME = 3, 1  # of mass, time and length
 UNKNOWN_KIND = "this kind of include is not read"
 
 
-class Asked(NamedTuple):
-    """A file an ``*INCLUDE`` card asks for: its name as written, the transform of the card, its unreadable fields."""
-
-    name: Field
-    transform: Transform
-    problems: tuple[Problem, ...] = ()
-
-
 class Unread(NamedTuple):
     """An include that was not read: its name as written, and why."""
 
@@ -39,15 +31,18 @@ class Unread(NamedTuple):
     reason: str
 
 
-def asked_by(card: Card) -> Iterator[Asked]:
-    """Files named by ``*INCLUDE`` (one per line) or ``*INCLUDE_TRANSFORM`` (one, and its numbers)."""
+def _asked_by(card: Card) -> Iterator[tuple[Field, Transform, tuple[Problem, ...]]]:
+    """Names of the files that an ``*INCLUDE`` card asks for, the transform of each, and what of that is unreadable.
+
+    ``*INCLUDE`` has one name in a line, ``*INCLUDE_TRANSFORM`` one alone, and its numbers.
+    """
     names = _names(card)
     if card.name == "INCLUDE":
-        yield from (Asked(name, card.transform) for name, _ in names)
+        yield from ((name, card.transform, ()) for name, _ in names)
     elif first := next(names, None):
         name, rest = first
         own, problems = _transform(card, rest)
-        yield Asked(name, own.inside(card.transform), problems)
+        yield name, own.inside(card.transform), problems
 
 
 def _names(card: Card) -> Iterator[tuple[Field, list[Row]]]:
@@ -78,32 +73,6 @@ def _transform(card: Card, rows: list[Row]) -> tuple[Transform, tuple[Problem, .
     return Transform(node, part, material, set_, rest, time, scaled, moved), problems
 
 
-class Folders:
-    """Where includes are looked for: folder of the main deck, *INCLUDE_PATH in order, the including file's.
-
-    Readers of decks differ in this order; all of these are tried, the first that has the file counts.
-    """
-
-    def __init__(self, main: str) -> None:
-        self._main = main
-        self._paths: list[Path] = []
-
-    def add(self, card: Card) -> None:
-        """Take over ``*INCLUDE_PATH``, or ``_RELATIVE`` to the main deck's folder."""
-        for name, _ in _names(card):
-            self._paths.append(_folder(self._main) / _portable(name.text))
-
-    def find(self, name: Field) -> str | None:
-        """Path of the include as messages should show it, or None."""
-        for folder in (_folder(self._main), *self._paths, _folder(name.file)):
-            # the last has the bytes taken as the file system takes them, not as Latin-1
-            for spelling in (name.text, _portable(name.text), os.fsdecode(name.text.encode("latin-1", "replace"))):
-                path = str(folder / spelling)
-                if spelling and os.path.isfile(path):  # noqa: PTH113 - Path.is_file raises on names too long
-                    return path
-        return None
-
-
 def _folder(file: str) -> Path:
     from pathlib import Path  # not above: a deck without includes does without it
 
@@ -121,7 +90,7 @@ _KEPT: Final = (
     *("LOAD_BODY", "LOAD_GRAVITY", "DEFINE_CURVE"),
 )
 _READ_INCLUDES: Final = ("INCLUDE", "INCLUDE_TRANSFORM")
-_PATHS: Final = ("INCLUDE_PATH", "INCLUDE_PATH_RELATIVE")
+_PATHS: Final = ("INCLUDE_PATH", "INCLUDE_PATH_RELATIVE")  # both relative to the folder of the main deck
 _LONG: Final = r"\bLONG\s*=\s*([YSK])"  # compiled where it is needed
 SWITCHING: Final = re.compile(r"\*\s*(DEFORMABLE|RIGID.DEFORMABLE)", re.IGNORECASE)  # keywords meant to switch
 _SUFFIXES: Final = "+-%"
@@ -241,7 +210,7 @@ class _Context(NamedTuple):
 class _Reader:
     def __init__(self, deck: Deck) -> None:
         self.deck = deck
-        self.folders = Folders(deck.path)
+        self.folders: list[Path] = []  # those of *INCLUDE_PATH, in order
         self.sources: dict[str, SourceFile] = {}  # by path: a file that is included twice is the same each time
 
     def read(self, source: SourceFile, context: _Context) -> None:
@@ -272,7 +241,7 @@ class _Reader:
         elif card.name.startswith("PARAMETER"):
             context.scope.define(card.name, card.rows)
         elif card.name in _PATHS:
-            self.folders.add(card)
+            self.folders += [_folder(self.deck.path) / _portable(name.text) for name, _ in _names(card)]
         elif card.name.startswith("INCLUDE"):
             self.deck.included.append(card)
             self.include(card, context, width)
@@ -283,16 +252,30 @@ class _Reader:
         if card.name not in _READ_INCLUDES:
             self.deck.unread.append(Unread(card.here, UNKNOWN_KIND))
             return
-        for asked in asked_by(card):
-            self.deck.problems += asked.problems
-            path = self.folders.find(asked.name)
+        for name, transform, problems in _asked_by(card):
+            self.deck.problems += problems
+            path = self.find(name)
             chain = (*context.chain, os.path.realpath(card.file))
             if reason := why_unread(path, chain):
-                self.deck.unread.append(Unread(asked.name, reason))
+                self.deck.unread.append(Unread(name, reason))
             elif path is not None:
                 if path not in self.sources:
                     self.sources[path] = SourceFile(path)
-                self.read(self.sources[path], _Context(Scope(context.scope), width, asked.transform, chain))
+                self.read(self.sources[path], _Context(Scope(context.scope), width, transform, chain))
+
+    def find(self, name: Field) -> str | None:
+        """Path of an include as messages should show it, or None.
+
+        Readers of decks differ in whether the folder of the main deck, *INCLUDE_PATH or the folder of the including
+        file comes first; all are tried, the first that has the file counts.
+        """
+        for folder in (_folder(self.deck.path), *self.folders, _folder(name.file)):
+            # the last has the bytes taken as the file system takes them, not as Latin-1
+            for spelling in (name.text, _portable(name.text), os.fsdecode(name.text.encode("latin-1", "replace"))):
+                path = str(folder / spelling)
+                if spelling and os.path.isfile(path):  # noqa: PTH113 - Path.is_file raises on names too long
+                    return path
+        return None
 
 
 def why_unread(path: str | None, chain: Sequence[str]) -> str:

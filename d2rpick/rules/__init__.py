@@ -16,15 +16,15 @@ from d2rpick.deck import radioss_run
 from d2rpick.deck.reader import Deck, read_deck
 from d2rpick.deck.source import SourceFile
 from d2rpick.rules import reading, runs, sets, switched_parts, times
-from d2rpick.rules.base import Case, Finding, Judge, Rule, RunCase, Severity
+from d2rpick.rules.base import Case, Finding, Rule, RunCase, Severity
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from d2rpick.deck.switching import Window
+    from d2rpick.rules.judgement import HistoryJudge as Judge
 
 
-_SEVERITIES: Final = ("error", "warning", "info")
 _MODULES = (reading, sets, times, switched_parts, runs)
 _ALL = (one for module in _MODULES for one in vars(module).values() if isinstance(one, Rule))
 RULES: Final[Mapping[str, Rule]] = {rule.id: rule for rule in sorted(_ALL, key=lambda rule: rule.id)}
@@ -97,9 +97,9 @@ def read_configuration(table: Mapping[str, object], source: str = "", others: Co
         found = f"{source}: severity is {severity!r}"
         raise ConfigurationError(f"{found}, a table like {{D2R104 = 'warning'}} was expected")
     for rule, value in severity.items():
-        if value not in _SEVERITIES:
+        if value not in [*Severity]:
             found = f"{source}: severity of {rule} is {value!r}"
-            raise ConfigurationError(f"{found}, one of {', '.join(_SEVERITIES)} expected")
+            raise ConfigurationError(f"{found}, one of {', '.join(Severity)} expected")
     return Configuration(_names(table, "select", source), _names(table, "ignore", source), dict(severity), source)
 
 
@@ -138,7 +138,10 @@ def configuration_for(deck: str, asked: Configuration, others: Collection[str] =
 
 
 def check_deck(
-    path: str, configuration: Configuration | None = None, judge: Judge | None = None, content: bytes | None = None
+    path: str,
+    configuration: Configuration | None = None,
+    judge: Judge | None = None,
+    content: bytes | None = None,
 ) -> Checked:
     """Read a deck with its includes, or a Radioss run with its legs, and apply the rules.
 
@@ -148,7 +151,7 @@ def check_deck(
         The main deck; or a file of a Radioss run, which is checked with the others of that run.
     configuration : Configuration, optional
         Which rules count, and how much; default: all, as they are.
-    judge : Judge, optional
+    judge : HistoryJudge, optional
         Judges the windows by an energy history; without one the energy rules find nothing.
     content : bytes, optional
         What the deck holds, where it does not lie in a file.

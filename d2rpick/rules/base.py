@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, one_line
 from d2rpick.deck.parts import Constraint, Parts, read_constraints, read_parts, read_sections
@@ -13,10 +13,11 @@ from d2rpick.deck.radioss_run import Flaw, Run, RunWindows, find_run_windows
 from d2rpick.deck.switching import Event, Header, SwitchSet, Window, Windows, find_windows, read_switching
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from d2rpick.deck.card import Card, Field, Value
     from d2rpick.deck.reader import Deck, Unread
+    from d2rpick.rules.judgement import HistoryJudge
 
 
 LS_DYNA, RADIOSS = "ls-dyna", "radioss"
@@ -26,34 +27,12 @@ K = TypeVar("K")
 V = TypeVar("V")
 
 
-class Fault(NamedTuple):
-    """What an energy history has against a window: the rule it belongs to, at which end, and why."""
-
-    rule: str
-    at_td: bool
-    message: str
-
-
 def grouped(pairs: Iterable[tuple[K, V]]) -> dict[K, list[V]]:
     """Gather what has the same key, in the order of the keys."""
     found: dict[K, list[V]] = {}
     for key, value in pairs:
         found.setdefault(key, []).append(value)
     return found
-
-
-class Judge(Protocol):
-    """Judges windows by an energy history."""
-
-    @property
-    def end(self) -> float:
-        """Last time of the history."""
-
-    def faults(self, window: Window, together: Iterable[int]) -> Sequence[Fault]:
-        """Everything that speaks against a window; nothing when it is a good one."""
-
-    def deforming(self, parts: Collection[int]) -> tuple[int, ...] | None:
-        """Those of some parts that ever have internal energy; None where that is not known."""
 
 
 class Severity(StrEnum):
@@ -107,7 +86,7 @@ class Case:
     """A deck as the rules see it; ``judge`` is given when there is an energy history to judge windows by."""
 
     deck: Deck
-    judge: Judge | None = None
+    judge: HistoryJudge | None = None
 
     @property
     def solver(self) -> str:

@@ -6,7 +6,7 @@ Not imported by the rules themselves: without a history the check does not need 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import DeckError, if_written, name_units
 from d2rpick.choice.answers import Verdict, find_better_pair, suggest_at
@@ -17,7 +17,6 @@ from d2rpick.choice.warnings import POOR_KINETIC_SHARE, WRONG_ENERGY, Caution, e
 from d2rpick.deck import read_inventory
 from d2rpick.histories.digits import above, first_as_read, in_the_record
 from d2rpick.histories.surroundings import UNKNOWN
-from d2rpick.rules.base import Fault
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
@@ -26,6 +25,15 @@ if TYPE_CHECKING:
     from d2rpick.deck.switching import Window
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run, Selection
+
+
+class Fault(NamedTuple):
+    """What an energy history has against a window: the rule it belongs to, at which end, and why."""
+
+    rule: str
+    at_td: bool
+    message: str
+
 
 # What verify warns of and no rule reports.
 _KEPT: Final = (
