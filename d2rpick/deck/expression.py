@@ -51,6 +51,14 @@ def number(text: str) -> Number:
     return _checked(float(f"{mantissa}e{exponent or 0}"))
 
 
+def real(text: str) -> float:
+    """Read a number of a field; a blank is 0, and what is none is not known."""
+    try:
+        return float(number(text)) if text.strip() else 0.0
+    except ExpressionError:
+        return math.nan
+
+
 def names_in(text: str) -> tuple[str, ...]:
     """Return the parameters a text refers to, in lower case.
 
@@ -84,10 +92,6 @@ def _nint(x: Number) -> int:
     return int(math.copysign(math.floor(abs(x) + 0.5), x))
 
 
-def _sign(x: Number, y: Number) -> Number:
-    return abs(x) if y >= 0 else -abs(x)
-
-
 _FUNCTIONS: Final[dict[str, tuple[int, Callable[..., Number]]]] = {
     **{
         name: (1, getattr(math, name))
@@ -108,7 +112,7 @@ _FUNCTIONS: Final[dict[str, tuple[int, Callable[..., Number]]]] = {
     "atan2": (2, math.atan2),
     "min": (2, min),
     "max": (2, max),
-    "sign": (2, _sign),
+    "sign": (2, lambda x, y: abs(x) if y >= 0 else -abs(x)),
     "mod": (2, lambda x, y: int(math.fmod(_nint(x), _nint(y)))),
 }
 _CONSTANTS: Final = {"pi": math.pi, "dtor": math.pi / 180, "rtod": 180 / math.pi}

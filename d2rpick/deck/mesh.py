@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import name_units
-from d2rpick.deck.expression import ExpressionError, number
+from d2rpick.deck.expression import ExpressionError, real
 from d2rpick.deck.radioss_deck import Starter, number_of
 
 if TYPE_CHECKING:
@@ -162,14 +162,7 @@ def _reals(field: NDArray[np.uint8]) -> Reals:
     try:
         return texts.astype(np.float64)
     except ValueError:  # 1.5-3 is a number for a solver
-        return np.array([_real(text.decode("latin-1")) for text in texts.tolist()])
-
-
-def _real(text: str) -> float:
-    try:
-        return float(number(text.strip()))
-    except ExpressionError:
-        return math.nan
+        return np.array([real(text.decode("latin-1")) for text in texts.tolist()])
 
 
 def _id(value: float) -> int:

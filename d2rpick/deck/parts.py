@@ -182,17 +182,13 @@ def _take_set(card: Card, parts: Parts) -> None:
 
 def _content(card: Card, options: Collection[str], values: Sequence[Value[int]]) -> PartSet:
     offset = card.transform.set_ if "ADD" in options else card.transform.part
-    unread = ((one.field, one.problem or _negative(one)) for one in values)
-    problems = tuple((place, problem) for place, problem in unread if problem)
+    told = "{!r} in a part set is not followed, a positive id was expected"
+    wrong = (one for one in values if one.problem or one.value < 0)
+    problems = tuple((one.field, one.problem or told.format(one.field.text)) for one in wrong)
     ids = tuple(value.value + offset for value in values if value.value > 0)
     if "GENERATE" in options:
         return PartSet(ranges=tuple(zip(ids[::2], ids[1::2], strict=False)), problems=problems)
     return PartSet(sets=ids, problems=problems) if "ADD" in options else PartSet(parts=ids, problems=problems)
-
-
-def _negative(value: Value[int]) -> str:
-    told = f"{value.field.text!r} in a part set is not followed, a positive id was expected"
-    return told if value.value < 0 else ""
 
 
 def node_sets(deck: Deck) -> dict[int, frozenset[int]]:

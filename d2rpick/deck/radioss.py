@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.deck import formulations, model
-from d2rpick.deck.expression import ExpressionError, number
+from d2rpick.deck.expression import real
 from d2rpick.deck.mesh import KINDS, NOT_COUNTED, Mesh, elements_of, nodes_of
 from d2rpick.deck.model import Formulation, Inventory, Material, PartData, Section
 from d2rpick.deck.radioss_deck import SOLIDS, Starter, below_title, blocks, kept_off, keyword, number_of, reals, whole
@@ -189,10 +189,7 @@ def _flags(card: Card, rows: Sequence[Row]) -> list[int]:
 
 def _at(rows: Sequence[str], row: int, start: int) -> float | None:
     """Read a number above 0 in 20 columns, or None."""
-    try:
-        value = float(number(rows[row][start : start + _REAL])) if row < len(rows) else 0.0
-    except ExpressionError:
-        return None
+    value = real(rows[row][start : start + _REAL]) if row < len(rows) else 0.0
     return value if value > 0 else None
 
 

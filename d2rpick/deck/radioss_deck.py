@@ -6,14 +6,13 @@ A block is a line that begins with ``/``, and the data lines below it.  Columns 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.graph import reached
 from d2rpick.deck.card import Card, Field, Row, Scope, Value
-from d2rpick.deck.expression import ExpressionError, number
+from d2rpick.deck.expression import ExpressionError, number, real
 from d2rpick.deck.source import Block, SourceFile
 
 if TYPE_CHECKING:
@@ -300,11 +299,6 @@ class Starter:
         others = map(number_of, self.named(*WITHOUT_FRAME))
         return found | dict.fromkeys(others, "tetrahedra, 20-node bricks or 16-node shells")
 
-    def parts_in(self, subset: int) -> set[int]:
-        """Parts of a subset and of those below it."""
-        subsets = set(reached([subset], lambda one: self.subsets.get(one, ())))
-        return {part for part, line in self.parts.items() if line.subset in subsets}
-
     def group_members(self, group: int) -> tuple[set[int], set[int]] | None:
         """Nodes and whole parts of a group of nodes; None where they cannot be known."""
         nodes, parts = set[int](), set[int]()
@@ -314,7 +308,8 @@ class Starter:
             elif kind == "PART":
                 parts.update(ids)
             elif kind == "SUBSET":
-                parts.update(*(self.parts_in(one) for one in ids))
+                below = {*reached(ids, lambda one: self.subsets.get(one, ()))}
+                parts.update(part for part, line in self.parts.items() if line.subset in below)
             elif kind != "GRNOD" or any(one <= 0 for one in ids):
                 return None
         return nodes, parts
@@ -339,12 +334,4 @@ def _ids(rows: Iterable[Row]) -> tuple[int, ...]:
 
 def reals(row: Row, count: int) -> list[float]:
     """Read numbers of 20 columns each; a blank is 0, NaN what is none."""
-    return [_real(row.text[at : at + 2 * _WIDTH]) for at in range(0, count * 2 * _WIDTH, 2 * _WIDTH)]
-
-
-def _real(text: str) -> float:
-    """Read a number; a blank is 0, and what is none is not known."""
-    try:
-        return float(number(text)) if text.strip() else 0.0
-    except ExpressionError:
-        return math.nan
+    return [real(row.text[at : at + 2 * _WIDTH]) for at in range(0, count * 2 * _WIDTH, 2 * _WIDTH)]

@@ -81,7 +81,9 @@ def _ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     deck, printed = read_deck(main), read_deck("the card", card.text.encode())
     if len(card.files) != 1 or not read_switching(printed):
         raise DeckError(f"{main}: an LS-DYNA deck, but the cards are for another solver")
-    _refuse_cut(deck)
+    for block, told in cuts(deck):  # what is added would hide it, and end a number that is cut
+        if block.source is deck.sources[0]:
+            raise DeckError(f"{deck.path}: {told} The cards behind it would hide that: {cure(block)}")
     _refuse_switched(deck, printed)
     ((name, text),) = card.files.items()
     if deck.long:
@@ -89,13 +91,6 @@ def _ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     yield Path(main).name, with_cards(deck.sources[0], f"*INCLUDE\n{name}\n", deck.sources[0].blocks())
     yield name, text.encode()
     yield from copies(deck.sources[1:], main, {name, Path(main).name})
-
-
-def _refuse_cut(deck: Deck) -> None:
-    """Raise DeckError where the main file seems to be cut: what is added would hide it, and end a number that is."""
-    for block, told in cuts(deck):
-        if block.source is deck.sources[0]:
-            raise DeckError(f"{deck.path}: {told} The cards behind it would hide that: {cure(block)}")
 
 
 def _refuse_switched(deck: Deck, printed: Deck) -> None:

@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 
-_FAMILIES: Final = ({1, 3}, {2, 4})  # rigid wall, contact
+_OF_WALL: Final = {1, 3}
+_OF_CONTACT: Final = {2, 4}
+_FAMILIES: Final = (_OF_WALL, _OF_CONTACT)
 _WITHOUT_FORCE, _WITH_FORCE = {1, 2}, {3, 4}
 
 
@@ -25,12 +27,9 @@ def _pair(codes: tuple[int, int], signs: tuple[int, int] = (1, -1), back: int = 
     return deck(there + again)
 
 
-_OF_WALL: Final = {1, 3}
-_OF_CONTACT: Final = {2, 4}
 _ENTITIES: Final[tuple[tuple[set[int], str, Literal["CONTACT", "RIGIDWALL"]], ...]] = (
     (_OF_CONTACT, "contact", "CONTACT"), (_OF_WALL, "rigid wall", "RIGIDWALL"),
 )  # fmt: skip
-_NEEDS_FORCE: Final = {3, 4}
 _MOST_LISTED = 8
 
 
@@ -92,7 +91,10 @@ def _mutual(case: Case) -> Iterator[Objection]:
             problem = f"RELSW names set {header.relsw.value}, which no card defines"
         if not problem and header.relsw.value and partner is not None:
             first = header.swset.value < partner.swset.value  # what both share is said once, at one of them
-            problem = _one_sided(header, partner) or (_mismatch(header, partner) if first else "")
+            if partner.relsw.value != header.swset.value or partner is header:
+                problem = f"RELSW names set {header.relsw.value}, which names set {partner.relsw.value}"
+            elif first:
+                problem = _mismatch(header, partner)
         if problem:
             yield header.relsw.field, f"{problem}; check RELSW, PAIRED and CODE of both sets"
     for header, problem in _swapped(case):
@@ -125,12 +127,6 @@ def _alone(header: Header) -> str:
     if paired and not relsw:
         return f"PAIRED is {paired} but RELSW names no set"
     return f"PAIRED is {paired}" if paired not in {-1, 0, 1} else ""
-
-
-def _one_sided(header: Header, partner: Header) -> str:
-    if partner.relsw.value == header.swset.value and partner is not header:
-        return ""
-    return f"RELSW names set {header.relsw.value}, which names set {partner.relsw.value}"
 
 
 def _mismatch(one: Header, other: Header) -> str:
@@ -249,7 +245,7 @@ def _unnamed(case: Case) -> Iterator[Objection]:
     """The switch waits for a force that is not zero. Without the number of the contact or rigid wall there is no
     force to wait for. Source: vendor keyword data; what the solver does with 0 is not confirmed.
     """
-    for header in _by_force(case, _NEEDS_FORCE):
+    for header in _by_force(case, _WITH_FORCE):
         if header.entno.value == 0:
             what = "a contact" if header.code.value in _OF_CONTACT else "a rigid wall"
             found = f"ENTNO is 0 with CODE {header.code.value}, which waits for the force of {what}"

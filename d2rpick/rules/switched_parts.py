@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import name_units
 from d2rpick.base.graph import reached
-from d2rpick.deck.parts import Constraint, Parts, element_cards
+from d2rpick.deck.parts import Parts, element_cards
 from d2rpick.rules.base import BOTH, ERROR, INFO, WARNING, Case, Example, Objection, grouped, rule
 from d2rpick.rules.examples import BACK, PASSES, THERE, automatic, deck
 
@@ -197,7 +197,8 @@ def _torn(case: Case) -> Iterator[Objection]:
     """
     first = {event.unit.id: event for event in reversed(case.made_rigid)}
     leads = {part: event.line.lead.value for part, event in first.items() if event.line.lead}
-    bodies = {part: _body(part, leads) for part in first}
+    # each with the lead at the end of the LRB chain; a part that merges into nobody leads itself
+    bodies = {part: reached([part], lambda one: [lead] if (lead := leads.get(one)) else [])[-1] for part in first}
     cards = element_cards(case.deck, searched=True)
     if len(set(bodies.values())) < 2 or not cards:
         return
@@ -206,18 +207,10 @@ def _torn(case: Case) -> Iterator[Objection]:
     for (low, high), node in first_shared_nodes(cards, bodies).items():
         if _together(case, first[low].unit, first[high].unit):
             place = (first[high].line.lead or first[high].line.part).field
-            one, other = (f"part {part}{_of_set(first[part])}" for part in (low, high))
+            lines = ((part, first[part].line) for part in (low, high))
+            one, other = (f"part {part}" + f" (of part set {line.part.value})" * line.by_set for part, line in lines)
             found = f"{one} and {other} share node {node} but become separate rigid bodies that both own it"
             yield place, f"{found}; merge them: LRB {low} on the line of {other}"
-
-
-def _of_set(event: Event) -> str:
-    return f" (of part set {event.line.part.value})" if event.line.by_set else ""
-
-
-def _body(part: int, leads: dict[int, int]) -> int:
-    """Return the lead at the end of the LRB chain; a part that merges into nobody leads itself."""
-    return reached([part], lambda one: [lead] if (lead := leads.get(one)) else [])[-1]
 
 
 def _together(case: Case, one: Unit, other: Unit) -> bool:
@@ -238,7 +231,8 @@ def _held(case: Case, *, nodal: bool) -> Iterator[Objection]:
     wanted = [one for one in (case.constraints if switched else ()) if (one.kind == "nodal rigid body") == nodal]
     owner = _owners(case, switched) if wanted else {}
     for constraint in wanted:
-        part = _on(constraint, owner, switched)
+        own = (owner[node] for node in sorted(constraint.nodes) if node in owner)
+        part = constraint.part if constraint.part in switched else next(own, None)
         if part is None:
             continue
         name = f"{constraint.kind} {constraint.id}" if constraint.id else constraint.kind
@@ -266,12 +260,6 @@ def _left_active(case: Case, *, nodal: bool) -> dict[int, Header]:
         if header and header.nrbf.value != _DELETED and (nodal or header.ncsf.value != _DELETED):
             found.setdefault(event.unit.id, header)
     return found
-
-
-def _on(constraint: Constraint, owner: dict[int, int], switched: dict[int, Header]) -> int | None:
-    if constraint.part in switched:
-        return constraint.part
-    return next((owner[node] for node in sorted(constraint.nodes) if node in owner), None)
 
 
 @rule(
