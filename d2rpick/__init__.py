@@ -52,31 +52,21 @@ if TYPE_CHECKING:
     from d2rpick.running.watch import Event as Event
     from d2rpick.vibration.oscillator import Oscillator as Oscillator
 
-_HOME = {
-    **dict.fromkeys(
-        (
-            "ChangedError",
-            "ConfigurationError",
-            "D2RPickError",
-            "DeckError",
-            "FormatError",
-            "HistoryError",
-            "RangeError",
-        ),
-        "base.errors",
-    ),
-    **dict.fromkeys(("Suggestion", "Verdict", "suggest", "verify"), "api.choices"),
-    **dict.fromkeys(("JudgedCard", "card"), "api.cards"),
-    **dict.fromkeys(("Calibration", "PartTable", "calibrate", "parts"), "api.costs"),
-    **dict.fromkeys(("Findings", "check"), "api.checking"),
-    **dict.fromkeys(("Exploration", "Plan", "explore", "plan"), "api.flights"),
-    **dict.fromkeys(("FirstRun", "first", "follow"), "api.running"),
-    **dict.fromkeys(("Run", "from_frame", "read"), "api.runs"),
-    **dict.fromkeys(("Study", "study"), "api.studies"),
-    "Event": "running.watch",
-    "Oscillator": "vibration.oscillator",
-    "Weights": "choice.cost",
+_NAMES = {
+    "base.errors": "ChangedError ConfigurationError D2RPickError DeckError FormatError HistoryError RangeError",
+    "api.choices": "Suggestion Verdict suggest verify",
+    "api.cards": "JudgedCard card",
+    "api.costs": "Calibration PartTable calibrate parts",
+    "api.checking": "Findings check",
+    "api.flights": "Exploration Plan explore plan",
+    "api.running": "FirstRun first follow",
+    "api.runs": "Run from_frame read",
+    "api.studies": "Study study",
+    "running.watch": "Event",
+    "vibration.oscillator": "Oscillator",
+    "choice.cost": "Weights",
 }
+_HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 __all__ = ["__version__", *sorted(_HOME)]  # noqa: PLE0604  names of strings all
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.api.drives import Asked, Driving
+from d2rpick.api.drives import Driving
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.situation import Settings
 from d2rpick.choice.windows import bounds, flights_of
@@ -64,7 +64,7 @@ def driven(name: str, folder: Path) -> Drive:
     deck.mkdir(parents=True, exist_ok=True)
     (deck / f"{name}_0000.rad").write_bytes(model.deck())
     (deck / f"{name}_0001.rad").write_text(next(model.legs(())))
-    driving = Driving(Asked(deck=str(deck / f"{name}_0000.rad"), folder=folder / "driven"), print)
+    driving = Driving(str(deck / f"{name}_0000.rad"), folder / "driven", print)
     with driving.driver(resume=True) as driver:
         driver.prepare()
         driver.run()
@@ -152,7 +152,7 @@ def _window(
 def refused(name: str, folder: Path) -> bool:
     """Whether a wait below half of a period that the deck tells is refused."""
     try:
-        Driving(Asked(deck=str(folder / "deck" / f"{name}_0000.rad"), folder=folder, wait=TOO_SHORT), print)
+        Driving(str(folder / "deck" / f"{name}_0000.rad"), folder, print, wait=TOO_SHORT)
     except RangeError:
         return True
     return False

@@ -100,9 +100,12 @@ class Paged(Answer):
         drawn: Figure = getattr(figures_choice, f"draw_{self.kind}")(self)
         return drawn
 
-    def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:
+    def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:  # noqa: ARG002
         """Write the page: ``command`` repeats it, ``judging`` are the options that judge a card by the same history."""
-        raise NotImplementedError
+        from d2rpick.report import pages
+
+        written: str = getattr(pages, f"{self.kind}_page")(self, command)
+        return written
 
     def report(self, path: arguments.Path) -> Path:
         """Write everything to one HTML page that needs no network; an existing file is replaced."""

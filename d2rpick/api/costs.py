@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from d2rpick.api.arguments import Choosing, Parts
-    from d2rpick.api.cards import Cards
     from d2rpick.api.request import Request
     from d2rpick.api.runs import Run
     from d2rpick.choice.switched_run import Times
@@ -65,12 +64,6 @@ class PartTable(Paged, sets_of_parts.Parts):
         from d2rpick.report.parts import draw
 
         return draw(self)
-
-    def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:  # noqa: ARG002
-        """Write the page."""
-        from d2rpick.report.pages import parts_page
-
-        return parts_page(self, command)
 
 
 def parts(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import hashlib
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from d2rpick.api.answer import Paged
@@ -30,18 +30,7 @@ if TYPE_CHECKING:
 
 # Of a second: where nothing vibrates so long without a force is flight, and so long before a contact td lies at least.
 _SHORTEST = 2e-3
-
-
-@dataclass(frozen=True, kw_only=True)
-class Asked:
-    """How a run is to be driven: all that ``d2rpick drive`` is told.  Times are in the unit of the deck."""
-
-    deck: str
-    folder: Path
-    part: tuple[str, ...] = ()
-    wait: float | None = None
-    margin: float | None = None
-    commands: Commands = field(default_factory=Commands)
+_INSTALLED = Commands()
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -60,7 +49,7 @@ class Drive(Paged, Driven):
 
 
 class Driving:
-    """A run that is about to be driven, or to go on.
+    """A run that is about to be driven, or to go on, as ``d2rpick drive`` is told; times in the unit of the deck.
 
     Raises
     ------
@@ -68,19 +57,27 @@ class Driving:
         If the deck cannot be driven, or the wait contradicts what it says of its springs.
     """
 
-    def __init__(self, asked: Asked, told: Callable[[str], None]) -> None:
-        self.asked = asked
-        self.deck = driven_deck(asked.deck, numbers("--part", asked.part) if asked.part else ())
-        self.inventory = read_inventory(asked.deck)
+    def __init__(
+        self,
+        deck: str,
+        folder: Path,
+        told: Callable[[str], None],
+        part: Sequence[str] = (),
+        wait: float | None = None,
+        margin: float | None = None,
+        commands: Commands = _INSTALLED,
+    ) -> None:
+        self.name, self.folder, self.commands, self._told = deck, folder, commands, told
+        self.deck = driven_deck(deck, numbers("--part", part) if part else ())
+        self.inventory = read_inventory(deck)
         known = wait_of_deck(self.inventory)
-        if asked.wait is not None:
-            check_wait(asked.wait, known, asked.deck)
+        if wait is not None:
+            check_wait(wait, known, deck)
         shortest = _SHORTEST * self.deck.second if self.deck.second else 0.0
-        self.limits = Limits(self.deck.end, self.deck.interval, shortest, asked.margin)
-        self.looks = Looks(self.deck.parts, self.inventory, asked.wait, known)
-        self.solver = Solver(asked.folder, self.deck.name, asked.commands.threads)
+        self.limits = Limits(self.deck.end, self.deck.interval, shortest, margin)
+        self.looks = Looks(self.deck.parts, self.inventory, wait, known)
+        self.solver = Solver(folder, self.deck.name, commands.threads)
         self.cautions: tuple[Caution, ...] = tuple(doubts_of_solver(self.deck.parts, self.inventory))
-        self._told = told
 
     @contextmanager
     def driver(self, *, resume: bool) -> Iterator[Driver]:
@@ -89,7 +86,7 @@ class Driving:
         D2RPickError where one is at work there, the folder holds something else, or the run has begun and is not to
         be resumed, or the disk is full.
         """
-        folder = self.asked.folder
+        folder = self.folder
         folder.mkdir(parents=True, exist_ok=True)
         with alone(folder):
             journal = Journal(folder / JOURNAL)
@@ -98,13 +95,13 @@ class Driving:
             if begun and not resume:
                 raise D2RPickError(f"{folder}: this run has begun; --resume goes on with it, or choose another folder")
             if begun and begun[0]["deck"] != digest:
-                raise D2RPickError(f"{folder}: begun with another deck than {self.asked.deck} is now; name that one")
+                raise D2RPickError(f"{folder}: begun with another deck than {self.name} is now; name that one")
             if not begun:
                 if any(not one.name.startswith(".") for one in folder.iterdir()):
                     raise D2RPickError(f"{folder}: the folder is not empty; choose another one")
                 journal.add("begun", deck=digest)
             try:
-                yield Driver(self.deck, self.solver, journal, self.asked.commands, self.limits, self.looks, self._told)
+                yield Driver(self.deck, self.solver, journal, self.commands, self.limits, self.looks, self._told)
             except OSError as error:
                 if error.errno not in (errno.ENOSPC, errno.EDQUOT):
                     raise

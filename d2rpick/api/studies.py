@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import chain
@@ -20,7 +18,7 @@ from d2rpick.api.answer import Paged, frame_of
 from d2rpick.api.asked import request_of
 from d2rpick.api.request import Request, needed_time, time_or_window
 from d2rpick.base.errors import INTERNAL_ERROR, FormatError
-from d2rpick.base.files import record_of, signed
+from d2rpick.base.files import append_whole, record_of, signed
 from d2rpick.base.workers import Farm, answers, on_cores
 from d2rpick.choice import study as core
 from d2rpick.choice.study import FAILED, UNREADABLE, Question, Stamp, StudyRow, stamps
@@ -33,7 +31,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from d2rpick.api.arguments import Choosing, Parts
-    from d2rpick.api.cards import Cards
 
 
 _FIRST: Final = b'{"source": '
@@ -140,23 +137,11 @@ class Ledger:
         """Append the row of a run that was judged; it is in the file when this returns."""
         if row.status in (FAILED, UNREADABLE, INTERNAL_ERROR):  # asked again next time
             return
-        size = None
         try:
-            with Path(self.name).open("ab") as file:
-                size = file.tell()
-                file.write(self._end + line(row, self.asked).encode() + b"\n")
+            append_whole(Path(self.name), self._end + line(row, self.asked).encode() + b"\n")
         except OSError as error:
-            if size is not None:
-                self._shorten(size)
             raise FormatError(f"{self.name}: cannot be written ({error.strerror}); make room and begin again") from None
         self._end = b""
-
-    def _shorten(self, size: int) -> None:
-        """Take back what was written of a row; an empty file is removed."""
-        with suppress(OSError):
-            os.truncate(self.name, size)
-            if not size:
-                Path(self.name).unlink()
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -181,12 +166,6 @@ class Study(Paged, core.Study):
         ['ok']
         """
         return frame_of(self.to_dict()["runs"], RUN.keys, td=self.td)
-
-    def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:  # noqa: ARG002
-        """Write the page."""
-        from d2rpick.report.pages import study_page
-
-        return study_page(self, command)
 
 
 def study(

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import stat
 import time
+from contextlib import suppress
 from errno import ELOOP
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
 
@@ -193,6 +194,25 @@ def write_whole(path: Path, content: bytes) -> None:
         scratch.replace(path)
     except BaseException:
         scratch.unlink(missing_ok=True)
+        raise
+
+
+def append_whole(path: Path, content: bytes, *, durable: bool = False) -> None:
+    """Append to a file whole or not at all, when ``durable`` onto the disk; an OSError leaves it as it was."""
+    size = None
+    try:
+        with path.open("ab") as file:
+            size = file.tell()
+            file.write(content)
+            file.flush()
+            if durable:
+                os.fsync(file.fileno())
+    except OSError:
+        with suppress(OSError):
+            if size:
+                os.truncate(path, size)
+            elif size == 0:
+                path.unlink()
         raise
 
 

@@ -83,15 +83,12 @@ def drive(
     import signal
     from pathlib import Path
 
-    from d2rpick.api.drives import Asked, Driving
+    from d2rpick.api.drives import Driving
     from d2rpick.running.engine import Commands
 
-    asked = Asked(
-        deck=deck, folder=Path(folder), part=part, wait=wait, margin=margin,
-        commands=Commands(starter, engine, threads),
-    )  # fmt: skip
     output = output.beside(deck)
-    driving = Driving(asked, (lambda _: None) if output.quiet else tell)
+    told = (lambda _: None) if output.quiet else tell
+    driving = Driving(deck, Path(folder), told, part, wait, margin, Commands(starter, engine, threads))
     output.notes(driving.deck.notes, driving.cautions)
     if dry_run:
         return click.echo("\n".join(_plan(driving)))
@@ -110,10 +107,10 @@ def drive(
 def _plan(driving: Driving) -> list[str]:
     import shlex
 
-    deck, commands = driving.deck, driving.asked.commands
+    deck, commands = driving.deck, driving.commands
     bodies = ", ".join(map(str, deck.nodes))
     return [
-        f"copies    {', '.join(deck.files)} to {driving.asked.folder}",
+        f"copies    {', '.join(deck.files)} to {driving.folder}",
         f"starts    {shlex.join(commands.words('starter', f'{deck.name}_0000.rad'))}",
         f"          {shlex.join(commands.words('engine', f'{deck.name}_0001.rad'))}, and further legs",
         f"switches  {len(deck.parts)} parts by main node {bodies}, to the end at {deck.end:g}",

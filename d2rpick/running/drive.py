@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
 import time
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import D2RPickError, FormatError, HistoryError
-from d2rpick.base.files import record_of, signed, write_whole
+from d2rpick.base.files import append_whole, record_of, signed, write_whole
 from d2rpick.choice.deck_of_run import in_deck
 from d2rpick.choice.warnings import Caution
 from d2rpick.deck.model import DISCRETE
@@ -350,15 +349,10 @@ class Journal:
     def add(self, event: str, **values: Any) -> dict[str, Any]:
         """Append a record; D2RPickError where there is no room for it."""
         record = {"event": event, **values}
-        size = self.path.stat().st_size if self.path.exists() else 0
+        line = signed(json.dumps(record, allow_nan=False)).encode()
         try:
-            with self.path.open("ab") as file:
-                file.write(self._end + signed(json.dumps(record, allow_nan=False)).encode() + b"\n")
-                file.flush()
-                os.fsync(file.fileno())
+            append_whole(self.path, self._end + line + b"\n", durable=True)
         except OSError as error:
-            with suppress(OSError):
-                os.truncate(self.path, size)
             raise D2RPickError(f"{self.path}: cannot be written ({error.strerror}); make room, then --resume") from None
         self._end = b""
         self.records.append(record)

@@ -16,7 +16,7 @@ import pytest
 from hypothesis import given
 from hypothesis.strategies import floats, integers
 
-from d2rpick.api.drives import Asked, Driving
+from d2rpick.api.drives import Driving
 from d2rpick.base.errors import D2RPickError
 from d2rpick.histories.formats.radioss_th import TimeHistory
 from d2rpick.histories.opening import open_run
@@ -194,7 +194,7 @@ def test_a_restart_that_may_be_cut_is_not_taken(tmp_path: Path) -> None:
 
 
 def test_a_disk_that_is_full_is_told_with_what_to_do(tmp_path: Path) -> None:
-    driving = Driving(Asked(deck=asked(tmp_path)[1], folder=tmp_path / "run", wait=WAIT), print)
+    driving = Driving(asked(tmp_path)[1], tmp_path / "run", print, wait=WAIT)
     for wrong, message in (
         (errno.ENOSPC, "run: No space left on device; make room, then --resume"),
         (errno.EIO, "Input"),
