@@ -41,32 +41,36 @@ class BlockLayout(NamedTuple):
 class Grammar(NamedTuple):
     """What the engine has to know about a database.
 
-    ``start`` is the text a block's first line begins with, ``describe`` takes a block apart, ``whole`` tells
-    whether a block that stands alone in its file is known to be whole.  The numbers have ``width`` columns
-    and ``decimals`` places.  ``compare_all`` compares every block in full when the file is opened; otherwise,
-    where all blocks have one size, only their first lines, and the rest when it is read.
+    ``start`` is the text a block's first line begins with; ``lines`` matches the lines that are known.  ``describe``
+    takes a block apart, by these lines, and names its numbers and the last of them; it releases their columns, in an
+    array of the shape of the block.  What ``changing`` matches in other lines may differ from block to block: it must
+    match short pieces only, lest a whole line hide in one.  ``time`` is the first number.  ``whole`` tells whether a
+    block that stands alone in its file is known to be whole.  The numbers have ``width`` columns and ``decimals``
+    places.  ``compare_all`` compares every block in full when the file is opened; otherwise, where all blocks have one
+    size, only their first lines, and the rest when it is read.
     """
 
     start: bytes
-    describe: Callable[[bytes], BlockLayout]
+    lines: re.Pattern[bytes]
+    describe: Callable[[bytes, Sequence[re.Match[bytes]], Bytes], tuple[Mapping[Any, int], Hashable]]
+    changing: re.Pattern[bytes]
+    time: Hashable
     whole: Callable[[BlockLayout], bool]
     width: int
     decimals: int
     compare_all: bool
 
-
-def release(literal: Bytes, block: bytes, changing: re.Pattern[bytes], first: int, behind: int) -> None:
-    """Let what ``changing`` matches in a piece of a block differ from block to block.
-
-    It must match short pieces only, lest a whole line hide in one.
-    """
-    for piece in changing.finditer(block, first, behind):
-        literal[piece.start() : piece.end()] = 0
-
-
-def overlong(block: bytes) -> bool:
-    """Whether a line is longer than solvers write: states were blanked, and hide in it."""
-    return max(map(len, block.split(b"\n"))) >= _OVERLONG
+    def layout(self, block: bytes) -> BlockLayout:
+        """Find where in a block what stands."""
+        literal, lines = np.full(len(block), 255, np.uint8), [*self.lines.finditer(block)]
+        edges = [0, *(edge for line in lines for edge in line.span()), len(block)]
+        for first, behind in zip(edges[::2], edges[1::2], strict=True):
+            for piece in self.changing.finditer(block, first, behind):
+                literal[piece.start() : piece.end()] = 0
+        fields, last = self.describe(block, lines, literal)
+        if max(map(len, block.split(b"\n"))) >= _OVERLONG:  # states were blanked, and hide in it
+            fields = {name: place if name == self.time else UNSURE for name, place in fields.items()}
+        return BlockLayout(fields, literal, last, broken_off=b"ls-dyna" in block)
 
 
 def head(data: bytes | Content) -> tuple[str, str, int]:

@@ -87,7 +87,7 @@ class Blocks:
         self._begin = begin
         self._runs = array("q")  # packed: a file whose blocks all differ must not fill the memory
         data, end = self._data, self._end  # not self: a circle would keep the file open
-        self.layout = lru_cache(maxsize=16)(lambda at, size: grammar.describe(data[at : min(at + size, end)]))
+        self.layout = lru_cache(maxsize=16)(lambda at, size: grammar.layout(data[at : min(at + size, end)]))
         self._compared = grammar.compare_all
         self._trusted = False  # whether a part of each block was compared for numbers that were asked for
         self._varied: dict[int, Bytes] = {}  # by the start of a run of many blocks: 0 for the bytes that they share

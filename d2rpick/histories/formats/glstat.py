@@ -11,18 +11,16 @@ import re
 from contextlib import suppress
 from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.database import Database
-from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, head, overlong, release, written_head
+from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, head, written_head
 from d2rpick.histories.formats.fixed_text import PORTIONS, Blocks, Portions
 from d2rpick.histories.history import Samples, frozen
 
 if TYPE_CHECKING:
-    from collections.abc import Hashable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
-    from d2rpick.histories.content import Content
+    from d2rpick.histories.content import Bytes, Content
     from d2rpick.histories.names import Selection
     from d2rpick.histories.source import Source
 
@@ -114,17 +112,12 @@ class Glstat(Database):
         return tuple(name for name in names if name != _TIME)
 
 
-def _describe(block: bytes) -> BlockLayout:
-    literal = np.full(len(block), 255, np.uint8)
-    behind = 0
-    fields: dict[Hashable, int] = {}
-    name = ""
-    mixed = False
-    for line in _LINE.finditer(block):
+def _describe(block: bytes, lines: Sequence[re.Match[bytes]], literal: Bytes) -> tuple[dict[str, int], str]:
+    fields: dict[str, int] = {}
+    name, behind, mixed = "", 0, False
+    for line in lines:
         mixed |= name in fields and b"..." in block[behind : line.start()]  # a line that lost some of its columns
-        name = line[1].rstrip(b".").rstrip().decode("latin-1")
-        release(literal, block, _CHANGING, behind, line.start())
-        behind = line.end()
+        name, behind = line[1].rstrip(b".").rstrip().decode("latin-1"), line.end()
         value = _VALUE.match(line[2])
         if value is None:
             fields[name] = UNSURE
@@ -134,17 +127,18 @@ def _describe(block: bytes) -> BlockLayout:
         literal[line.start(2) : line.start(2) + _WIDTH] = 0
         mixed |= name in fields
         fields[name] = line.start(2)
-    release(literal, block, _CHANGING, behind, len(block))
-    if mixed or overlong(block):  # with lines of another state: any of them may be
+    if mixed:  # with lines of another state: any of them may be
         fields = {name: place if name == _TIME else UNSURE for name, place in fields.items()}
-    return BlockLayout(fields, literal, last=name, broken_off=b"ls-dyna" in block)
+    return fields, name
 
 
 def _is_whole(layout: BlockLayout) -> bool:
     return _LAST in layout.fields
 
 
-_GRAMMAR: Final = Grammar(_START, _describe, _is_whole, _WIDTH, decimals=5, compare_all=True)
+_GRAMMAR: Final = Grammar(
+    _START, _LINE, _describe, _CHANGING, _TIME, _is_whole, width=_WIDTH, decimals=5, compare_all=True
+)
 
 
 def write(title: str, lines: Mapping[str, Samples]) -> bytes:

@@ -33,6 +33,8 @@ _ENERGY_NAMES: Final = ("internal_energy", "ie", "inten", "allie", "e_int")
 _TIME_NAMES: Final = ("time", "t")
 _MANY: Final = 12  # candidates named in a message
 _BRANCHES: Final = ("glstat", "matsum")
+# What h5py makes of a damaged file.
+_DAMAGED: Final = OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError, OverflowError, MemoryError
 
 
 def recognises(data: bytes) -> bool:
@@ -269,16 +271,7 @@ def _opened(file: BinaryIO, source: str) -> Iterator[h5py.File]:
     try:
         with h5py.File(file, "r") as opened:
             yield opened
-    except (
-        OSError,
-        RuntimeError,
-        KeyError,
-        ValueError,
-        TypeError,
-        AttributeError,
-        OverflowError,
-        MemoryError,
-    ) as error:
+    except _DAMAGED as error:
         reason = printable(" ".join(str(error).split()))
         raise FormatError(f"{source}: HDF5 cannot be read ({reason}); the file is damaged or needs a filter") from error
 

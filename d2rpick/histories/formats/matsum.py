@@ -13,18 +13,16 @@ from collections import Counter
 from functools import partial
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-import numpy as np
-
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.database import Database
-from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, head, overlong, release, written_head
+from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, head, written_head
 from d2rpick.histories.formats.fixed_text import PORTIONS, Blocks, Portions
 from d2rpick.histories.names import Part, Selection
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from d2rpick.histories.content import Content
+    from d2rpick.histories.content import Bytes, Content
     from d2rpick.histories.history import Samples
     from d2rpick.histories.source import Source
 
@@ -87,7 +85,7 @@ class Matsum(Database):
         self.source = source
         self._legend = _legend(data)
         describe, whole = partial(_describe, self._legend), partial(_is_whole, self._legend)
-        grammar = Grammar(_START, describe, whole, width=13, decimals=4, compare_all=False)
+        grammar = Grammar(_START, _LINE, describe, _CHANGING, _TIME, whole, width=13, decimals=4, compare_all=False)
         self._blocks = Blocks(data, source, begin, grammar, portions=portions)
         if not self.version and not self._blocks.states:
             told = f"{source}:1: neither a line with 'ls-dyna' nor a whole state was found, this is not a matsum"
@@ -190,33 +188,28 @@ def _is_whole(legend: Mapping[int, str], layout: BlockLayout) -> bool:
     return bool(legend) and all((id_, _MAT) in layout.fields for id_ in legend)
 
 
-def _describe(legend: Mapping[int, str], block: bytes) -> BlockLayout:
-    literal = np.full(len(block), 255, np.uint8)
-    behind = 0
+def _describe(
+    legend: Mapping[int, str], block: bytes, lines: Sequence[re.Match[bytes]], literal: Bytes
+) -> tuple[dict[tuple[int | None, str], int], tuple[int | None, str]]:
     fields: dict[tuple[int | None, str], int] = {}
     part: int | None = None
     doubled = False
     name = _TIME
-    for line in _LINE.finditer(block):
-        release(literal, block, _CHANGING, behind, line.start())
-        first, behind = line.span()
+    for line in lines:
         if line[1] is not None:
             part = _part_number(legend, line[1], block)
             doubled = (part, _MAT) in fields
             if doubled:  # two groups of lines: neither is sure
                 fields.update({field: UNSURE for field in fields if field[0] == part})
-            fields[part, _MAT] = UNSURE if doubled else first - 1  # with the line end before it
-        for field in _FIELD.finditer(block, first, behind):
+            fields[part, _MAT] = UNSURE if doubled else line.start() - 1  # with the line end before it
+        for field in _FIELD.finditer(block, *line.span()):
             name = (part, field[1].decode())
             if field[2] is None or doubled or name in fields:
                 fields[name] = UNSURE
             else:
                 literal[field.start(2) : field.end(2)] = 0
                 fields[name] = field.start(2)
-    release(literal, block, _CHANGING, behind, len(block))
-    if overlong(block):
-        fields = {field: place if field == _TIME else UNSURE for field, place in fields.items()}
-    return BlockLayout(fields, literal, last=name, broken_off=b"ls-dyna" in block)
+    return fields, name
 
 
 def _part_number(legend: Mapping[int, str], text: bytes, block: bytes) -> int:
