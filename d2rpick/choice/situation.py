@@ -149,7 +149,8 @@ class Situation:
     @property
     def kinetic_share(self) -> float | None:
         """K, or None on basis "energy" and at rest [-]."""
-        return None if self.at_rest else self.vibration.kinetic_share  # where nothing vibrates there is no share
+        share = self.vibration.kinetic_share
+        return None if share is None or self.at_rest else share  # where nothing vibrates there is no share
 
     @property
     def earliest_tr(self) -> float | None:

@@ -116,7 +116,8 @@ def suggest_in_window(
         td = last if last > inside[0] and look(last).at_rest else td
     elif chosen is not None:
         times = offered_times(situation, inside, STEPS)[0].tolist() if times is None else times
-        td = _unbeaten(td, times, look, looking(history, replace(settings, replay=False), since=since))
+        earliest = float(history.time[0]) if since is None else since
+        td = _unbeaten(td, times, earliest, look, looking(history, replace(settings, replay=False), since=since))
     found = suggest_at(looking(history, settings, fits, since, quick=False)(td))
     return replace(found, td_window=window, longer=_given_up(longest, found.recommended, inside, look))
 
@@ -152,11 +153,12 @@ def as_printed(error: float | None) -> float:
     return np.inf if error is None else round(error, _READ)
 
 
-def _unbeaten(td: float, times: Iterable[float], look: Look, at_level: Look) -> float:
+def _unbeaten(td: float, times: Iterable[float], earliest: float, look: Look, at_level: Look) -> float:
     """Give ``td``, or the one of ``times`` with the longest rigid time whose pair beats its: no worse, and better.
 
     Peaks were compared as one of them knows the flight; the energy alone shows another one to each td.  Where only
-    pairs ``at_level`` compare with its, an oscillator is sought at no td that is beaten without.
+    pairs ``at_level`` compare with its, an oscillator is sought at no td that is beaten without.  Nothing is rigid before
+    ``earliest`` [time].
     """
     own = next(iter(_acceptable([look(td)])), None)
     if own is None:
@@ -164,7 +166,8 @@ def _unbeaten(td: float, times: Iterable[float], look: Look, at_level: Look) -> 
     seen = look if own[0].flight.source == "energy" else own[0].at
     first = at_level if seen is look and own[0].basis == "energy" else seen
     error = as_printed(error_of(*own))
-    better = _beating(own, [seen(time) for time in times if _may_beat(first(time), own, error)])
+    late = (time for time in times if time - earliest >= own[1].rigid_time)
+    better = _beating(own, [seen(time) for time in late if _may_beat(first(time), own, error)])
     for there, _ in sorted(better, key=lambda one: (-one[1].rigid_time, as_printed(error_of(*one)))):
         if _beating(own, [look(there.td)]):
             return there.td

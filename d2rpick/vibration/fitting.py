@@ -213,7 +213,7 @@ def minimise(
     damping = 1e-4  # of the unit diagonal: starts are close, so steps may be long
     cost, normal, gradient = _normal_equations(parameters, model, s, e)
     free = gradient.size
-    for _ in range(_MAX_STEPS):
+    for left in range(_MAX_STEPS, 0, -1):
         scale = np.sqrt(normal.diagonal()) + 1e-150
         damped = normal / (scale * scale[:, None])
         damped.flat[:: free + 1] += damping
@@ -225,7 +225,7 @@ def minimise(
         if trial_cost <= cost:
             parameters, cost, (normal, gradient) = trial, trial_cost, trial_equations
             damping = max(damping / 10, 1e-10)
-            if _MAX_STEPS * expected < cost - hopeless:
+            if left * expected < cost - hopeless:
                 break
         else:
             damping *= 10
