@@ -157,7 +157,7 @@ def _unbeaten(td: float, times: Iterable[float], earliest: float, look: Look, at
     """Give ``td``, or the one of ``times`` with the longest rigid time whose pair beats its: no worse, and better.
 
     Peaks were compared as one of them knows the flight; the energy alone shows another one to each td.  Where only
-    pairs ``at_level`` compare with its, an oscillator is sought at no td that is beaten without.  Nothing is rigid before
+    pairs ``at_level`` compare with its, an oscillator is sought at no td that is beaten without.  None is rigid before
     ``earliest`` [time].
     """
     own = next(iter(_acceptable([look(td)])), None)
