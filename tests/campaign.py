@@ -12,7 +12,6 @@ import warnings
 from collections import Counter
 from collections.abc import Callable
 from functools import cache, partial
-from itertools import pairwise
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
@@ -25,9 +24,10 @@ from d2rpick.histories.formats import csv_table, hdf5_file
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection, open_run
 from tests.command import DECK
+from tests.damaged_files import FILES
 from tests.faults import Fault, damage
 from tests.hdf5_files import plain, written
-from tests.histories.formats import test_curves, test_faults_binary, test_faults_text, test_radioss_th
+from tests.histories.formats import test_curves, test_faults_text
 from tests.reading import run_of, states_of
 
 _CHUNK: Final = 200  # inputs of one task
@@ -60,18 +60,18 @@ def matsum(random: Random) -> bool:
 
 def binout(random: Random) -> bool:
     """Damage the structure of a binout, or lose, double and move its records."""
-    made = random.choice((test_faults_binary.BINOUT, test_faults_binary.LONG))
-    places = test_faults_binary.BINOUT_STRUCTURE if made is test_faults_binary.BINOUT else made.marks
-    return bool(test_faults_binary.true_binout(_restructured(random, bytes(made.data), made.marks, places, 1)))
+    return restructured(random, "binout", "long binout")
 
 
 def time_history(random: Random) -> bool:
-    """Damage the structure of a T01; runs of records as long as a state are left alone, since nothing tells them."""
-    made, places = test_faults_binary.T01, test_faults_binary.T01_STRUCTURE
-    text = test_radioss_th
-    if random.random() < 1 / 2:
-        return bool(text.true(_restructured(random, text.DATA, text.SMALL.marks, text.STRUCTURE, 4)))
-    return bool(test_faults_binary.true_t01(_restructured(random, bytes(made.data), made.marks, places, 5)))
+    """Damage a T01 like that."""
+    return restructured(random, "T01", "T01 as text")
+
+
+def restructured(random: Random, *names: str) -> bool:
+    """Damage one of these files of records."""
+    file = FILES[random.choice(names)]
+    return bool(file.true(file.restructured(random)))
 
 
 def csv(random: Random) -> bool:
@@ -162,33 +162,6 @@ def main() -> int:
         print(f"{form:<12} {each:>9} {counts['read']:>9} {counts['refused']:>9} {len(wrong):>9}")
         print(*(f"  {what}" for what in wrong[:_SHOWN]), sep="\n", end="\n" if wrong else "")
     return int(any(counts.keys() - {"read", "refused"} for counts in found.values()))
-
-
-def _restructured(random: Random, data: bytes, marks: list[int], places: list[int], state: int) -> bytes:
-    """Flip bytes of structure, cut, insert, or move records; never ``state`` of them, or a multiple."""
-    changed = bytearray(data)
-    what = random.choice(("flip", "cut", "insert", "lost", "twice", "moved"))
-    if what == "flip":
-        for _ in range(random.randint(1, 4)):
-            changed[random.choice(places)] = random.randrange(256)
-        return bytes(changed)
-    at = random.choice(marks)
-    if what == "cut":
-        return data[: random.randrange(len(data))]
-    if what == "insert":
-        changed[at:at] = random.randbytes(random.randint(1, 40))
-        return bytes(changed)
-    edges = [*marks, len(data)]
-    records = [data[begin:end] for begin, end in pairwise(edges)]
-    first, length = random.randrange(len(records)), random.randint(1, 30)
-    length += state > 1 and length % state == 0
-    moved = records[first : first + length]
-    if what != "twice":
-        del records[first : first + length]
-    if what != "lost" and (state == 1 or len(moved) % state):
-        at = random.randint(0, len(records))
-        records[at:at] = moved
-    return data[: marks[0]] + b"".join(records)
 
 
 def _read(read: Callable[[], object]) -> object:

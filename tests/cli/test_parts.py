@@ -83,7 +83,7 @@ def test_td_behind_the_contact_that_the_momentum_shows_is_no_free_flight() -> No
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (("--part", "bax"), ["no part 'bax'", "did you mean", "box"]),
+        (("--part", "bax"), ["no part 'bax'", "did you mean", "1 'box', 2 'step', 3 'sled'"]),
         (("--part", "7"), ["no part 7", "1 'box', 2 'step', 3 'sled'"]),
         (("--part", "box", "--flying", "7"), ["no part 7", "1 'box'"]),
         (("--part", "box", "--energy", "1"), ["--energy and --part exclude each other"]),

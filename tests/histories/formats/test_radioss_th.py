@@ -2,13 +2,10 @@
 
 import gzip
 from collections.abc import Callable
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from d2rpick.base.errors import D2RPickError, FormatError
 from d2rpick.histories.formats import csv_table, radioss_th
@@ -16,38 +13,11 @@ from d2rpick.histories.formats.radioss_th import TimeHistory, recognises
 from d2rpick.histories.opening import Selection, open_run
 from tests.command import BOX, ROLLOVER, put
 from tests.computed import stored, unpacked
-from tests.faults import cases, some
-from tests.histories.formats.test_faults_binary import bounded_memory, t01_value, true_columns
-from tests.made_t01 import MadePart, T01TextWriter, T01Writer, real, t01, value
+from tests.damaged_files import FILES, printed
+from tests.made_t01 import MadePart, T01TextWriter, T01Writer, t01, value
 from tests.reading import run_of, run_on_disk
 
-STATES = 3
-SMALL = t01(
-    STATES, [MadePart(id_, f"part {id_}", (1, 5)) for id_ in (7, 3)], globals_=5, subset_variables=0,
-    made=T01TextWriter(),
-)  # fmt: skip
-DATA = bytes(SMALL.data)
-FIRST_STATE = SMALL.marks[-4 * STATES]
-# All but the lines of numbers in the states, which bear no mark but their place.
-STRUCTURE = [
-    *range(FIRST_STATE),
-    *(at for mark in SMALL.marks[-4 * STATES :] for at in range(mark, DATA.index(b"\n", mark) + 1)),
-]
-
-
-def printed(number: float) -> float:
-    return float(real(number))
-
-
-def true(data: bytes) -> list[tuple[int, bool]]:
-    """Read everything; what is read must be true."""
-    return true_columns(
-        lambda: TimeHistory(data, "runT01"),
-        ("internal_energy", "z_momentum"),
-        lambda name, state, part=0: printed(t01_value(name, state, part)),
-    )
-
-
+SMALL = FILES["T01 as text"]
 FORMS: dict[str, Callable[[], T01Writer]] = {
     "binary": T01Writer,
     "text": T01TextWriter,
@@ -179,20 +149,20 @@ def test_legs_may_be_text_and_binary() -> None:
 
 def test_a_packed_text_is_read_like_one_on_a_disk(tmp_path: Path) -> None:
     plain, packed = tmp_path / "plain", tmp_path / "packed"
-    plain.write_bytes(DATA)
-    packed.write_bytes(gzip.compress(DATA))
+    plain.write_bytes(SMALL.data)
+    packed.write_bytes(gzip.compress(SMALL.data))
     read = [open_run([str(file)]).history(Selection(parts=("7",))) for file in (plain, packed)]
     assert [history.format for history in read] == ["radioss-th"] * 2
-    assert read[0].energy.tolist() == read[1].energy.tolist() == [printed(value(s, 7, 1)) for s in range(STATES)]
+    assert read[0].energy.tolist() == read[1].energy.tolist() == [printed(value(s, 7, 1)) for s in range(SMALL.states)]
 
 
 def test_what_a_running_solver_appends_to_a_file_on_its_disk_does_not_count(tmp_path: Path) -> None:
-    file = put(tmp_path / "runT01", DATA[:-10])
+    file = put(tmp_path / "runT01", SMALL.data[:-10])
     run = run_on_disk(file)
     with file.open("ab") as end:
-        end.write(DATA[-10:])
+        end.write(SMALL.data[-10:])
     history = run.history(Selection(parts=("7",)))
-    assert history.energy.tolist() == [printed(value(s, 7, 1)) for s in range(STATES - 1)]
+    assert history.energy.tolist() == [printed(value(s, 7, 1)) for s in range(SMALL.states - 1)]
     assert not history.complete
     assert "the file ends within state 3, which was left out" in history.notes[0]
 
@@ -210,7 +180,7 @@ def test_what_a_running_solver_appends_to_a_file_on_its_disk_does_not_count(tmp_
 )
 def test_a_head_that_does_not_hold_what_it_says_is_refused(line: bytes, damaged: bytes) -> None:
     with pytest.raises(FormatError, match="was expected in the head of the time history near byte"):
-        opened(DATA.replace(line, damaged))
+        opened(SMALL.data.replace(line, damaged))
 
 
 CODED = "runT01\n00000318a title\nWed Apr 10 13:20:15 2024 RADIOSS Open\n0000000A0000000MZZZZZEOR\n"
@@ -225,45 +195,7 @@ def test_other_forms_of_text_are_refused_with_what_to_do(text: str) -> None:
 
 def test_as_a_table_it_is_refused() -> None:
     with pytest.raises(FormatError):
-        run_of(csv_table, DATA).history(Selection())
-
-
-def test_cut_at_any_byte_it_keeps_its_whole_states() -> None:
-    assert true(DATA) == [(STATES, True)] * 6
-    stride = (len(DATA) - FIRST_STATE) // STATES
-    for cut in some(range(len(DATA)), 23):
-        whole, rest = divmod(cut - FIRST_STATE, stride)
-        # a head alone, behind which a record begins, may be refused
-        assert true(DATA[:cut]) in ([(whole, rest == 0)] * 6, *([[]] if whole < 1 else ()))
-
-
-@pytest.mark.parametrize("flip", [0x01, 0x04, 0x10, 0x80])
-def test_any_byte_of_its_structure_may_be_wrong(flip: int) -> None:
-    data = bytearray(DATA)
-    for place in some(STRUCTURE, 23):
-        data[place] ^= flip
-        true(bytes(data))
-        data[place] ^= flip
-
-
-@cases(30)
-@given(
-    st.lists(st.tuples(st.sampled_from(STRUCTURE), st.integers(0, 255)), max_size=3),
-    st.sampled_from(SMALL.marks),
-    st.binary(max_size=40),
-    st.integers(0, 30).filter(lambda lost: lost % 4),
-)
-def test_bytes_and_records_may_be_put_in_lost_and_changed(
-    changed: list[tuple[int, int]], at: int, put_in: bytes, lost: int
-) -> None:
-    data = bytearray(DATA)
-    for place, byte in changed:
-        data[place] = byte
-    records = [bytes(data[begin:end]) for begin, end in pairwise([*SMALL.marks, len(data)])]
-    first = SMALL.marks.index(at)
-    with bounded_memory():
-        true(bytes(data[:at] + put_in + data[at:]))
-        true(bytes(data[: SMALL.marks[0]]) + b"".join(records[:first] + records[first + lost :]))
+        run_of(csv_table, SMALL.data).history(Selection())
 
 
 @pytest.mark.parametrize(

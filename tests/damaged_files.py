@@ -1,0 +1,170 @@
+"""Files of records, to be damaged in tests: a number tells its variable, state and part, so a shifted one is seen."""
+
+import tracemalloc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property, partial
+from itertools import pairwise
+from random import Random
+from typing import TypeVar
+
+import numpy as np
+
+from d2rpick.base.errors import FormatError
+from d2rpick.histories.database import Database
+from d2rpick.histories.formats.binout import Binout
+from d2rpick.histories.formats.radioss_th import TimeHistory
+from tests.made_binout import GLSTAT, LsdaWriter, binout, values
+from tests.made_t01 import MadePart, T01TextWriter, T01Writer, real, t01, value
+
+Read = TypeVar("Read")
+
+STATES = 6
+PARTS = (7, 3)
+MEMORY = 1 << 22  # far above what the small files need, far below what a damaged length may promise
+
+
+def true_binout(data: bytes) -> list[tuple[int, bool]]:
+    """Read everything; what is read must be true.  States of each column, and if the file is complete."""
+    run = refused_or(lambda: Binout([("binout", data)]))
+    if run is not None and run.complete and not run.notes:
+        assert {"time", *run.channels} == {*GLSTAT}, "a lost variable is told"
+        for times in (refused_or(lambda: run.time), refused_or(lambda: run.part_time)):
+            assert times is None or times[:1].tolist() in ([], [1 / 8]), "a lost first state is told"
+    return true_columns(lambda: Binout([("binout", data)]), ("internal_energy", "z_momentum"), values)
+
+
+def t01_value(name: str, state: int, part: int = 0) -> float:
+    return value(state, part, {"internal_energy": 1, "z_momentum": 5}[name])
+
+
+def true_t01(data: bytes, of: Callable[..., float] = t01_value) -> list[tuple[int, bool]]:
+    """Read everything; what is read must be true."""
+    return true_columns(lambda: TimeHistory(data, "runT01"), ("internal_energy", "z_momentum"), of)
+
+
+def true_text(data: bytes) -> list[tuple[int, bool]]:
+    """The same of a text."""
+    return true_t01(data, lambda name, state, part=0: printed(t01_value(name, state, part)))
+
+
+def printed(number: float) -> float:
+    return float(real(number))
+
+
+def true_columns(
+    opened: Callable[[], Database], names: tuple[str, ...], true: Callable[..., float]
+) -> list[tuple[int, bool]]:
+    run = refused_or(opened)
+    if run is None:
+        return []
+    assert all("\n" not in note for note in run.notes)
+    found = []
+    for name in names:
+        columns = [(lambda: run.time, partial(run.channel, name), partial(true, name))]
+        columns += [
+            (lambda: run.part_time, partial(run.part_channel, name, [id_]), partial(true, name, part=id_))
+            for id_ in PARTS
+        ]
+        for times, numbers, of_state in columns:
+            time, column = refused_or(times), refused_or(numbers)
+            if time is not None and column is not None:
+                states = [round(t * 8) for t in time.tolist()]
+                assert time.tolist() == [state / 8 for state in states]
+                assert column.ravel().tolist() == [of_state(state) for state in states]
+                found.append((len(states), run.complete))
+    return found
+
+
+def refused_or(read: Callable[[], Read]) -> Read | None:
+    """What is read, or None for an error of ours in one line."""
+    try:
+        return read()
+    except FormatError as error:
+        line = str(error)
+    assert "\n" not in line
+    return None
+
+
+@contextmanager
+def bounded_memory() -> Iterator[None]:
+    tracemalloc.start()
+    try:
+        yield
+        assert tracemalloc.get_traced_memory()[1] < MEMORY
+    finally:
+        tracemalloc.stop()
+
+
+@dataclass
+class Damaged:
+    """A file to be damaged: ``per_state`` records make a state, or 1 where a state tells its records."""
+
+    made: LsdaWriter | T01Writer
+    true: Callable[[bytes], list[tuple[int, bool]]]
+    states: int = STATES
+    per_state: int = 1
+
+    @cached_property
+    def data(self) -> bytes:
+        return bytes(self.made.data)
+
+    @cached_property
+    def first(self) -> int:
+        """Which record of a time history is the first one of its states."""
+        return len(self.made.marks) - self.per_state * self.states
+
+    @cached_property
+    def structure(self) -> list[int]:
+        """Bytes that are no values of variables."""
+        data, number = self.data, np.zeros(len(self.data), dtype=bool)
+        for place, (begin, end) in enumerate(pairwise([*self.made.marks, len(data)])):
+            if isinstance(self.made, T01TextWriter):
+                number[data.index(b"\n", begin) + 1 : end] = place >= self.first
+            elif isinstance(self.made, T01Writer):
+                number[begin + 4 : end - 4] = place >= self.first
+            elif data[begin + 8] == 3:
+                number[begin + 11 + data[begin + 10] : end] = True
+        return np.flatnonzero(~number).tolist()
+
+    def restructured(self, random: Random) -> bytes:
+        """Flip bytes of structure, cut, insert, or lose, double and move records.
+
+        A run as long as one state, moved to the same place of another, puts a state together from two: no time history
+        says anywhere which record belongs to which state.  Runs of other lengths leave a trace.
+        """
+        changed, marks = bytearray(self.data), self.made.marks
+        what = random.choice(("flip", "cut", "insert", "lost", "twice", "moved"))
+        if what == "cut":
+            return self.data[: random.randrange(len(changed))]
+        if what in ("flip", "insert"):
+            for _ in range(random.randint(what == "flip", 4)):
+                changed[random.choice(self.structure)] = random.randrange(256)
+            at = random.choice(marks)
+            changed[at:at] = random.randbytes(random.randint(1, 40) if what == "insert" else 0)
+            return bytes(changed)
+        records = [self.data[begin:end] for begin, end in pairwise([*marks, len(changed)])]
+        first, length = random.randrange(len(records)), random.randint(1, 30)
+        length += self.per_state > 1 and length % self.per_state == 0
+        moved = records[first : first + length]
+        if what != "twice":
+            del records[first : first + length]
+        if what != "lost" and (self.per_state == 1 or len(moved) % self.per_state):
+            at = random.randint(0, len(records))
+            records[at:at] = moved
+        return self.data[: marks[0]] + b"".join(records)
+
+
+FILES = {
+    "binout": Damaged(binout(range(1, STATES + 1), PARTS), true_binout),
+    "long binout": Damaged(binout(range(1, 200), PARTS), true_binout),
+    "T01": Damaged(t01(STATES, [MadePart(id_, f"part {id_}") for id_ in PARTS]), true_t01, per_state=5),
+    "T01 as text": Damaged(
+        t01(
+            3, [MadePart(id_, f"part {id_}", (1, 5)) for id_ in PARTS], globals_=5, subset_variables=0,
+            made=T01TextWriter(),
+        ),
+        true_text, 3, per_state=4,
+    ),
+}  # fmt: skip
