@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import ConfigurationError
@@ -44,8 +44,7 @@ def find_rules(name: str) -> tuple[Rule, ...]:
     return found
 
 
-@dataclass(frozen=True)
-class Configuration:
+class Configuration(NamedTuple):
     """Which rules count, by id or its beginning (``D2R1``), and what weight single rules have.
 
     ``ignore`` is stronger than ``select``; an empty ``select`` means all.  ``source`` names their file.
@@ -59,7 +58,7 @@ class Configuration:
 
     select: tuple[str, ...] = ()
     ignore: tuple[str, ...] = ()
-    severity: Mapping[str, str] = field(default_factory=dict)
+    severity: Mapping[str, str] = MappingProxyType({})
     source: str = ""
 
     def selects(self, rule: str) -> bool:
@@ -134,7 +133,7 @@ def configuration_for(deck: str, asked: Configuration, others: Collection[str] =
     """
     found = read_configuration(*nearest_settings(os.path.dirname(deck)), others)  # noqa: PTH120  a name with a NUL byte has none
     found.verify(RULES)
-    return replace(found, select=asked.select or found.select, ignore=asked.ignore or found.ignore)
+    return found._replace(select=asked.select or found.select, ignore=asked.ignore or found.ignore)
 
 
 def check_deck(

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, one_line
@@ -258,8 +259,7 @@ Objection = tuple["Field", str]
 """Where, and what is wrong there."""
 
 
-@dataclass(frozen=True)
-class Example:
+class Example(NamedTuple):
     """A deck, and the files it includes, or that belong to it, by name; ``name`` is that of the deck itself.
 
     ``history`` are arguments of ``d2rpick replay`` that write the energy history it is checked with, ``options``
@@ -267,7 +267,7 @@ class Example:
     """
 
     deck: str
-    files: Mapping[str, str] = field(default_factory=dict)
+    files: Mapping[str, str] = MappingProxyType({})
     history: str = ""
     options: str = ""
     stdin: bool = False

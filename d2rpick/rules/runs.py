@@ -5,7 +5,6 @@ Bodies may go through walls, begin at rest, or be rigid all along.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
@@ -265,8 +264,8 @@ def _left_rigid(case: RunCase) -> Iterator[Objection]:
     "D2R409",
     ERROR,
     "a rigid body that no leg switches, though its parts deform in the history",
-    (GOOD_RUN, _wheel(), replace(_wheel(), history=_SPRING)),
-    (replace(_wheel(part=3), history=_SPRING),),
+    (GOOD_RUN, _wheel(), _wheel()._replace(history=_SPRING)),
+    (_wheel(part=3)._replace(history=_SPRING),),
     (RADIOSS,),
 )
 def _left_rigid_deforming(case: RunCase) -> Iterator[Objection]:
