@@ -78,17 +78,20 @@ class Row:
 
     def field(self, position: int) -> Field:
         """Field ``position`` from 0, between commas or in fixed columns; empty beyond the end of the line."""
-        cells = self._cells
-        text, column = cells[position] if position < len(cells) else ("", len(self.text) + 1)
-        return Field(text, self.block, self.distance, column)
+        fields = self._fields
+        beyond = len(self.text) + 1
+        return fields[position] if position < len(fields) else Field("", self.block, self.distance, beyond)
 
     @cached_property
-    def _cells(self) -> list[tuple[str, int]]:
-        """Text of each field without the blanks around it, and its column; they are asked for one after the other."""
-        line, width = self.text, self.width
-        between = ((at, line[at : at + width]) for at in range(0, len(line), width))
-        pieces = _between_commas(line) if "," in line else between
-        return [(found := text.strip(), 1 + start + (text.index(found[0]) if found else 0)) for start, text in pieces]
+    def _fields(self) -> list[Field]:
+        """All fields: they are asked for one after the other, and again."""
+        line, width, block, distance = self.text, self.width, self.block, self.distance
+        in_columns = ((at, line[at : at + width]) for at in range(0, len(line), width))
+        pieces = _between_commas(line) if "," in line else in_columns
+        return [
+            Field(found := text.strip(), block, distance, 1 + start + (text.index(found[0]) if found else 0))
+            for start, text in pieces
+        ]
 
 
 def _between_commas(text: str) -> Iterator[tuple[int, str]]:
