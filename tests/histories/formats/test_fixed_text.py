@@ -13,7 +13,7 @@ from d2rpick.histories.content import Content
 from d2rpick.histories.formats.fixed_text import PORTIONS, Portions
 from d2rpick.histories.formats.glstat import Glstat
 from d2rpick.histories.formats.matsum import Matsum
-from tests.text_files import glstat_text, matsum_text
+from tests.text_files import HEAD, glstat_blocks, glstat_text, matsum_text
 
 IDS = [1, 20, 300]
 
@@ -109,3 +109,16 @@ def test_damage_to_a_number_taken_ahead_is_named_with_its_line() -> None:
     line = 1 + text[: text.index(b"*25")].count(b"\n")
     with pytest.raises(FormatError, match=rf"^glstat:{line}: 'internal energy' is '1.00\*25E\+02'"):
         run.channel("internal energy")
+
+
+@pytest.mark.parametrize("lengths", [1, 7, 20])
+def test_blocks_whose_length_varies_are_read(lengths: int) -> None:
+    states = np.arange(100.0)
+    blocks = [
+        block.replace(b"100449", b"1" * (1 + state % lengths))
+        for state, block in enumerate(glstat_blocks(states, states**2))
+    ]
+    run = Glstat(HEAD + b"\n\n" + b"".join(blocks), "glstat", ["internal energy"])
+    assert run.time.tolist() == states.tolist()
+    assert run.channel("internal energy").tolist() == (states**2).tolist()
+    assert set(run.channel("external work").tolist()) == {7.0}
