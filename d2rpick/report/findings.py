@@ -15,7 +15,7 @@ from d2rpick.deck.source import STDIN
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, kind_of, many, one_of, row
 from d2rpick.rules import RULES, Checked
-from d2rpick.rules.base import Example, Rule, Severity, Unreadable
+from d2rpick.rules.base import MAIN_DECK, Example, Rule, Severity, Unreadable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -324,7 +324,7 @@ def _example(title: str, example: Example, width: int) -> Iterator[str]:
         yield f"checked by d2rpick check {example.name} --history energy.csv {example.options}".rstrip() + ":"
     elif example.stdin:
         yield f"{title}, read by d2rpick check -:"
-    elif example.name != Example.name:
+    elif example.name != MAIN_DECK:
         yield f"{title}, as {example.name}:"
     else:
         yield f"{title}:"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 
 from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, one_line
 from d2rpick.deck.parts import Constraint, Parts, read_constraints, read_parts, read_sections
@@ -259,6 +259,9 @@ Objection = tuple["Field", str]
 """Where, and what is wrong there."""
 
 
+MAIN_DECK: Final = "main.k"  # of an example that has no other name
+
+
 class Example(NamedTuple):
     """A deck, and the files it includes, or that belong to it, by name; ``name`` is that of the deck itself.
 
@@ -271,7 +274,7 @@ class Example(NamedTuple):
     history: str = ""
     options: str = ""
     stdin: bool = False
-    name: str = "main.k"
+    name: str = MAIN_DECK
 
 
 class Rule(NamedTuple):

@@ -1,6 +1,7 @@
 """Reports of findings, each against its published schema."""
 
 import json
+import re
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -103,3 +104,13 @@ def test_nothing_found_is_a_report_too(tmp_path: Path) -> None:
     sarif_is_valid(report.as_sarif(report.Checks([], str(tmp_path)), Shown()))
     junit_is_valid(report.as_junit(report.Checks([], str(tmp_path)), Shown()))
     assert report.as_github(report.Checks([], str(tmp_path)), Shown()) == ""
+
+
+def test_only_a_deck_of_another_name_is_named() -> None:
+    named = [
+        name
+        for rule in RULES.values()
+        for name in re.findall(r"^\w+, as (\S+):$", report.as_text(rule, 100), re.MULTILINE)
+    ]
+    assert named
+    assert "main.k" not in named
