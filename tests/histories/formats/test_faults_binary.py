@@ -76,8 +76,8 @@ def test_a_variable_whose_type_changes_between_states_is_left_out_with_a_note() 
 
 
 @pytest.mark.parametrize("name", FILES)
-@cases(25)
-@given(random=st.randoms())
+@cases(40)
+@given(random=st.randoms(use_true_random=True))
 def test_records_may_be_lost_doubled_and_moved_and_bytes_put_in_and_changed(name: str, random: Random) -> None:
     with nullcontext() if name == "long binout" else bounded_memory():
         FILES[name].true(FILES[name].restructured(random))
