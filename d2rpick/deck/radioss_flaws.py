@@ -71,9 +71,7 @@ def flaws_of(run: Run, switched: Collection[int]) -> tuple[Flaw, ...]:
     """
     starter = run.starter
     bodies = [body for body in starter.bodies if body.node.value in switched] if starter else []
-    if starter is None or not bodies:
-        return ()
-    if not (starter.named("RWALL") or starter.named("INIVEL") or any(leg.starts for leg in run.legs)):
+    if starter is None or not bodies or not run.pushed:
         return ()
     if starter.moved:
         why = "ids of a //SUBMODEL may be moved: what its rigid walls and initial velocities do to /RBODY is not known"

@@ -67,6 +67,11 @@ class Run:
         """Main nodes that the legs switch."""
         return frozenset(node.value for leg in self.legs for _, _, nodes in leg.switched for node in nodes)
 
+    @property
+    def pushed(self) -> bool:
+        """Whether rigid walls, or velocities that are given to nodes, may do something to its bodies."""
+        return bool(self.starter and self.starter.named("RWALL", "INIVEL")) or any(leg.starts for leg in self.legs)
+
 
 def recognises(head: bytes) -> bool:
     """Whether a file that begins like this is a starter deck or an engine file."""

@@ -232,10 +232,7 @@ class RunCase(Case):
     @cached_property
     def flaws(self) -> tuple[Flaw, ...]:
         """What the starter does to the nodes of the bodies that the legs switch."""
-        starter, legs = self.run.starter, self.run.legs
-        if not self.run.named or starter is None:
-            return ()
-        if not (starter.named("RWALL") or starter.named("INIVEL") or any(leg.starts for leg in legs)):
+        if not self.run.named or not self.run.pushed:
             return ()
         from d2rpick.deck.radioss_flaws import flaws_of  # loads numpy
 
