@@ -124,7 +124,7 @@ class Deck:
         return [source.name for source in self.sources]
 
     def named(self, *names: str) -> list[Card]:
-        """Cards whose keyword is one of ``names``, or one of them with an option behind ``_``."""
+        """Cards of a deck that was read whose keyword is one of ``names``, or one with an option behind ``_``."""
         found = [self._places[name] for name in names if name in self._places]
         return [self.cards[place] for place in (found[0] if len(found) == 1 else sorted(set().union(*found)))]
 
