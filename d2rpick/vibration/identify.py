@@ -310,9 +310,11 @@ def _judged(
     s, e = record.s, record.e
     rest = e - attempt.energy
     rms, spread, structure = float(np.sqrt(np.mean(rest**2))), float(np.std(e)), fitting.structure_of(rest)
-    vibration = attempt.scaled.vibration_energy(s)
+    local = attempt.scaled.vibration_energy(s)
+    vibration = float(np.hypot.reduce(local) / np.sqrt(s.size))  # squares may overflow
     # where noise exceeds the vibration, a rest says nothing about a further mode
-    local_structure = fitting.structure_of(rest / np.maximum(vibration, max(rms, _FLOOR * np.max(vibration))))
+    np.maximum(local, max(rms, _FLOOR * np.max(local)), out=local)
+    local_structure = fitting.structure_of(np.divide(rest, local, out=local))
     loose = _loose(attempt.name, rms / spread, structure / spread, local_structure)
     found_density = samples_per_period(s, attempt.scaled)
     wrong = _implausible(attempt.scaled, found_density, density, least_periods, record.end - record.start)
@@ -327,7 +329,7 @@ def _judged(
         start=record.start,
         end=record.end,
         covariance=_covariance(attempt.normal, rest) * attempt.units * attempt.units[:, None],
-        vibration=float(np.hypot.reduce(vibration) / np.sqrt(s.size)) * record.scale,  # squares may overflow
+        vibration=vibration * record.scale,
         follows=loose is None,
         plausible=wrong is None,
     )
