@@ -16,6 +16,7 @@ from d2rpick.choice.ranking import EQUALLY_GOOD, Quality
 from d2rpick.choice.suggest_td import STEPS, as_printed, error_of, looking, offered_times, within_flight
 from d2rpick.choice.warnings import Caution, cautions_of
 from d2rpick.choice.windows import bounds, longest_flight
+from d2rpick.histories.digits import as_read
 from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
@@ -195,8 +196,9 @@ def _marked(offers: Sequence[Offer]) -> Iterator[Offer]:
     for known in (True, False):
         group = [one for one in offers if _found(one) and (one.basis != "energy") == known]
         least, longest = np.inf, np.inf
-        for one in sorted(group, key=lambda one: (-(one.rigid_time or 0.0), as_printed(one.error))):
-            error, rigid = as_printed(one.error), one.rigid_time or 0.0
+        read = {one.td: (-as_read(one.rigid_time or 0.0), as_printed(one.error)) for one in group}
+        for one in sorted(group, key=lambda one: read[one.td]):
+            rigid, error = read[one.td]
             if error < least or (error, rigid) == (least, longest):  # equal pairs do not beat each other
                 unbeaten.add(one.td)
                 least, longest = error, rigid

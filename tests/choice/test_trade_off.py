@@ -15,6 +15,7 @@ from d2rpick.choice.of_run import Reference, read, suggest_of
 from d2rpick.choice.ranking import rank
 from d2rpick.choice.situation import Settings, examine
 from d2rpick.choice.trade_off import Offer, TradeOff, explore_of
+from d2rpick.histories.digits import as_read
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Selection
 from d2rpick.histories.run import Run
@@ -55,7 +56,7 @@ def unbeaten(found: TradeOff) -> None:
     """Hold the marks against every other offer."""
     for known in (True, False):
         pairs = [
-            (one.unbeaten, round(one.error, 3), one.best.rigid_time)
+            (one.unbeaten, round(one.error, 3), as_read(one.best.rigid_time))
             for one in found.offers
             if one.best and one.error is not None and not one.best.same_swing and (one.basis != "energy") == known
         ]
@@ -90,6 +91,16 @@ def histories(draw: st.DrawFn) -> History:
     noise = np.random.default_rng(draw(st.integers(0, 99))).standard_normal(states)
     share = draw(st.sampled_from([0.0, 0.003, 0.1]))
     return History(time, energy + share * noise, ("made",), "made", "E")
+
+
+def test_equal_pairs_do_not_beat_each_other_by_rounding() -> None:
+    """From peak to peak of one oscillator the rigid time is the same, but for its last digits."""
+    found = explore_of(read(["sample_data/energy.csv"]), Settings(), None, steps=20)
+    unbeaten(found)
+    peaks = [one for one in found.offers if one.peak and one.best]
+    alike = [one for one in peaks if as_read(one.best.rigid_time) == as_read(peaks[-1].best.rigid_time)]  # type: ignore[union-attr]
+    assert len(alike) > 1
+    assert {one.unbeaten for one in alike} == {True}
 
 
 @pytest.mark.slow
