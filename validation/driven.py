@@ -17,7 +17,7 @@ import numpy as np
 from d2rpick.api.drives import Driving
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.situation import Settings
-from d2rpick.choice.windows import bounds, flights_of
+from d2rpick.choice.windows import flights_of
 from d2rpick.histories.formats.radioss_th import TimeHistory
 from d2rpick.histories.listings import read_timing
 from d2rpick.histories.opening import Selection, open_run
@@ -110,7 +110,7 @@ def held(name: str, folder: Path, solver: Path) -> Iterator[tuple[str, float, fl
     switched = [one for one in found.windows if not one.reason]
     yield "windows", len(switched), np.inf, bool(switched)
     history = open_run(names).history(Selection())
-    for start, end in [bounds(history, one) for one in flights_of(history, Settings())][: goal.flights]:
+    for start, end in [one.within(history.time) for one in flights_of(history, Settings())][: goal.flights]:
         lands = min(read(names).contacts(), key=lambda time: abs(time - end))
         shift = min((abs(time - lands) for time in read(ours).contacts()), default=np.inf)
         yield (

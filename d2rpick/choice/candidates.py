@@ -199,8 +199,8 @@ class Candidates(Sequence[Candidate]):
 
     def _candidate(self, rank: int, reach: float) -> Candidate:
         i = int(self.order[rank])
-        situation, found, known = self.situation, self.moments[i], self.known[i]
-        history, td, tr = situation.history, situation.td, found.tr
+        situation, known, (tr, kind, rising) = self.situation, self.known[i], self.moments[i]
+        history, td = situation.history, situation.td
         energy, level, same_swing, off = (
             column[i].item() for column in (self.energy, self.level_error, self.same_swing, self.position_error)
         )
@@ -211,11 +211,11 @@ class Candidates(Sequence[Candidate]):
         return Candidate(
             rank=(rank + 1) * self.ranked,
             tr=tr,
-            kind=found.kind,
+            kind=kind,
             energy=energy,
             energy_ratio=energy / situation.energy_td if situation.energy_td > 0 and not situation.at_rest else None,
             level_error=None if np.isnan(level) else level,
-            rising=found.rising,
+            rising=rising,
             rigid_time=td - tr,
             rigid_fraction=rigid_fraction,
             tr_low=tr - reach,
@@ -223,7 +223,7 @@ class Candidates(Sequence[Candidate]):
             acceptable=not against,
             recommended=rank == self.recommended,
             notes=(*against, *_SAME_SWING * same_swing, *_remarks(situation, reach, known, parts)),
-            run_time_share=_run_time_share(situation, rigid_fraction),
+            run_time_share=situation.settings.run_time_share(rigid_fraction),
             same_swing=same_swing,
             parts=parts,
             **(known._asdict() if known else {}),
@@ -326,8 +326,3 @@ def _position(worst: Off | None) -> dict[str, Any]:
         "position_error_assumes": ONE_BODY if worst.assumed else None,
         "position_error_is_lower_bound": worst.at_least,
     }
-
-
-def _run_time_share(situation: Situation, rigid_fraction: float) -> float | None:
-    cost_share, step_ratio = situation.settings.cost_share, situation.settings.step_ratio
-    return None if cost_share is None else measures.run_time_share(rigid_fraction, cost_share, step_ratio)

@@ -12,12 +12,11 @@ import numpy as np
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.judged_parts import FEWEST, SAME
 from d2rpick.flight.internal_energy import round_off
+from d2rpick.histories.samples import stretches
 from d2rpick.vibration import measures
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-    from numpy.typing import NDArray
 
     from d2rpick.histories.history import History, Samples, Track
 
@@ -124,7 +123,9 @@ def compare_runs(
         objections += _not_locked_in(reference, tr, frozen, wanted, tolerance)
         if mean_reference > round_off(reference):
             objections += _another_mean(mean / mean_reference, min_mean)
-    objections += _another_motion(error)
+    if error is not None and error > MOST_MOMENTUM_ERROR:
+        moved = f"the switched run's momentum after td is off by {error:.1%}"
+        objections.append(f"{moved}: its motion differs from the reference")
     return Comparison(
         source=switched.source,
         energy_frozen=frozen,
@@ -225,13 +226,6 @@ def _another_mean(share: float, least: float) -> Iterator[str]:
         yield f"{found}, {least:g} to {2 - least:g} were expected (`min_mean_energy`)"
 
 
-def _another_motion(error: float | None) -> Iterator[str]:
-    """Object to a momentum that is off by this share of its maximum after td."""
-    if error is not None and error > MOST_MOMENTUM_ERROR:
-        moved = f"the switched run's momentum after td is off by {error:.1%}"
-        yield f"{moved}: its motion differs from the reference"
-
-
 def times_of(switched: History, reference: History) -> tuple[float, float]:
     """Read off a switched run when its parts were rigid: its energy stands still, and that of the reference does not.
 
@@ -248,8 +242,8 @@ def times_of(switched: History, reference: History) -> tuple[float, float]:
     """
     time, energy = switched.time, switched.energy
     limit = np.maximum(SAME * np.abs(energy), switched.energy_precision.quanta(energy))
-    still = stretches(np.append(False, np.abs(np.diff(energy)) <= limit[1:]))
-    spans = [(max(first - 1, 0), last) for first, last in still]
+    still = stretches(np.append(False, np.abs(np.diff(energy)) <= limit[1:]), FEWEST)
+    spans = [(max(one.start - 1, 0), one.stop - 1) for one in still]
     least = round_off(reference)
     moving = [
         (first, last)
@@ -264,13 +258,6 @@ def times_of(switched: History, reference: History) -> tuple[float, float]:
     before = np.linspace(time[max(first - 1, 0)], time[first], _BETWEEN)
     tr = before[np.abs(reference.energies_at(before) - energy[first]).argmin()]
     return float(tr), float(time[last])
-
-
-def stretches(states: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last of states that follow each other."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], states.astype(np.int8), [0]])))
-    pairs = edges.reshape(-1, 2)
-    return [(int(a), int(b) - 1) for a, b in pairs if b - a >= FEWEST]
 
 
 def _reported_wrong(rigid: float, after: Samples) -> bool:

@@ -86,24 +86,17 @@ def judged_card(
     every = sorted((*done, *windows))
     plain = cards(every, printing, solver)
     verdicts = tuple(judge(*times) for asked, times in zip(every, plain.windows, strict=True) if asked not in done)
-    remarks = (*_of_done(done, history), *_of_whole(history), *_remarks(verdicts))
+    remarks = tuple(_remarks(done, history, verdicts))
     return cards(every, printing, solver, remarks), verdicts
 
 
-def _of_done(done: Sequence[Times], history: History) -> Iterator[str]:
-    """Say which windows were not judged, and why."""
+def _remarks(done: Sequence[Times], history: History, verdicts: Sequence[Verdict]) -> Iterator[str]:
+    """Say which windows were not judged, whose level is not that of the parts, and what was found of the others."""
     if done:
         windows = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in done)
         yield f"{', '.join(history.source)} was rigid from {windows}: done, and not judged again."
-
-
-def _of_whole(history: History) -> Iterator[str]:
-    """Say so where the level is not that of the parts that are switched."""
     if history.parts is None and history.channel.replace(" ", "_") == "internal_energy":
         yield "The level is that of the whole model, whatever parts are switched."
-
-
-def _remarks(verdicts: Sequence[Verdict]) -> Iterator[str]:
     for verdict in verdicts:
         which = f" {verdict.candidate.tr:.6g} to {verdict.situation.td:.6g}" if len(verdicts) > 1 else ""
         yield from _judgement(verdict, which)

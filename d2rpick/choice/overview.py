@@ -13,7 +13,7 @@ from d2rpick.choice.of_run import Reference
 from d2rpick.choice.situation import Settings
 from d2rpick.choice.switched_run import Times, by_the_model, rigid_times
 from d2rpick.choice.warnings import Caution, cautions_of_engine
-from d2rpick.choice.windows import bounds, flights_of
+from d2rpick.choice.windows import flights_of
 from d2rpick.flight.momentum import with_parts_by_number
 from d2rpick.flight.window import FreeFlight
 from d2rpick.histories.balance import balance_of
@@ -209,7 +209,7 @@ def _flights(history: History) -> tuple[tuple[str, FreeFlight], ...]:
     except RangeError:
         return ()
     return tuple(
-        (flight.source, FreeFlight(*bounds(history, flight), flight.parts, flight.end is not None, flight.damping))
+        (flight.source, FreeFlight(*flight.within(history.time), flight.parts, flight.end is not None, flight.damping))
         for flight in found
         if flight.source
     )

@@ -20,10 +20,9 @@ from d2rpick.choice.health import refuse_unsound
 from d2rpick.choice.of_run import Reference, check_units, suggest_of
 from d2rpick.choice.switched_run import Done, Times, done_windows, switched_history
 from d2rpick.choice.warnings import WRONG_ENERGY, Caution, cautions_of_engine
-from d2rpick.choice.windows import bounds, flights_of, last_td
+from d2rpick.choice.windows import flights_of, last_td
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.margin import Margin, margin_before_contact
-from d2rpick.vibration.measures import run_time_share
 from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
@@ -154,8 +153,7 @@ class Plan:
     @property
     def run_time_share(self) -> float | None:
         """Expected run time with the supported windows over that of the reference; None without a cost share [-]."""
-        share, ratio = self.settings.cost_share, self.settings.step_ratio
-        return None if share is None else run_time_share(self.rigid_fraction, share, ratio)
+        return self.settings.run_time_share(self.rigid_fraction)
 
 
 def plan_of(
@@ -224,7 +222,7 @@ def _rows(
     landed: float | None = None  # of the flight before
     for number, seen in enumerate(flights, start=1):
         flight = _given(reference.history, seen, settings.after)
-        start, end = bounds(reference.history, flight)
+        start, end = flight.within(reference.history.time)
         margin = margin_before_contact(reference.history, flight, settings.margin)
         row = Planned(number, flight, start, end, margin, record, "left-out")
         within = [one for one in known if one.flight == seen]
@@ -244,7 +242,7 @@ def _rows(
 
 def _given(history: History, flight: Flight, after: float | None) -> Flight:
     """Let a flight in which the load is said to end begin there, as ``suggest`` does."""
-    start, end = bounds(history, flight)
+    start, end = flight.within(history.time)
     return flight if after is None or not start <= after < end else flight._replace(start=after, source="given")
 
 

@@ -19,6 +19,7 @@ from d2rpick.flight.margin import margin_before_contact
 from d2rpick.histories.digits import sum_as_read
 from d2rpick.histories.samples import window
 from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD, Identification, identify, identify_several, judge_given
+from d2rpick.vibration.measures import run_time_share
 from d2rpick.vibration.model import Evidence, Vibration, describing, doubtful, energy_at, model_at
 from d2rpick.vibration.span import Fits, Span, described_span, span_of
 from d2rpick.vibration.uncertainty import resolved
@@ -71,6 +72,11 @@ class Settings:
     by_deck: ByDeck | None = field(default=None, compare=False, repr=False)
     kept_off: tuple[int, ...] = field(default=(), compare=False, repr=False)
     ruined: tuple[str, ...] = field(default=(), compare=False, repr=False)
+
+    def run_time_share(self, rigid_fraction: float) -> float | None:
+        """Give the expected run time over that of the reference [-]; None where the cost share is not known."""
+        share = self.cost_share
+        return None if share is None else run_time_share(rigid_fraction, share, self.step_ratio)
 
 
 # Of the highest energy a solver errs by so much at any time.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import FormatError, if_written, name_units
-from d2rpick.choice.windows import bounds, flights_of
+from d2rpick.choice.windows import flights_of
 from d2rpick.deck.geometry import masses_and_steps
 from d2rpick.deck.model import DISCRETE, Inventory, PartData
 from d2rpick.deck.pieces import pieces_of
@@ -105,7 +105,7 @@ def facts_of(run: Run, settings: Settings) -> RunFacts:
         still = {part.id: PartFacts(part, masses.get(part.id), has_energy=False) for part in run.parts}
         return RunFacts(still, reason=str(error))
     flights = flights_of(history, settings)
-    spans = tuple(bounds(history, flight) for flight in flights)
+    spans = tuple(flight.within(history.time) for flight in flights)
     longest = max(range(len(spans)), key=lambda at: spans[at][1] - spans[at][0], default=None)
     moment = float(history.time[-1]) if longest is None else sum(spans[longest]) / 2
     known = {

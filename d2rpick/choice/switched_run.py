@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import RangeError, if_written, listing
-from d2rpick.choice.comparison import stretches
-from d2rpick.choice.judged_parts import rigid_parts, with_energy
+from d2rpick.choice.judged_parts import FEWEST, rigid_parts, with_energy
 from d2rpick.choice.warnings import Caution
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.momentum import believed
 from d2rpick.histories.history import Given, History
+from d2rpick.histories.samples import stretches
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -219,12 +219,12 @@ def _absent_times(reference: Reference) -> tuple[_Absent, ...]:
     moves = np.interp(time, balance.time, balance.kinetic) > least
     gone = ((kinetic == 0) & kinetic.any(axis=0)).any(axis=1) & moves
     energies, found = reference.run.part_energies(parts), []
-    for first, last in stretches(gone):
-        start, end = float(time[first]), float(time[last])
+    for states in stretches(gone, FEWEST):
+        start, end = time[states][[0, -1]].tolist()
         rigid = rigid_parts(reference.run, parts, time, start, end)
-        rigid = (kinetic[first : last + 1] == 0).all(axis=0) if rigid is None else rigid
+        rigid = (kinetic[states] == 0).all(axis=0) if rigid is None else rigid
         names = [part.title or f"part {part.id}" for part, one in zip(parts, rigid.tolist(), strict=True) if one]
-        deform = ~rigid & (np.ptp(energies[first : last + 1], axis=0) > least)
+        deform = ~rigid & (np.ptp(energies[states], axis=0) > least)
         found.append(_Absent(start, end, listing(names), not deform.any()))
     return tuple(found)
 

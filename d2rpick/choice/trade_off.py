@@ -15,7 +15,7 @@ from d2rpick.choice.of_run import Reference, check_units, suggest_of
 from d2rpick.choice.ranking import EQUALLY_GOOD, Quality
 from d2rpick.choice.suggest_td import STEPS, as_printed, error_of, looking, offered_times, within_flight
 from d2rpick.choice.warnings import Caution, cautions_of
-from d2rpick.choice.windows import bounds, longest_flight
+from d2rpick.choice.windows import longest_flight
 from d2rpick.histories.digits import as_read
 from d2rpick.vibration.span import Fits
 
@@ -279,7 +279,7 @@ def explored_around(
     if window is None and flight.start is None:
         return None
     try:
-        span = window or bounds(situation.history, flight)
+        span = window or flight.within(situation.history.time)
         return explore_of(reference, situation.settings, span, td=situation.td, steps=steps, since=since)
     except RangeError:  # the window holds no state
         return None

@@ -47,7 +47,7 @@ def longest_flight(
         cure = "give `td`, and the end of the load as `after` where it is known"
         cure = "only what nothing holds can be switched" if held else cure
         raise RangeError(f"{', '.join(history.source)}: {found}; {cure}")
-    windows = [(bounds(history, flight), flight) for flight in flights]
+    windows = [(flight.within(history.time), flight) for flight in flights]
     (start, end), longest = max(windows, key=lambda one: one[0][1] - one[0][0])
     latest = last_td(end, margin_before_contact(history, longest, settings.margin).time)
     return start, latest if longest.source == "energy" and latest > start else end
@@ -69,7 +69,7 @@ def flights_of(history: History, settings: Settings, fits: Fits | None = None) -
     history.check(landing, argument="landing")
     found = _flights_of(history, replace(settings, landing=None), fits)
     last = _last_before(landing, found)
-    if last and landing <= bounds(history, last)[1]:
+    if last and landing <= last.within(history.time)[1]:
         return tuple(landed(one, landing) if one is last else one for one in found)
     before = examine(history, landing, settings, fits).flight
     return tuple(sorted((*found, before))) if before.end == landing and not before.refusal else found
@@ -85,17 +85,11 @@ def _flights_of(history: History, settings: Settings, fits: Fits | None) -> tupl
         return find_flights(history, settings, fits)
     first = float(history.time[0]) if settings.after is None else settings.after
     middle = examine(history, (first + float(history.time[-1])) / 2, settings, fits, quick=True)
-    start, end = bounds(history, middle.flight)
+    start, end = middle.flight.within(history.time)
     if middle.evidence.span and start < end and not middle.flight.refusal:
         # it ends with the oscillator, also where its start is given
         return (middle.flight,)
     return find_flights(history, replace(settings, replay=False))
-
-
-def bounds(history: History, flight: Flight) -> tuple[float, float]:
-    """Give a flight as a window within the record [time]."""
-    first, last = float(history.time[0]), float(history.time[-1])
-    return first if flight.start is None else flight.start, last if flight.end is None else flight.end
 
 
 _PLAIN = Settings()

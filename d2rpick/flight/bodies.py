@@ -130,5 +130,4 @@ def _drift(
     (part,) = parts
     if flight.refusal or part.id not in {one.id for one in flight.parts or ()}:
         return None
-    start, end = (bound if at is None else at for bound, at in zip(history.time[[0, -1]], flight[:2], strict=True))
-    return Drift(np.array([start, end]), np.zeros((2, 3)), np.zeros(2), part, 0.0)
+    return Drift(np.array(flight.within(history.time)), np.zeros((2, 3)), np.zeros(2), part, 0.0)

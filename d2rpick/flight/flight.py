@@ -56,6 +56,11 @@ class Flight(NamedTuple):
     gravity: float = 0.0
     described: bool = False
 
+    def within(self, time: Samples) -> tuple[float, float]:
+        """Give it as a window within a record of these times (n,) [time]."""
+        first, last = float(time[0]), float(time[-1])
+        return first if self.start is None else self.start, last if self.end is None else self.end
+
     @property
     def by_parts(self) -> bool:
         """Whether the momentum of its parts shows it: contacts and loads that the model has elsewhere do not count."""

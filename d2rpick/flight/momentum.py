@@ -14,7 +14,7 @@ import numpy as np
 from d2rpick.base.errors import FormatError
 from d2rpick.flight.free_fall import Laws
 from d2rpick.flight.window import FEWEST, TOLERANCE, FreeFlight, all_windows, unheld
-from d2rpick.histories.samples import bent, window
+from d2rpick.histories.samples import bent, stretches, window
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -361,7 +361,7 @@ def believed(momenta: Momenta, whole: Momenta | None) -> tuple[slice, ...]:
 
     In the others a rigid body has taken some of them: then no quantity of a part is believed.
     """
-    return stretches(complete(momenta, whole))
+    return stretches(complete(momenta, whole), FEWEST)
 
 
 def complete(momenta: Momenta, whole: Momenta | None) -> NDArray[np.bool_]:
@@ -372,9 +372,3 @@ def complete(momenta: Momenta, whole: Momenta | None) -> NDArray[np.bool_]:
     largest = np.maximum.accumulate(np.abs(whole.values[:, 0]).max(axis=1))
     off = np.abs(momenta.of(everything) - whole.values[:, 0]).max(axis=1)
     return np.asarray(off <= _ALL_OF_IT * largest + 2 * momenta.noise(everything))
-
-
-def stretches(states: NDArray[np.bool_]) -> tuple[slice, ...]:
-    """Stretches of some states (n,) that are long enough."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], states.astype(np.int8), [0]]))).reshape(-1, 2)
-    return tuple(slice(first, last) for first, last in edges.tolist() if last - first >= FEWEST)

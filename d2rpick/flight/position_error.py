@@ -298,5 +298,4 @@ def _seen(history: History, flight: Flight, parts: Sequence[Part] | None) -> Fly
     wanted = {momenta.parts[i].id for i in momenta.chosen} if parts is None else {part.id for part in parts}
     flying = [i for i in momenta.moving if momenta.parts[i].id in ids]  # the ground does not fly
     members = [i for i in flying if momenta.parts[i].id in wanted]
-    start, end = (bound if at is None else at for bound, at in zip(momenta.time[[0, -1]], flight[:2], strict=True))
-    return Flying(momenta, masses, members, float(start), float(end), flying)
+    return Flying(momenta, masses, members, *flight.within(momenta.time), flying)

@@ -59,7 +59,8 @@ def steady_rotation(time: Samples, ways: Samples, masses: Samples, least: float 
     stood = float(np.sum(_rest(time, ways, np.zeros(3), weights) ** 2))
     if stood <= least:
         return Rotation(np.zeros(3), stood)
-    rate = _first_guess(time, ways, masses)
+    _, right, normal = (one.sum(axis=0) for one in _linear(time, ways, masses))
+    rate = np.asarray(np.linalg.pinv(normal, rcond=_ALONG_AXIS, hermitian=True) @ right)
     rest = _rest(time, ways, rate, weights)
     small, damping = _SMALL * 2 * np.pi / float(time[-1] - time[0]), 1e-3
     for _ in range(_MOST_STEPS):
@@ -132,11 +133,6 @@ def least_rests(time: Samples, ways: Samples, masses: Samples) -> Samples:
 def _without_each(terms: Samples, masses: Samples) -> Samples:
     """Sum quadratic terms (parts, ...) of ways about the centre over all parts but one, about the centre of these."""
     return np.asarray(terms.sum(axis=0) - (terms.T / (1 - masses / masses.sum())).T)
-
-
-def _first_guess(time: Samples, ways: Samples, masses: Samples) -> Samples:
-    _, right, normal = (one.sum(axis=0) for one in _linear(time, ways, masses))
-    return np.asarray(np.linalg.pinv(normal, rcond=_ALONG_AXIS, hermitian=True) @ right)
 
 
 def _linear(time: Samples, ways: Samples, masses: Samples) -> tuple[Samples, Samples, Samples]:

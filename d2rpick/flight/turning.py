@@ -72,21 +72,6 @@ class Turning(NamedTuple):
         return np.asarray(slid + np.cross(self.angles(tr, td), _at(self.time, self.arm, there)))
 
 
-class Parts(NamedTuple):
-    """All parts that fly: ``where`` each is (n, parts, 3) [length] and its ``mass`` (parts,).
-
-    ``centre`` (parts, 3) and ``spread`` (parts, 3, 3), second moments over the mass [length^2], are by the deck;
-    ``body`` are the indices of the parts that make the frame, ``rigid`` of all that become rigid.
-    """
-
-    where: Samples
-    mass: Samples
-    centre: Samples
-    spread: Samples
-    body: Sequence[int]
-    rigid: Sequence[int]
-
-
 class Flying(NamedTuple):
     """Parts in a flight, from ``start`` to ``end`` [time]: ``momenta`` of single parts and their ``masses`` (parts,).
 
@@ -105,8 +90,8 @@ class Flying(NamedTuple):
 def turning_in_flight(seen: Flying, moving: Sequence[int], placement: Placement) -> Turning | None:
     """Follow the orientation of the body that parts become, from where the deck puts all parts that fly.
 
-    ``moving`` are the places of those that move against the others.  None where a mass or a place is not known, or the
-    record does not begin with the run.
+    ``moving`` are the places of those that move against the others.  None where a mass or a place is not known, the
+    record does not begin with the run, or the parts of the body do not tell its orientation.
     """
     momenta, masses = seen.momenta, seen.masses
     assert momenta.parts is not None
@@ -124,9 +109,24 @@ def turning_in_flight(seen: Flying, moving: Sequence[int], placement: Placement)
     body = _frame_of(seen, moving, placement)
     where = (centre + velocity[0] * time[0] + since)[inside][::stride]
     at = {i: place for place, i in enumerate(every)}
-    spread, rigid = np.stack([one.spread for one in known]), [at[i] for i in seen.members]
-    parts = Parts(where, mass, centre, spread, [at[i] for i in body], rigid)
-    return turning_of(time[inside][::stride], parts, placement.watched_centre(momenta.parts[i].id for i in body))
+    rigid, part = [at[i] for i in seen.members], [at[i] for i in body]
+    where = where - _mean(where, mass)[:, np.newaxis]
+    home = _mean(centre[part], mass[part])
+    shape, middle = centre[part] - home, _mean(where[:, part], mass[part])
+    frames = _orientations(shape, where[:, part] - middle[:, np.newaxis], mass[part])
+    places, middle = where @ frames, np.einsum("ni,nij->nj", middle, frames)
+    if _bent(shape, places[:, part] - middle[:, np.newaxis], mass[part]) > _MOST_BENT:
+        return None
+    own = _inertia(np.einsum("p,pij->ij", mass, np.stack([one.spread for one in known])))
+    inertia, spin = _inertia(_second(places, mass)) + own, _spin(places, mass)
+    moving_inertia = _inertia(_second(places[:, rigid], mass[rigid]))
+    time = time[inside][::stride]
+    solved = _solved(time, frames, (inertia, spin), (moving_inertia, _spin(places[:, rigid], mass[rigid])))
+    place = np.einsum("p,npi->ni", mass[rigid], places[:, rigid] - middle[:, np.newaxis]) / mass.sum()
+    doubt = _doubt(shape, places[:, part] - middle[:, np.newaxis] - shape, mass[part])
+    looked_at = placement.watched_centre(momenta.parts[i].id for i in body)  # by the deck
+    arm = middle + (0.0 if looked_at is None else looked_at - home)
+    return Turning(time, place, arm, moving_inertia, *solved, doubt)
 
 
 def _frame_of(seen: Flying, moving: Sequence[int], placement: Placement) -> Sequence[int]:
@@ -136,39 +136,6 @@ def _frame_of(seen: Flying, moving: Sequence[int], placement: Placement) -> Sequ
     together = placement.hanging_together([parts[i].id for i in still])
     main = [i for i in still if parts[i].id in together]
     return main if seen.masses[main].sum() >= _MOST * seen.masses[list(seen.members)].sum() else still
-
-
-def turning_of(time: Samples, parts: Parts, looked_at: Samples | None) -> Turning | None:
-    """Follow the orientation of a body through a flight.
-
-    Parameters
-    ----------
-    time : array of shape (n,)
-        Of the states in flight [time].
-    parts : Parts
-    looked_at : array of shape (3,) or None
-        Where errors are looked at, by the deck [length]; None: at the centre of mass of the body.
-
-    Returns
-    -------
-    Turning or None
-        None where the parts of the body do not tell its orientation.
-    """
-    body, rigid, mass = list(parts.body), list(parts.rigid), parts.mass
-    where = parts.where - _mean(parts.where, mass)[:, np.newaxis]
-    home = _mean(parts.centre[body], mass[body])
-    shape, middle = parts.centre[body] - home, _mean(where[:, body], mass[body])
-    frames = _orientations(shape, where[:, body] - middle[:, np.newaxis], mass[body])
-    places, middle = where @ frames, np.einsum("ni,nij->nj", middle, frames)
-    if _bent(shape, places[:, body] - middle[:, np.newaxis], mass[body]) > _MOST_BENT:
-        return None
-    own = _inertia(np.einsum("p,pij->ij", mass, parts.spread))
-    inertia, spin = _inertia(_second(places, mass)) + own, _spin(places, mass)
-    moving = _inertia(_second(places[:, rigid], mass[rigid]))
-    solved = _solved(time, frames, (inertia, spin), (moving, _spin(places[:, rigid], mass[rigid])))
-    place = np.einsum("p,npi->ni", mass[rigid], places[:, rigid] - middle[:, np.newaxis]) / mass.sum()
-    doubt = _doubt(shape, places[:, body] - middle[:, np.newaxis] - shape, mass[body])
-    return Turning(time, place, middle + (0.0 if looked_at is None else looked_at - home), moving, *solved, doubt)
 
 
 def _doubt(shape: Samples, bent: Samples, mass: Samples) -> float:

@@ -169,6 +169,18 @@ def find_turns(energy: Samples) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
 _TOGETHER: Final = 8
 
 
+def stretches(states: NDArray[np.bool_], fewest: int = 1) -> tuple[slice, ...]:
+    """Give the stretches of neighbouring ``states`` (n,) that hold, of those with at least so many.
+
+    Examples
+    --------
+    >>> stretches(np.array([True, False, True, True]), 2)
+    (slice(2, 4, None),)
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], states.astype(np.int8), [0]]))).reshape(-1, 2)
+    return tuple(slice(first, last) for first, last in edges.tolist() if last - first >= fewest)
+
+
 def first_above(values: Samples, start: NDArray[np.intp], limit: Samples) -> NDArray[np.intp]:
     """Place of the first of values (n,) from each ``start`` on that is above its ``limit``, of their shape (m,).
 

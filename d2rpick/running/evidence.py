@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.flight.free_fall import FreeFall
-from d2rpick.flight.momentum import believed, complete, laws_of, stretches
+from d2rpick.flight.momentum import believed, complete, laws_of
 from d2rpick.flight.window import FEWEST, TOLERANCE, Constant, farthest
 from d2rpick.histories.history import rows_of
+from d2rpick.histories.samples import stretches
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -255,5 +256,5 @@ def rigid_times(history: History) -> tuple[tuple[float, float, float], ...]:
         )
         for one in history.momenta
         if one.parts is not None
-        for at in stretches(~complete(one, whole))
+        for at in stretches(~complete(one, whole), FEWEST)
     )

@@ -17,7 +17,7 @@ import numpy as np
 from d2rpick.base.errors import listing
 from d2rpick.vibration import measures
 from d2rpick.vibration.fitting import MAX_MISFIT
-from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD, Identification
+from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD, Identification, samples_per_period
 from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.moments import ModalEnergy, Moments, Profile, SampledEnergy
 from d2rpick.vibration.uncertainty import residual_bound
@@ -337,9 +337,7 @@ def _aliased(history: History, fit: Identification) -> tuple[str, ...]:
     if fit.mode is None or fit.misfit is None or fit.misfit > MAX_MISFIT:
         return ()
     time, _ = history.between(fit.start, fit.end)
-    # the interval that a moment lies in, on average: gaps count by their length
-    interval = float(np.sum(np.diff(time) ** 2)) / (fit.end - fit.start)
-    states = np.pi / (fit.mode.fastest * interval)
+    states = samples_per_period(time, fit.mode)
     if states >= MIN_SAMPLES_PER_PERIOD:
         return ()
     return (

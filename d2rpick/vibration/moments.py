@@ -174,26 +174,17 @@ class ModalEnergy(SampledEnergy):
         return found
 
 
+# Crossing of the level, extremum near it, match of the deformations of several parts or modes, start of a flight in
+# which nothing vibrates, or given.
 _KINDS: Final = ("crossing", "extremum", "match", "start", "given")
-
-
-class Moment(NamedTuple):
-    """A time that may serve as tr, before anything is measured; ``rising`` None where the energy turns.
-
-    ``kind``: "crossing" of the level, "extremum" near it, "match" of the deformations of several parts or modes,
-    "start" of a flight in which nothing vibrates, or "given".
-    """
-
-    tr: float
-    kind: str
-    rising: bool | None
 
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """Moments as columns of shape (n,): noise makes tens of thousands, and few of them are looked at one by one.
+    """Times that may serve as tr, before anything is measured, as columns of shape (n,).
 
-    ``tr`` [time]; ``kind``: places in the kinds of a `Moment`; ``rising``: 1, or -1 where it falls, 0 where neither.
+    Noise makes tens of thousands, and few of them are looked at one by one.
+    ``tr`` [time]; ``kind``: places in the names of kinds; ``rising``: 1, or -1 where it falls, 0 where neither.
     """
 
     tr: Samples
@@ -224,10 +215,10 @@ class Moments:
     def __len__(self) -> int:
         return self.tr.size
 
-    def __getitem__(self, place: int) -> Moment:
-        """Make the moment at a place."""
+    def __getitem__(self, place: int) -> tuple[float, str, bool | None]:
+        """Give tr, kind and whether it rises, None where the energy turns, of the moment at a place."""
         rising = int(self.rising[place])
-        return Moment(float(self.tr[place]), _KINDS[self.kind[place]], rising > 0 if rising else None)
+        return float(self.tr[place]), _KINDS[self.kind[place]], rising > 0 if rising else None
 
 
 class Profile(NamedTuple):

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.situation import Settings
-from d2rpick.choice.windows import bounds, flights_of
+from d2rpick.choice.windows import flights_of
 from d2rpick.histories.history import EXACT, History, Momenta, rows_of
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run
@@ -101,7 +101,7 @@ def test_the_highest_energy_is_that_of_a_state_in_the_span() -> None:
 
 def test_flights_begin_and_end_where_info_and_plan_find_them() -> None:
     history = record(BOX)
-    listed = np.array([bounds(history, one) for one in flights_of(history, Settings())])
+    listed = np.array([one.within(history.time) for one in flights_of(history, Settings())])
     for one in quiet_times(history, InnerMotion(history).needed):
         found = one.start, history.time[-1] if one.end is None else one.end
         if found[1] - one.start < 2 * one.wait:

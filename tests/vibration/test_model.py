@@ -7,7 +7,7 @@ from d2rpick.vibration import measures
 from d2rpick.vibration.identify import identify_several
 from d2rpick.vibration.model import Evidence, energy_at
 from d2rpick.vibration.modes import Mode, Modes
-from d2rpick.vibration.moments import Moment, Moments, Profile
+from d2rpick.vibration.moments import Moments, Profile
 from d2rpick.vibration.span import Span
 from tests.records import table
 
@@ -71,10 +71,7 @@ def test_crossings_of_a_level_come_before_the_other_moments() -> None:
     others = Moments.of("extremum", [2.0]), Moments.of("match", ()), Moments.of("given", np.array([0.5]))
     found = Moments.of_level(np.array([1.0, 3.0]), np.array([True, False]), *others)
     each = [found[i] for i in range(len(found))]
-    assert each == [
-        Moment(1.0, "crossing", True), Moment(3.0, "crossing", False), Moment(2.0, "extremum", None),
-        Moment(0.5, "given", None),
-    ]  # fmt: skip
+    assert each == [(1.0, "crossing", True), (3.0, "crossing", False), (2.0, "extremum", None), (0.5, "given", None)]
     assert found.are("extremum").tolist() == [False, False, True, False]
     assert found.at(np.array([3, 0]))[1] == found.at(slice(1))[0] == each[0]
     assert found.at(found.are("given"))[0] == each[3]

@@ -7,8 +7,7 @@ from d2rpick.choice.answers import suggest
 from d2rpick.choice.situation import Settings, examine
 from d2rpick.histories.history import History
 from d2rpick.vibration.measures import kinetic_share, lock_in_error
-from d2rpick.vibration.part_motion import all_zeros, by_own_modes, followed
-from d2rpick.vibration.part_signs import read_parts
+from d2rpick.vibration.part_signs import all_zeros, by_own_modes, followed, read_parts
 from d2rpick.vibration.waves import Waves
 from tests.benchmarks.promise_parts import Motion, history
 from tests.records import known, noisy

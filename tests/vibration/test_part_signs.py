@@ -15,8 +15,7 @@ from d2rpick.cli import d2rpick  # noqa: F401  imported first, it sets the threa
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.vibration.model import SUNK
-from d2rpick.vibration.part_motion import PartMotion
-from d2rpick.vibration.part_signs import MOST_UNSIGNED, SignedParts, read_parts
+from d2rpick.vibration.part_signs import MOST_UNSIGNED, PartMotion, SignedParts, read_parts
 from d2rpick.vibration.waves import Waves
 from tests import chain
 from tests.command import BOX
