@@ -13,6 +13,7 @@ import numpy as np
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.warnings import Caution
 from d2rpick.flight.flight import MOST_WORK
+from d2rpick.flight.internal_energy import largest
 from d2rpick.flight.work import FEWEST_STATES, work_beyond_gravity
 from d2rpick.histories.samples import window as within
 from d2rpick.vibration.modes import LARGEST_ENERGY
@@ -175,10 +176,9 @@ def _peak(balance: Balance) -> float | None:
     """Peak of the internal energy; None where it is unknown or tiny."""
     if balance.internal is None:
         return None
-    terms = (balance.internal, balance.kinetic, balance.total, balance.external_work)
-    largest = max(float(np.abs(term).max()) for term in terms if term is not None)
+    most = largest(balance.internal, balance.kinetic, balance.total, balance.external_work)
     peak = float(balance.internal.max())
-    return peak if peak > max(_FLOOR, _TINY_SHARE * largest) else None
+    return peak if peak > max(_FLOOR, _TINY_SHARE * most) else None
 
 
 def _share(energy: Samples | None, peak: float | None) -> float | None:
@@ -193,8 +193,7 @@ def _without_friction(balance: Balance) -> Samples | None:
 
 
 def _worst_part(balance: Balance) -> dict[str, Any]:
-    largest = max((e for _, _, e in balance.hourglass_of_parts), default=0.0)
-    least = max(_FLOOR, _SMALL_PART * largest)
+    least = max(_FLOOR, _SMALL_PART * max((e for _, _, e in balance.hourglass_of_parts), default=0.0))
     shares = [(h / e, part) for part, h, e in balance.hourglass_of_parts if e > least]
     if not shares:
         return {}
@@ -262,13 +261,13 @@ def refuse_unsound(history: History, *, choosing: bool = False) -> None:
 
 def unsound(history: History) -> Iterator[Caution]:
     """Say why a run cannot be judged, with stable codes."""
-    largest = float(np.abs(history.energy).max(initial=0.0))
-    if largest > LARGEST_ENERGY:
-        yield Caution("energy-too-large", f"energies up to {largest:g}, at most {LARGEST_ENERGY:g} was expected")
+    most = largest(history.energy)
+    if most > LARGEST_ENERGY:
+        yield Caution("energy-too-large", f"energies up to {most:g}, at most {LARGEST_ENERGY:g} was expected")
     elif found := _blew_up(history):
         yield Caution("blew-up", found)
     elif _has_nothing(history):
-        found = f"nothing to judge: no internal energy exceeds {largest:.3g}, so nothing deforms"
+        found = f"nothing to judge: no internal energy exceeds {most:.3g}, so nothing deforms"
         yield Caution("nothing-to-judge", found)
 
 
@@ -299,9 +298,6 @@ def _has_nothing(history: History) -> bool:
     balance = history.balance
     if balance is None:
         return False
-    internal, others = (history.energy, balance.internal), (balance.kinetic, balance.external_work, balance.total)
-    highest, beside = (
-        max((float(np.abs(term).max(initial=0.0)) for term in terms if term is not None), default=0.0)
-        for terms in (internal, others)
-    )
+    highest = largest(history.energy, balance.internal)
+    beside = largest(balance.kinetic, balance.external_work, balance.total)
     return highest == 0 or max(highest, beside) <= _NOTHING

@@ -162,12 +162,14 @@ def _widened(values: Samples, share: float) -> tuple[float, float]:
 
 def round_off(history: History) -> float:
     """Energy below which an internal energy is round-off beside the energies of the run [energy]."""
-    return history.known.once("round-off", lambda: _ROUND_OFF * _largest(history, history.balance))
-
-
-def _largest(history: History, balance: Balance | None) -> float:
+    balance = history.balance
     terms = (balance.internal, balance.kinetic, balance.external_work, balance.total) if balance else ()
-    return max(float(np.abs(term).max(initial=0.0)) for term in (history.energy, *terms) if term is not None)
+    return history.known.once("round-off", lambda: _ROUND_OFF * largest(history.energy, *terms))
+
+
+def largest(*terms: Samples | None) -> float:
+    """Largest size of some energies, of which some may be missing or empty; 0 without any [energy]."""
+    return max((float(np.abs(term).max(initial=0.0)) for term in terms if term is not None), default=0.0)
 
 
 # The band of the last quarter of a flight, widened on both sides by this share of its width, holds all before it.
