@@ -114,9 +114,10 @@ def test_what_a_solver_says_when_it_fails_is_told_and_the_run_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("D2RPICK_FAKE", "fail")
-    said = refused(*asked(tmp_path))
-    assert "strip_0002.out: the solver failed" in said
-    assert "NEGATIVE VOLUME IN ELEMENT 7" in said
+    failed = run(*asked(tmp_path))
+    assert failed.exit_code == 2
+    assert "strip_0002.out: the solver failed" in failed.stderr
+    assert "NEGATIVE VOLUME IN ELEMENT 7" in failed.stderr
     monkeypatch.delenv("D2RPICK_FAKE")
     check(json.loads(run(*asked(tmp_path, "--resume", "-q")).stdout), tmp_path)
 
