@@ -150,21 +150,26 @@ class _Parser:
         self.depth = 0
 
     def whole(self) -> Number:
-        value = self.value()
+        value = self.nested()
         if self.tokens[0]:
             raise self.unexpected()
         return value
 
-    def value(self, least: int = 1) -> Number:
+    def nested(self, least: int = 1) -> Number:
         self.depth += 1
         if self.depth > _DEEPEST:
             raise ExpressionError(f"an expression is nested deeper than {_DEEPEST} levels")
+        value = self.value(least)
+        self.depth -= 1
+        return value
+
+    def value(self, least: int) -> Number:
         value = self.signed()
         while (operation := _OPERATIONS.get(self.tokens[0])) and operation[0] >= least:
-            sign = self.tokens.pop(0)
+            tight, operate = operation
             # those of one kind are taken from the left, powers from the right
-            value = _checked(operation[1](value, self.value(operation[0] + (sign != "**"))))
-        self.depth -= 1
+            behind = self.nested(tight) if self.tokens.pop(0) == "**" else self.value(tight + 1)
+            value = _checked(operate(value, behind))
         return value
 
     def signed(self) -> Number:
@@ -177,7 +182,7 @@ class _Parser:
     def atom(self) -> Number:
         token = self.tokens.pop(0)
         if token == "(":
-            value = self.value()
+            value = self.nested()
             self.expect(")")
             return value
         if token[:1].isdigit() or token[:1] == ".":
@@ -197,10 +202,10 @@ class _Parser:
             raise ExpressionError(f"{name!r} is not a function of *PARAMETER_EXPRESSION")
         arity, function = _FUNCTIONS[name]
         self.expect("(")
-        arguments = [self.value()]
+        arguments = [self.nested()]
         while self.tokens[0] == ",":
             self.tokens.pop(0)
-            arguments.append(self.value())
+            arguments.append(self.nested())
         self.expect(")")
         if len(arguments) != arity:
             raise ExpressionError(f"{name}() takes {arity} values, found {len(arguments)}")
