@@ -209,10 +209,10 @@ def _clean(states: int) -> Path:
 
 
 def _two_parts(states: int) -> Path:
-    """Energies of two springs that vibrate in the two modes of their chain, with white noise."""
+    """Energies of two parts, each of which vibrates in a mode of its own: in several, noise hides the signs."""
     time = np.linspace(0.0, 1.0, states)
-    slow, fast = (np.exp(-0.8 * time) * np.sin(2 * np.pi * cycles * time) for cycles in (8.0, 13.7))
-    energies = np.stack([(slow + 0.5 * fast) ** 2, (0.7 * slow - 0.6 * fast) ** 2])
+    swing = [size * np.sin(2 * np.pi * cycles * time) for size, cycles in ((1.0, 8.0), (0.7, 13.7))]
+    energies = np.exp(-1.6 * time) * np.square(swing)
     energies += _NOISE * energies.max() * np.random.default_rng(14).standard_normal(energies.shape)
     return _written(f"parts{states}.csv", time, *energies, names=("IE_left", "IE_right"))
 
