@@ -14,7 +14,7 @@ import numpy as np
 
 from d2rpick.base.errors import RangeError
 from d2rpick.flight.flight import Flight, Seen, find_flight, seen_flight
-from d2rpick.flight.internal_energy import round_off
+from d2rpick.flight.internal_energy import largest, round_off
 from d2rpick.flight.margin import margin_before_contact
 from d2rpick.histories.digits import sum_as_read
 from d2rpick.histories.samples import window
@@ -118,7 +118,7 @@ def _faint(history: History, start: float) -> float:
     """
     after = history.between(start, float(history.time[-1]))[1]
     fall = float((np.maximum.accumulate(after) - after).max(initial=0.0))
-    highest = history.known.once("highest", lambda: float(np.abs(history.energy).max()))
+    highest = history.known.once("highest", lambda: largest(history.energy))
     quantum = history.energy_precision.quantum(float(np.abs(after).max(initial=0.0)))
     return max(_SOLVER_ERROR * highest, _QUANTA * quantum, _FAINT * fall)
 

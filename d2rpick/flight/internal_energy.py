@@ -105,8 +105,11 @@ def end_of_load(history: History, td: float) -> float | None:
     level = float(values.max() + _BAND_RESERVE * np.ptp(values))
     time, energy = history.between(-np.inf, td)
     above = energy > level
-    falls = np.flatnonzero(above[:-1] & ~above[1:])[-1:]
-    return float(find_crossings(time[falls[0] :][:2], energy[falls[0] :][:2], level)[0][0]) if falls.size else None
+    falls = np.flatnonzero(above[:-1] & ~above[1:])
+    if not falls.size:
+        return None
+    last = slice(falls[-1], falls[-1] + 2)
+    return float(find_crossings(time[last], energy[last], level)[0][0])
 
 
 def _last_excursion(history: History, start: float, td: float) -> float:

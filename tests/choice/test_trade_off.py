@@ -1,6 +1,7 @@
 """Every td of a trade-off is answered as ``suggest`` answers it, and what is marked as unbeaten is."""
 
 from itertools import pairwise
+from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
@@ -91,6 +92,23 @@ def histories(draw: st.DrawFn) -> History:
     noise = np.random.default_rng(draw(st.integers(0, 99))).standard_normal(states)
     share = draw(st.sampled_from([0.0, 0.003, 0.1]))
     return History(time, energy + share * noise, ("made",), "made", "E")
+
+
+@pytest.mark.parametrize("seed", [9, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 6, 10))])
+def test_no_td_beats_the_one_that_is_chosen_by_the_level_alone(seed: int, tmp_path: Path) -> None:
+    """Of forty modes, for whose td an oscillator is not sought everywhere."""
+    rng, time = np.random.default_rng(seed), np.linspace(0, 1, 900)
+    energy = sum(
+        rng.uniform(0.3, 1) * np.sin(2 * np.pi * cycles * time + rng.uniform(0, 3)) ** 2
+        for cycles in rng.uniform(6, 30, 40)
+    )
+    energy = energy * np.exp(-0.8 * time) + 60 * np.exp(-(((time - 0.06) / 0.01) ** 2))
+    file = tmp_path / "modes.csv"
+    np.savetxt(file, np.column_stack([time, energy]), delimiter=",", header="time,internal_energy", comments="")
+    found = explore_of(read([str(file)]), Settings(), None, steps=40)
+    assert found.recommended is not None
+    assert (found.recommended.basis, found.suggestion.situation.flight.source) == ("energy", "energy")
+    assert found.recommended.unbeaten
 
 
 def test_equal_pairs_do_not_beat_each_other_by_rounding() -> None:
