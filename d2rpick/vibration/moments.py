@@ -66,21 +66,22 @@ class SampledEnergy:
 
         ``passed``: when modes pass the level, where that is known [time].
         """
-        time, energy = self._sampled_before()
+        time, energy = self._sampled_before(since)
         times, rising = find_crossings(time, energy, energy[-1])
         asked = (since <= times) & (times < self.td)
         return times[asked], rising[asked]
 
     def turns_near(self, tolerance: float, since: float) -> Samples:
         """Times before td, none before ``since``, where the energy turns within the tolerance of the level (k,)."""
-        time, energy = self._sampled_before()
+        time, energy = self._sampled_before(since)
         turns = find_turns(energy)[0]
         near = time[turns[measures.level_error(energy[turns], energy[-1]) <= tolerance]]
         return near[near >= since]
 
-    def _sampled_before(self) -> tuple[Samples, Samples]:
-        """Times and energies of the samples before td, and td itself with its level at the end."""
-        before = self.history.time < self.td
+    def _sampled_before(self, since: float) -> tuple[Samples, Samples]:
+        """Times and energies of the last sample before ``since``, those up to td, and td itself with its level."""
+        first, last = np.searchsorted(self.history.time, (since, self.td))
+        before = slice(max(int(first) - 1, 0), int(last))
         time, energy = self.history.time[before], self.history.energy[before]
         return np.append(time, self.td), np.append(energy, self.energy(self.td))
 
