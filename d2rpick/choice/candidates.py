@@ -5,7 +5,7 @@ They are judged as columns; a `Candidate` is made only where one is looked at.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, overload
@@ -15,6 +15,7 @@ import numpy as np
 from d2rpick.choice.expectation import Objection, objections
 from d2rpick.histories.digits import not_before
 from d2rpick.vibration import measures
+from d2rpick.vibration.measures import Measured
 from d2rpick.vibration.model import measured_of, moments_of
 from d2rpick.vibration.moments import Moments
 
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation
     from d2rpick.flight.bodies import Off
     from d2rpick.histories.history import Samples
-    from d2rpick.vibration.measures import Measured
     from d2rpick.vibration.part_signs import PartMatch
 
 
@@ -94,14 +94,14 @@ class Candidates(Sequence[Candidate]):
 
     All columns are of shape (n,), in the order of time: ``energy`` [energy]; ``level_error`` [-], NaN where an energy
     is not positive; ``same_swing``; ``position_error`` [length], NaN where unknown; ``moments`` and ``known``, as the
-    vibration gave them, None where nothing was measured.
+    vibration gave them.
     ``order`` has the places in these of the candidates in their order, that of the ranks where it is ``ranked``;
     ``recommended`` is the place in it of the one that is.
     """
 
     situation: Situation
     moments: Moments
-    known: NDArray[np.object_]
+    known: Measured
     energy: Samples
     level_error: Samples
     same_swing: NDArray[np.bool_]
@@ -112,25 +112,25 @@ class Candidates(Sequence[Candidate]):
     recommended: int | None = None
 
     @classmethod
-    def of(cls, situation: Situation, moments: Moments, known: Sequence[Measured | None]) -> Candidates:
+    def of(cls, situation: Situation, moments: Moments, known: Measured) -> Candidates:
         """Hold each tr, of which is ``known`` what was measured, against flight, sign and tolerance.
 
-        Where nothing vibrates, nothing was.
+        Where nothing vibrates, no measure counts.
         """
         vibration, still = situation.vibration, situation.at_rest
-        tr, measured = moments.tr, np.fromiter((None if still else one for one in known), object, len(known))
+        tr, known = moments.tr, Measured.spread(np.zeros(len(moments), dtype=bool)) if still else known
         energy = vibration.whole.energies(tr)
         # beside nothing that vibrates the ratio of two rests of round-off is no error
         level_error = np.zeros(tr.shape) if still else measures.level_error(energy, situation.energy_td)
         return cls(
             situation=situation,
             moments=moments,
-            known=measured,
+            known=known,
             energy=energy,
             level_error=level_error,
             same_swing=(situation.turns_since(tr) < 2) & (not still),
             position_error=situation.position_errors(tr),
-            objections=tuple(objections(situation, tr, measured, energy, level_error)),
+            objections=tuple(objections(situation, tr, known, energy, level_error)),
             order=np.arange(tr.size),
         )
 
@@ -151,18 +151,13 @@ class Candidates(Sequence[Candidate]):
         if settings.max_kinetic_share is not None:
             found = found & (share is not None and share <= settings.max_kinetic_share)
         if settings.max_residual is not None:
-            found = found & (self.residual <= settings.max_residual)  # not where unknown, NaN
+            found = found & (self.known.residual <= settings.max_residual)  # not where unknown, NaN
         return found
-
-    @cached_property
-    def residual(self) -> Samples:
-        """Residuals, NaN where unknown [-]."""
-        return measures.column_of(self.known, "residual")
 
     @property
     def error(self) -> Samples:
         """What the order goes by, as ``Candidate.error`` [-]."""
-        error = np.where(np.isnan(self.residual), self.level_error, self.residual)
+        error = np.where(np.isnan(self.known.residual), self.level_error, self.known.residual)
         return np.where(np.isnan(error), np.inf, error)
 
     @cached_property
@@ -199,7 +194,7 @@ class Candidates(Sequence[Candidate]):
 
     def _candidate(self, rank: int, reach: float) -> Candidate:
         i = int(self.order[rank])
-        situation, known, (tr, kind, rising) = self.situation, self.known[i], self.moments[i]
+        situation, known, (tr, kind, rising) = self.situation, self.known.of(i), self.moments[i]
         history, td = situation.history, situation.td
         energy, level, same_swing, off = (
             column[i].item() for column in (self.energy, self.level_error, self.same_swing, self.position_error)
@@ -226,7 +221,7 @@ class Candidates(Sequence[Candidate]):
             run_time_share=situation.settings.run_time_share(rigid_fraction),
             same_swing=same_swing,
             parts=parts,
-            **(known._asdict() if known else {}),
+            **known,
             **_position(worst),
         )
 
@@ -299,19 +294,19 @@ def _distinct(situation: Situation, found: Moments) -> Moments:
     return found.at(np.argsort(found.tr, kind="stable"))
 
 
-def _remarks(situation: Situation, reach: float, known: Measured | None, parts: Sequence[PartMatch]) -> Iterator[str]:
+def _remarks(situation: Situation, reach: float, known: Mapping[str, Any], parts: Sequence[PartMatch]) -> Iterator[str]:
     """What to know of this tr beside its acceptance."""
-    if known is None and not (situation.vibration.unknown or situation.at_rest):
+    if not (known or situation.vibration.unknown or situation.at_rest):
         yield f"sign, lock-in error and residual unknown: {situation.vibration.undescribed}"
-    if known and known.lock_in_error > measures.TOLERATED_GROWTH and parts:
+    if known and known["lock_in_error"] > measures.TOLERATED_GROWTH and parts:
         from d2rpick.vibration.part_signs import main_contributors  # not above: a table has no parts
 
         yield f"mismatch of {main_contributors(parts)}"
-    if known and known.residual_high > known.residual + MUCH_HIGHER:
-        yield f"residual up to {known.residual_high:.2g} if the record hides a further mode"
-    if known and reach > known.timing_tolerance:
-        yield f"tr is known only to ±{reach:.2g}, its timing tolerance is {known.timing_tolerance:.2g}"
-    if known is None and reach >= situation.history.step:
+    if known and known["residual_high"] > known["residual"] + MUCH_HIGHER:
+        yield f"residual up to {known['residual_high']:.2g} if the record hides a further mode"
+    if known and reach > known["timing_tolerance"]:
+        yield f"tr is known only to ±{reach:.2g}, its timing tolerance is {known['timing_tolerance']:.2g}"
+    if not known and reach >= situation.history.step:
         yield "the level lies within the sampling error of an extremum"
 
 

@@ -9,7 +9,6 @@ import numpy as np
 from d2rpick.choice.warnings import end_of_flight, end_of_load
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.digits import above, first_as_read
-from d2rpick.vibration.measures import column_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -18,6 +17,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import Samples
+    from d2rpick.vibration.measures import Measured
 
 
 # Many modes never rest all at once, so the energy at rest is less than the lowest in flight.  This share of it gives
@@ -174,7 +174,7 @@ class Objection(NamedTuple):
 
 
 def objections(
-    situation: Situation, tr: Samples, known: NDArray[np.object_], energy: Samples, level_error: Samples
+    situation: Situation, tr: Samples, known: Measured, energy: Samples, level_error: Samples
 ) -> Iterator[Objection]:
     """Give every reason against some of the candidates.
 
@@ -183,8 +183,8 @@ def objections(
     situation : Situation
     tr : array of shape (n,)
         [time]
-    known : array of shape (n,)
-        `Measured` of each, None where it cannot be compared with td.
+    known : Measured
+        Of shape (n,).
     energy : array of shape (n,)
         [energy]
     level_error : array of shape (n,)
@@ -199,12 +199,12 @@ def objections(
     yield from (Objection(everywhere, reason) for reason in against_td(situation))
     if situation.at_rest:
         return
-    compared = known.astype(bool)
+    compared = known.compared
     described = compared | bool(vibration.unknown)
-    same_sign = column_of(known, "sign_match") != 0
+    same_sign = known.sign_match != 0
     yield Objection(~described, vibration.undescribed)
     yield Objection(~same_sign, "opposite sign of the deformation")
-    error, judged = np.where(compared, column_of(known, "lock_in_error"), level_error), described & same_sign
+    error, judged = np.where(compared, known.lock_in_error, level_error), described & same_sign
     yield Objection(judged & np.isnan(error), "the energy is not positive here, so there is nothing to compare")
     tolerance = situation.settings.tolerance
     yield Objection(judged & (error > tolerance), f"error {{}} above the tolerance {tolerance:g}", error, tolerance)

@@ -8,7 +8,6 @@ from q(tr) - q(td) and -q'(td).  All measures compare that difference with the v
 
 from __future__ import annotations
 
-from itertools import repeat
 from math import sqrt
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
@@ -17,7 +16,7 @@ import numpy as np
 from d2rpick.histories.samples import narrow
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from numpy.typing import NDArray
 
@@ -42,35 +41,50 @@ class Deformation(Protocol):
 
 
 class Measured(NamedTuple):
-    """Measures that only known deformations give; ``residual_high``: at worst, with what a fit may have missed."""
+    """Measures of n times as tr that only known deformations give, in columns of shape (n,), NaN where unknown.
 
-    sign_match: bool
-    lock_in_error: float
-    residual: float
-    residual_high: float
-    timing_tolerance: float
-    part_mismatch: float | None
+    ``sign_match``: 1 or 0; ``residual_high``: at worst, with what a fit may have missed.
+    """
+
+    sign_match: Samples
+    lock_in_error: Samples
+    residual: Samples
+    residual_high: Samples
+    timing_tolerance: Samples
+    part_mismatch: Samples
+
+    @classmethod
+    def spread(cls, compared: NDArray[np.bool_], columns: Samples | float = np.nan) -> Measured:
+        """Put ``columns`` of shape (6, k) at the k times that were ``compared`` of all, shape (n,)."""
+        table = np.full((len(cls._fields), compared.size), np.nan)
+        table[:, compared] = columns
+        return cls(*table)
+
+    @property
+    def compared(self) -> NDArray[np.bool_]:
+        """Of which times the deformation can be compared with that at td."""
+        return ~np.isnan(self.sign_match)
+
+    def of(self, place: int) -> dict[str, Any]:
+        """Measures of the time at a place by name, None where there is none; empty where it was not compared."""
+        row = {name: float(column[place]) for name, column in zip(self._fields, self, strict=True)}
+        if np.isnan(row["sign_match"]):
+            return {}
+        mismatch = row["part_mismatch"]
+        return {**row, "sign_match": row["sign_match"] > 0, "part_mismatch": None if np.isnan(mismatch) else mismatch}
 
 
 def measured(
     vibration: Deformation, tr: Samples, td: Samples | float, tolerance: Samples, bound: Bound, *, of_parts: bool
-) -> Iterator[Measured]:
-    """Give all measures of each tr of shape (n,), with its timing ``tolerance``, for one ``td`` or each for its own.
+) -> Samples:
+    """Give the columns of `Measured`, shape (6, n), of each tr (n,), for one ``td`` or each for its own.
 
     ``of_parts``: the deformations are those of parts, whose energy at td the mismatch is held against.
     """
     lock_in = lock_in_error(vibration, tr, td)
     error = residual(lock_in, kinetic_share(vibration, td))
-    columns = (sign_match(vibration, tr, td), lock_in, error, bound(error, tr, td), tolerance)
-    mismatch = part_mismatch(vibration, tr, td).tolist() if of_parts else repeat(None, tr.size)
-    return map(Measured, *(column.tolist() for column in columns), mismatch)
-
-
-def column_of(known: NDArray[np.object_], name: str) -> Samples:
-    """Give one of the measures of each, shape (n,); NaN where there are none."""
-    column, measured = np.full(known.shape, np.nan), known.astype(bool)
-    column[measured] = [getattr(one, name) for one in known[measured]]
-    return column
+    mismatch = part_mismatch(vibration, tr, td) if of_parts else np.full(tr.shape, np.nan)
+    return np.stack([sign_match(vibration, tr, td), lock_in, error, bound(error, tr, td), tolerance, mismatch])
 
 
 # The growth of the lock-in error that ``timing_tolerance`` allows.

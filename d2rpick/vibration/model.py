@@ -18,17 +18,18 @@ from d2rpick.base.errors import listing
 from d2rpick.vibration import measures
 from d2rpick.vibration.fitting import MAX_MISFIT
 from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD, Identification, samples_per_period
+from d2rpick.vibration.measures import Measured
 from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.moments import ModalEnergy, Moments, Profile, SampledEnergy
 from d2rpick.vibration.uncertainty import residual_bound
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Sequence
 
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import History, Samples
-    from d2rpick.vibration.measures import Bound, Deformation, Measured
+    from d2rpick.vibration.measures import Bound, Deformation
     from d2rpick.vibration.part_signs import PartMatch, SignedParts, Unsigned
     from d2rpick.vibration.span import Span
     from d2rpick.vibration.swings import Swings
@@ -122,8 +123,8 @@ class Vibration:
         crossings = self.whole.crossings(since, passed)
         return Moments.of_level(*crossings, Moments.of("extremum", turns), Moments.of("match", matches))
 
-    def measured(self, times: Samples) -> Sequence[Measured | None]:
-        """Measures of each time as tr, None where its deformation cannot be compared with that at td."""
+    def measured(self, times: Samples) -> Measured:
+        """Measures of each time as tr, as far as its deformation can be compared with that at td."""
         return measured_of([self], [times])[0]
 
     def errors(self, times: Samples) -> Samples:
@@ -162,8 +163,8 @@ class Vibration:
             return np.zeros(times.shape, dtype=bool)
         return (times >= self.compared.first) & (times <= self.compared.last)
 
-    def measures_of(self, tr: Samples, td: Samples | float) -> Iterator[Measured]:
-        """Measures of comparable times (n,) for one ``td``; of a single mode also for a td each."""
+    def measures_of(self, tr: Samples, td: Samples | float) -> Samples:
+        """Columns of measures, (6, n), of comparable times (n,) for one ``td``; of a single mode also for a td each."""
         assert self.compared
         deformation = self.compared.deformation
         if isinstance(deformation, Mode):
@@ -195,17 +196,18 @@ def moments_of(vibrations: Sequence[Vibration], tolerance: float, since: Sequenc
     return [one.moments(tolerance, since[i], passed.get(i)) for i, one in enumerate(vibrations)]
 
 
-def measured_of(vibrations: Sequence[Vibration], times: Sequence[Samples]) -> list[Sequence[Measured | None]]:
-    """Give the measures of the times of each vibration, None where its deformation is not comparable to that at td."""
-    known: dict[int, list[Measured | None]] = {}
+def measured_of(vibrations: Sequence[Vibration], times: Sequence[Samples]) -> list[Measured]:
+    """Give the measures of the times of each vibration, as far as its deformation is comparable to that at td."""
+    known: dict[int, Measured] = {}
     for places in _alike(vibrations):
         inside = [vibrations[i].comparable(times[i]) for i in places]
         tr = np.concatenate([times[i][here] for i, here in zip(places, inside, strict=True)])
         seen_from = [vibrations[i].td for i in places]
-        td = np.repeat(seen_from, [np.count_nonzero(here) for here in inside]) if len(places) > 1 else seen_from[0]
-        found = vibrations[places[0]].measures_of(tr, td) if tr.size else iter(())
-        for place, here in zip(places, inside, strict=True):
-            known[place] = [next(found) if one else None for one in here.tolist()]
+        counts = [np.count_nonzero(here) for here in inside]
+        td = np.repeat(seen_from, counts) if len(places) > 1 else seen_from[0]
+        found = vibrations[places[0]].measures_of(tr, td) if tr.size else np.zeros((len(Measured._fields), 0))
+        own = np.split(found, np.cumsum(counts)[:-1], axis=1)
+        known |= zip(places, map(Measured.spread, inside, own), strict=True)
     return [known[i] for i in range(len(vibrations))]
 
 
