@@ -10,9 +10,8 @@ from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
-from d2rpick.choice.of_run import read
 from d2rpick.choice.plan import plan_of
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.question import Settings, read
 from d2rpick.histories.opening import Selection
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import RigidWindow, simulate

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from d2rpick.base.errors import FormatError
 from d2rpick.base.files import at_rest
-from d2rpick.choice.of_run import read
+from d2rpick.choice.question import read
 from d2rpick.histories.content import OnDisk, Portions
 from d2rpick.histories.database import Legs
 from d2rpick.histories.history import History

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from d2rpick.api import arguments
 from d2rpick.api.request import Request
 from d2rpick.base.errors import ArgumentError, FormatError, listing, name_units
-from d2rpick.choice.of_run import Reference
+from d2rpick.choice.question import Reference
 from d2rpick.choice.warnings import Caution
 from d2rpick.histories.names import Selection
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from d2rpick.api.arguments import Choosing, Parts
     from d2rpick.api.runs import Run
     from d2rpick.choice.cost import CostModel, Weights
-    from d2rpick.choice.situation import Settings
+    from d2rpick.choice.question import Settings
     from d2rpick.histories import run as histories
 
 

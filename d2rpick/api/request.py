@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
 
     from d2rpick.choice.cost import Weights
-    from d2rpick.choice.situation import Settings
+    from d2rpick.choice.question import Settings
     from d2rpick.histories.names import Selection
     from d2rpick.vibration.oscillator import Oscillator
 
@@ -196,7 +196,7 @@ class Request:
     @property
     def settings(self) -> Settings:
         """How to choose and judge."""
-        from d2rpick.choice.situation import Settings
+        from d2rpick.choice.question import Settings
 
         mode, oscillator = None, self.oscillator
         if oscillator is not None and self.v0 is not None:

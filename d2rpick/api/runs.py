@@ -296,7 +296,7 @@ def extracted(run: histories.Run, selection: Selection) -> tuple[dict[str, Sampl
     ``time`` and ``internal_energy``, with several parts ``part_<id>`` for each, then quantities of the whole model and
     the momentum by which the flight is seen, each of shape (n,).
     """
-    from d2rpick.choice.of_run import Reference
+    from d2rpick.choice.question import Reference
 
     history = Reference.of(run, selection).history
     table = {"time": history.time, "internal_energy": history.energy}

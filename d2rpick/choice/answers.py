@@ -10,7 +10,7 @@ from d2rpick.base.errors import RangeError
 from d2rpick.choice.candidates import Candidate, Candidates, find_candidates, judge
 from d2rpick.choice.expectation import Expectation, against_td, expectation, most_energy
 from d2rpick.choice.ranking import EQUALLY_GOOD, Quality, over_limits, quality_of, rank
-from d2rpick.choice.situation import Settings, Situation, examine
+from d2rpick.choice.situation import Situation, examine
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution, cautions_of, out_of_place
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.digits import as_read
@@ -18,6 +18,7 @@ from d2rpick.histories.digits import as_read
 if TYPE_CHECKING:
     from d2rpick.choice.comparison import Comparison
     from d2rpick.choice.health import Health
+    from d2rpick.choice.question import Settings
     from d2rpick.histories.history import History
 
 

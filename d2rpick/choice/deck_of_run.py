@@ -23,8 +23,7 @@ from d2rpick.histories.surroundings import Support, Surroundings
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Sequence
 
-    from d2rpick.choice.of_run import Reference
-    from d2rpick.choice.situation import Settings
+    from d2rpick.choice.question import Reference, Settings
     from d2rpick.deck.model import Gravity, Hold, Inventory
     from d2rpick.histories.names import Part
     from d2rpick.histories.run import Run

@@ -15,8 +15,8 @@ from d2rpick.choice.warnings import Caution
 from d2rpick.flight.flight import MOST_WORK
 from d2rpick.flight.internal_energy import largest
 from d2rpick.flight.work import FEWEST_STATES, work_beyond_gravity
+from d2rpick.histories.history import LARGEST_ENERGY
 from d2rpick.histories.samples import window as within
-from d2rpick.vibration.modes import LARGEST_ENERGY
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

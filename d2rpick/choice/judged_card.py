@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.base.errors import D2RPickError
-from d2rpick.choice.of_run import Reference, judge_of
+from d2rpick.choice.of_run import judge_of
 from d2rpick.deck.printed_card import PrintedCard, Printing, Times
 from d2rpick.deck.printing import SOLVERS, cards, solver_of
 
@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from d2rpick.choice.answers import Verdict
-    from d2rpick.choice.situation import Settings, Situation
+    from d2rpick.choice.question import Reference, Settings
+    from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import History
 
 

@@ -6,55 +6,25 @@ The command line, ``study``, ``check --history``, ``card`` and Python go this on
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from d2rpick.choice.answers import Suggestion, Verdict, suggest_at, verify, verify_at
 from d2rpick.choice.health import OF_THE_MODEL, assess, cautions_of_health, refuse_unsound
-from d2rpick.choice.situation import Settings, Situation, examine
+from d2rpick.choice.question import check_units
+from d2rpick.choice.situation import Situation, examine
 from d2rpick.choice.warnings import cautions_of_engine
 from d2rpick.histories.balance import balance_of
-from d2rpick.histories.opening import Selection, open_run
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from d2rpick.choice.question import Reference, Settings
     from d2rpick.histories.history import History, Track
     from d2rpick.histories.names import Part
     from d2rpick.histories.run import Run
     from d2rpick.vibration.span import Fits
 
-_DEFAULT = Selection()
-
-
-class Reference(NamedTuple):
-    """A run without switching, and the energy in it that a choice is about."""
-
-    run: Run
-    history: History
-
-    @classmethod
-    def of(cls, run: Run, selection: Selection = _DEFAULT) -> Reference:
-        """Read what is selected of a run that is open; FormatError when it is not there."""
-        if selection.parts:
-            from d2rpick.flight.momentum import with_parts_by_number  # not above: a table has no parts
-
-            selection = with_parts_by_number(run, selection)
-        return cls(run, run.history(selection))
-
-    def like(self, run: Run, selection: Selection = _DEFAULT) -> Reference:
-        """Read of another run of the model the parts that this one has, whatever words they were asked for by."""
-        ids = tuple(str(part.id) for part in self.history.parts or ())
-        springs = tuple(str(part.id) for part in self.history.springs)
-        run = run.within(self.run.surroundings)
-        return Reference.of(run, selection._replace(parts=ids, springs=springs) if ids else selection)
-
-
 _Answer = TypeVar("_Answer", Suggestion, Verdict)
-
-
-def read(names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto") -> Reference:
-    """Open the files of a run and read what is selected; arguments and errors as of `open_run`."""
-    return Reference.of(open_run(names, selection, input_format), selection)
 
 
 def suggest_of(
@@ -161,13 +131,6 @@ def _check(
         history.check_unit(*td, argument="td_window")
     elif td is not None:
         history.check_unit(td, argument="td")
-
-
-def check_units(history: History, settings: Settings) -> None:
-    """RangeError where a time that was given looks to be in another unit than the history."""
-    for name in ("after", "landing"):
-        if (time := getattr(settings, name)) is not None:
-            history.check_unit(time, argument=name)
 
 
 def _with_health(answer: _Answer, run: Run) -> _Answer:

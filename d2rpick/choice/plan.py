@@ -16,11 +16,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.choice.flights import flights_of, last_td
 from d2rpick.choice.health import refuse_unsound
-from d2rpick.choice.of_run import Reference, check_units, suggest_of
+from d2rpick.choice.of_run import suggest_of
+from d2rpick.choice.question import Reference, check_units
 from d2rpick.choice.switched_run import Done, Times, done_windows, switched_history
 from d2rpick.choice.warnings import WRONG_ENERGY, Caution, cautions_of_engine
-from d2rpick.choice.windows import flights_of, last_td
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.margin import Margin, margin_before_contact
 from d2rpick.vibration.span import Fits
@@ -30,8 +31,8 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.answers import Suggestion
     from d2rpick.choice.candidates import Candidate
+    from d2rpick.choice.question import Settings
     from d2rpick.choice.ranking import Quality
-    from d2rpick.choice.situation import Settings
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History
 

@@ -21,7 +21,8 @@ from d2rpick.choice.deck_of_run import (
     left_rigid_in,
     of_another_model,
 )
-from d2rpick.choice.of_run import Reference, suggest_of, verify_of
+from d2rpick.choice.of_run import suggest_of, verify_of
+from d2rpick.choice.question import Reference
 from d2rpick.choice.switchable_parts import PartRow, RunFacts, facts_of, rows_of, step_growth
 from d2rpick.choice.warnings import Caution, out_of_place
 from d2rpick.deck.geometry import Placement
@@ -33,7 +34,8 @@ from d2rpick.vibration.measures import run_time_share
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.choice.situation import Settings, Situation
+    from d2rpick.choice.question import Settings
+    from d2rpick.choice.situation import Situation
     from d2rpick.choice.switched_run import Times
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.run import Run

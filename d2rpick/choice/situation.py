@@ -1,4 +1,4 @@
-"""What is asked, and what the record tells about a td before any tr is looked at.
+"""What the record tells about a td before any tr is looked at.
 
 That is the flight, the vibration, the level, and whether anything vibrates.
 """
@@ -13,13 +13,12 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.errors import RangeError
-from d2rpick.flight.flight import Flight, Seen, find_flight, seen_flight
+from d2rpick.flight.flight import Flight, Seen, find_flight, landed, seen_flight
 from d2rpick.flight.internal_energy import largest, round_off
 from d2rpick.flight.margin import margin_before_contact
 from d2rpick.histories.digits import sum_as_read
 from d2rpick.histories.samples import window
 from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD, Identification, identify, identify_several, judge_given
-from d2rpick.vibration.measures import run_time_share
 from d2rpick.vibration.model import Evidence, Vibration, describing, doubtful, energy_at, model_at
 from d2rpick.vibration.span import Fits, Span, described_span, span_of
 from d2rpick.vibration.uncertainty import resolved
@@ -27,56 +26,10 @@ from d2rpick.vibration.uncertainty import resolved
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from d2rpick.choice.cost import ByDeck
-    from d2rpick.deck.geometry import Placement
-    from d2rpick.flight.bodies import Bodies, RigidBody
+    from d2rpick.choice.question import Settings
+    from d2rpick.flight.bodies import Bodies
     from d2rpick.histories.history import History, Samples
-    from d2rpick.vibration.modes import Mode
     from d2rpick.vibration.swings import Swings
-
-
-@dataclass(frozen=True)
-class Settings:
-    """What the analyst asks for; times in the unit of the history.
-
-    ``after``: the load ends here, ``landing``: the next contact comes here (None: found from the record).  ``margin``:
-    kept clear after the load and before the next contact (None: nothing, but where td is chosen or the landing given
-    what `d2rpick.flight.margin` derives before the contact).
-    ``tolerance``: on the lock-in error, on the level error where no oscillator is known.
-    ``max_kinetic_share``, ``max_residual``: limits that a recommendation must keep, or None.  ``oscillator``:
-    given instead of identified.  ``fit_window``: the oscillator is identified there.  ``replay`` False: judge by
-    the energy level alone.  ``strict``: accept no tr of a flight that is not certain.
-    ``cost_share``, ``step_ratio``: of the switched parts in the cost of a step, and of the step while rigid to that
-    while deformable; without the first nothing is said of the run time.
-    ``bodies``: what the parts become while they are rigid, by a deck; None without one, empty where it does not tell.
-    Then one body is assumed.
-    ``placement``: where the deck puts the parts, or None without one.
-    ``by_deck``: the files that these, and a cost share that is not given, come from; None where no deck tells anything.
-    ``kept_off``: main nodes of rigid bodies that the run of a Radioss deck keeps off.  ``ruined``: what ruins that run.
-    """
-
-    after: float | None = None
-    landing: float | None = None
-    margin: float | None = None
-    tolerance: float = 0.2
-    max_kinetic_share: float | None = None
-    max_residual: float | None = None
-    oscillator: Mode | None = None
-    fit_window: tuple[float, float] | None = None
-    replay: bool = True
-    strict: bool = False
-    cost_share: float | None = None
-    step_ratio: float = 1.0
-    bodies: tuple[RigidBody, ...] | None = None
-    placement: Placement | None = field(default=None, compare=False, repr=False)
-    by_deck: ByDeck | None = field(default=None, compare=False, repr=False)
-    kept_off: tuple[int, ...] = field(default=(), compare=False, repr=False)
-    ruined: tuple[str, ...] = field(default=(), compare=False, repr=False)
-
-    def run_time_share(self, rigid_fraction: float) -> float | None:
-        """Give the expected run time over that of the reference [-]; None where the cost share is not known."""
-        share = self.cost_share
-        return None if share is None else run_time_share(rigid_fraction, share, self.step_ratio)
 
 
 # Of the highest energy a solver errs by so much at any time.
@@ -272,14 +225,6 @@ def examine(
             within = Span(settled, flight.end or float(history.time[-1]))
             evidence = evidence._replace(swings=_swings(history, within, fits))
     return Situation(history, td, settings, flight, evidence, fits)
-
-
-def landed(flight: Flight, landing: float | None) -> Flight:
-    """Let a flight end at the ``landing`` that is given [time], unless more than the energy shows an earlier one."""
-    if landing is None or flight.start is None or landing <= flight.start:
-        return flight
-    known = flight.end is not None and flight.end < landing and flight.source not in ("energy", "given")
-    return flight if known else flight._replace(end=landing)
 
 
 def _between_supports(history: History, flight: Flight, td: float) -> Flight:

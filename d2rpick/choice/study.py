@@ -13,7 +13,8 @@ import numpy as np
 
 from d2rpick.base import __version__
 from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, D2RPickError, RangeError, listing, one_line
-from d2rpick.choice.of_run import read, suggest_of
+from d2rpick.choice.of_run import suggest_of
+from d2rpick.choice.question import read
 from d2rpick.choice.ranking import EQUALLY_GOOD
 from d2rpick.choice.warnings import Caution
 from d2rpick.choice.windows import (
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.choice.answers import Suggestion
-    from d2rpick.choice.situation import Settings
+    from d2rpick.choice.question import Settings
     from d2rpick.histories.history import Samples
 
 # A run has one of these; the first two were judged.

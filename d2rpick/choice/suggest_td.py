@@ -12,9 +12,9 @@ import numpy as np
 from d2rpick.choice.answers import ROUNDING, Pair, Suggestion, suggest_at
 from d2rpick.choice.candidates import Candidate, candidates_of
 from d2rpick.choice.expectation import mean_in_flight, shortfall
+from d2rpick.choice.flights import longest_flight
 from d2rpick.choice.ranking import LIKE_LEVELS, like_quality, rank
-from d2rpick.choice.situation import Settings, Situation, examine
-from d2rpick.choice.windows import longest_flight
+from d2rpick.choice.situation import Situation, examine
 from d2rpick.flight.flight import SOURCES
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.margin import margin_before_contact
@@ -25,6 +25,7 @@ from d2rpick.vibration.span import Fits
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
+    from d2rpick.choice.question import Settings
     from d2rpick.histories.history import History, Samples
 
     Look = Callable[[float], Situation]

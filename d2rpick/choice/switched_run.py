@@ -18,7 +18,7 @@ from d2rpick.histories.samples import stretches
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.choice.of_run import Reference
+    from d2rpick.choice.question import Reference
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.names import Part
 

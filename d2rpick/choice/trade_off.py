@@ -10,12 +10,13 @@ import numpy as np
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.answers import AcceptableWindow, Suggestion, suggest_at
 from d2rpick.choice.candidates import Candidate, Candidates, candidates_of
+from d2rpick.choice.flights import longest_flight
 from d2rpick.choice.health import refuse_unsound
-from d2rpick.choice.of_run import Reference, check_units, suggest_of
+from d2rpick.choice.of_run import suggest_of
+from d2rpick.choice.question import Reference, check_units
 from d2rpick.choice.ranking import EQUALLY_GOOD, Quality
 from d2rpick.choice.suggest_td import STEPS, as_printed, error_of, looking, offered_times, within_flight
 from d2rpick.choice.warnings import Caution, cautions_of
-from d2rpick.choice.windows import longest_flight
 from d2rpick.histories.digits import as_read
 from d2rpick.vibration.span import Fits
 
@@ -24,7 +25,8 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.expectation import Expectation
     from d2rpick.choice.plan import Plan
-    from d2rpick.choice.situation import Settings, Situation
+    from d2rpick.choice.question import Settings
+    from d2rpick.choice.situation import Situation
 
 
 class Offer(NamedTuple):

@@ -2,142 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import sqrt
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.errors import RangeError
 from d2rpick.choice.candidates import Candidate, Candidates, judge
 from d2rpick.choice.expectation import most_energy
-from d2rpick.choice.situation import Settings, Situation, examine, landed
-from d2rpick.flight.flight import Flight, all_seen, witnesses
-from d2rpick.flight.margin import margin_before_contact
-from d2rpick.flight.window import moments
-from d2rpick.histories.digits import not_after, sum_as_read
 from d2rpick.histories.samples import find_crossings, narrow, union
 from d2rpick.vibration.measures import TOLERATED_GROWTH
-from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from d2rpick.histories.history import History, Samples
-
-
-def longest_flight(
-    history: History, settings: Settings, fits: Fits | None = None, *, otherwise: tuple[float, float] | None = None
-) -> tuple[float, float]:
-    """Give the longest flight as a window for td within the record [time].
-
-    The energy alone may show no end of the flight to the td in it: then the margin is kept from the one that was found.
-    ``otherwise`` is given where nothing shows a flight; without it that is a RangeError.
-    """
-    flights = flights_of(history, settings, fits)
-    if settings.landing is not None and (last := _last_before(settings.landing, flights)):
-        flights = (last,)
-    if not flights and otherwise:
-        return otherwise
-    if not flights:
-        held = history.surroundings.held(history.parts, float(history.time[-1]))
-        found = held or "nothing in the record shows a flight, in which td could be chosen"
-        cure = "give `td`, and the end of the load as `after` where it is known"
-        cure = "only what nothing holds can be switched" if held else cure
-        raise RangeError(f"{', '.join(history.source)}: {found}; {cure}")
-    windows = [(flight.within(history.time), flight) for flight in flights]
-    (start, end), longest = max(windows, key=lambda one: one[0][1] - one[0][0])
-    latest = last_td(end, margin_before_contact(history, longest, settings.margin).time)
-    return start, latest if longest.source == "energy" and latest > start else end
-
-
-def last_td(end: float, margin: float) -> float:
-    """Give the last td, as it is read, that keeps a margin from the end of a flight [time]."""
-    return not_after(sum_as_read(end, -margin)) if margin else end
-
-
-def flights_of(history: History, settings: Settings, fits: Fits | None = None) -> tuple[Flight, ...]:
-    """Find all flights, that of the landing that is given up to there.
-
-    Where the energy is all there is, one oscillator for the whole record, else none is sought.
-    """
-    landing = settings.landing
-    if landing is None:
-        return _flights_of(history, settings, fits)
-    history.check(landing, argument="landing")
-    found = _flights_of(history, replace(settings, landing=None), fits)
-    last = _last_before(landing, found)
-    if last and landing <= last.within(history.time)[1]:
-        return tuple(landed(one, landing) if one is last else one for one in found)
-    before = examine(history, landing, settings, fits).flight
-    return tuple(sorted((*found, before))) if before.end == landing and not before.refusal else found
-
-
-def _last_before(landing: float, flights: Iterable[Flight]) -> Flight | None:
-    """Give the last flight that begins before a landing [time]."""
-    return max((one for one in flights if (one.start or 0.0) < landing), key=lambda one: one.start or 0.0, default=None)
-
-
-def _flights_of(history: History, settings: Settings, fits: Fits | None) -> tuple[Flight, ...]:
-    if any(True for _ in witnesses(history)) or not settings.replay:
-        return find_flights(history, settings, fits)
-    first = float(history.time[0]) if settings.after is None else settings.after
-    middle = examine(history, (first + float(history.time[-1])) / 2, settings, fits, quick=True)
-    start, end = middle.flight.within(history.time)
-    if middle.evidence.span and start < end and not middle.flight.refusal:
-        # it ends with the oscillator, also where its start is given
-        return (middle.flight,)
-    return find_flights(history, replace(settings, replay=False))
-
-
-_PLAIN = Settings()
-
-
-def find_flights(history: History, settings: Settings = _PLAIN, fits: Fits | None = None) -> tuple[Flight, ...]:
-    """Find every flight of a record, ascending in time.
-
-    Parameters
-    ----------
-    history : History
-        With its evidence, as a run gives it.
-    settings : Settings, optional
-        How an oscillator is looked for where no better evidence shows a flight.
-    fits : Fits, optional
-        Those of an earlier look at the record; none of its windows is fitted twice.
-
-    Returns
-    -------
-    tuple of Flight
-        ``end`` is None where the record ends in flight.  A flight shorter than a twentieth of the record is not seen.
-
-    Raises
-    ------
-    RangeError
-        If the record has fewer than 3 states.
-    """
-    seen = all_seen(history)
-    if seen:
-        return tuple(
-            Flight(one.start, one.end if one.end_seen else None, source, one.parts, one.damping, gravity=one.gravity)
-            for source, one in seen
-        )
-    found: list[Flight] = []
-    fits = Fits() if fits is None else fits
-    for td in sorted(moments(history.time), reverse=True):  # the last quiet time before td tells most of the flight
-        if found and found[-1].start is not None and td > found[-1].start:
-            continue
-        situation = examine(history, td, settings, fits, quick=True)
-        flight = situation.flight
-        if situation.in_flight and not flight.refusal and not (found and _overlap(flight, found[-1])):
-            found.append(flight)
-    return tuple(reversed(found))
-
-
-def _overlap(earlier: Flight, later: Flight) -> bool:
-    """Say whether a flight lasts into a later one: it misses the load before that one, so its end is not known."""
-    return earlier.end is None or later.start is None or earlier.end > later.start
+    from d2rpick.choice.situation import Situation
+    from d2rpick.histories.history import Samples
 
 
 # Halvings of the sampling interval at an end of a window: to a millionth of it.

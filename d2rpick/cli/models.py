@@ -261,7 +261,7 @@ def _scan(box: Box, output: Output) -> None:
 
     begin(box.jobs or cores(), "d2rpick.models.box_run")
     from d2rpick.choice.answers import suggest
-    from d2rpick.choice.situation import Settings
+    from d2rpick.choice.question import Settings
     from d2rpick.models.box_run import comparison_end, history_of, scan, scan_times, simulate
     from d2rpick.report.rollover import Scan
 

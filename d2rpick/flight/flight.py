@@ -136,6 +136,14 @@ class Seen(NamedTuple):
     held: bool = False
 
 
+def landed(flight: Flight, landing: float | None) -> Flight:
+    """Let a flight end at the ``landing`` that is given [time], unless more than the energy shows an earlier one."""
+    if landing is None or flight.start is None or landing <= flight.start:
+        return flight
+    known = flight.end is not None and flight.end < landing and flight.source not in ("energy", "given")
+    return flight if known else flight._replace(end=landing)
+
+
 def find_flight(history: History, td: float, after: float | None, seen: Seen, span: Span | None) -> Flight:
     """Choose the best answer to when the load is over: given, seen, by the oscillator, by the energy.
 

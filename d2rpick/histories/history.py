@@ -26,6 +26,8 @@ Samples: TypeAlias = "NDArray[np.float64]"
 _Found = TypeVar("_Found")
 Record = TypeVar("Record", bound="History | Balance | Momenta")
 
+# Beyond, squares of energies are no numbers any more; no unit system comes near.
+LARGEST_ENERGY: Final = 1e150
 # Parts slower than this share of the fastest stand still: single precision leaves them a speed.
 _STILL: Final = 1e-6
 

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from d2rpick.choice.cost import Weights
     from d2rpick.choice.health import Health
     from d2rpick.choice.judged_card import SolverInput
-    from d2rpick.choice.situation import Settings, Situation
+    from d2rpick.choice.question import Settings
+    from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run
     from d2rpick.report.keys import Read

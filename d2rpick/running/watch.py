@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import FormatError, HistoryError, RangeError
 from d2rpick.choice.deck_of_run import in_deck
-from d2rpick.choice.of_run import Reference
+from d2rpick.choice.question import Reference
 from d2rpick.flight.window import FEWEST
 from d2rpick.histories.listings import WITH_AN_ERROR, ending
 from d2rpick.histories.opening import open_run

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# Beyond, squares of energies are no numbers any more; no unit system comes near.
-LARGEST_ENERGY = 1e150
 # Samples that are worked on at a time, so that what is made of them stays in the processor's cache.
 BLOCK: Final = 8192
 # Halving alone would need no more to reach rounding.

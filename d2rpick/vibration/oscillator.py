@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 import numpy as np
 
 from d2rpick.base.errors import RangeError
-from d2rpick.vibration.modes import LARGEST_ENERGY, Mode
+from d2rpick.histories.history import LARGEST_ENERGY
+from d2rpick.vibration.modes import Mode
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

@@ -11,7 +11,7 @@ import pytest
 from d2rpick.api.studies import Ledger, fingerprint, line
 from d2rpick.base.errors import FormatError
 from d2rpick.choice import study
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.question import Settings
 from d2rpick.choice.study import Question, StudyRow, ask
 from d2rpick.histories.opening import Selection
 from tests import variants

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from d2rpick.choice.answers import suggest
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.question import Settings
 from d2rpick.histories.history import History
 from d2rpick.vibration.identify import identify
 from d2rpick.vibration.modes import Modes

@@ -20,7 +20,7 @@ from time import perf_counter
 import numpy as np
 
 from d2rpick.choice.answers import suggest
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.question import Settings
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import RigidWindow, history_of, simulate
 from tests.rehearsals import SETS, Rehearsal, rehearse

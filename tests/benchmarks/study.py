@@ -29,8 +29,8 @@ MOST, MOST_GROWN = 1.25, 25.0
 LOOP = f"""
 import sys
 from d2rpick.choice.answers import suggest
-from d2rpick.choice.of_run import read
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.question import read
+from d2rpick.choice.question import Settings
 found = [suggest(read([name]).history, {TD}, Settings()).recommended for name in sys.argv[1:]]
 assert all(found)
 """

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from d2rpick.choice.answers import Pair, suggest, suggest_at, verify, verify_at
-from d2rpick.choice.of_run import read
-from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.question import Settings, read
+from d2rpick.choice.situation import examine
 from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.histories.history import History
 from tests import paper

@@ -5,8 +5,8 @@ import pytest
 
 from d2rpick.choice.answers import suggest
 from d2rpick.choice.candidates import candidates_of, find_candidates
+from d2rpick.choice.question import Settings
 from d2rpick.choice.ranking import rank
-from d2rpick.choice.situation import Settings
 from d2rpick.choice.suggest_td import looking
 from d2rpick.vibration import measures
 from tests import paper

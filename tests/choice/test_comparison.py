@@ -15,8 +15,8 @@ from d2rpick.base.errors import RangeError
 from d2rpick.choice.answers import Verdict
 from d2rpick.choice.comparison import MOST_MOMENTUM_ERROR, Comparison, compare_runs
 from d2rpick.choice.judged_parts import rigid_parts
-from d2rpick.choice.of_run import Reference, compare_with, read, verify_of
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.of_run import compare_with, verify_of
+from d2rpick.choice.question import Reference, Settings, read
 from d2rpick.choice.switched_run import switched_history
 from d2rpick.histories.history import History, Samples, Track
 from d2rpick.histories.opening import Selection, open_run

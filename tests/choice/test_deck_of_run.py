@@ -12,9 +12,10 @@ import d2rpick as d2
 from d2rpick.base.errors import D2RPickError
 from d2rpick.choice.answers import suggest
 from d2rpick.choice.deck_of_run import doubts_of_solver
-from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.flights import find_flights
+from d2rpick.choice.question import Settings
+from d2rpick.choice.situation import examine
 from d2rpick.choice.warnings import Caution
-from d2rpick.choice.windows import find_flights
 from d2rpick.deck import read_inventory
 from d2rpick.flight.momentum import flight_around
 from d2rpick.histories.history import EXACT, Given, History, Momenta

@@ -7,7 +7,7 @@ import pytest
 
 from d2rpick.choice.answers import verify
 from d2rpick.choice.judged_card import CardRequest, judged_card
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.question import Settings
 from d2rpick.deck.printed_card import Printing
 from tests.command import ENERGY, GLSTAT
 from tests.energies import sure

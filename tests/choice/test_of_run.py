@@ -3,8 +3,8 @@
 from functools import partial
 
 from d2rpick.choice.judged_card import CardRequest, judged_card
-from d2rpick.choice.of_run import Reference, judge_of, read, suggest_of, verify_of
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.of_run import judge_of, suggest_of, verify_of
+from d2rpick.choice.question import Reference, Settings, read
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
 from d2rpick.rules.judgement import faults_of

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.answers import Verdict, suggest, verify, verify_at
-from d2rpick.choice.of_run import Reference, read
 from d2rpick.choice.plan import plan_of
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.question import Reference, Settings, read
 from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.choice.windows import acceptable_windows
 from d2rpick.flight.flight import all_seen, seen_flight

@@ -5,7 +5,7 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.question import Settings
 from tests.benchmarks.promise import BAD
 from tests.benchmarks.promise_parts import CLASSES, Motion, Record, history, records, stated
 from tests.energies import sure

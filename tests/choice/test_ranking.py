@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from d2rpick.choice.answers import suggest, verify
 from d2rpick.choice.candidates import find_candidates
-from d2rpick.choice.of_run import read
+from d2rpick.choice.question import Settings, read
 from d2rpick.choice.ranking import (
     EQUALLY_GOOD,
     GRADES,
@@ -21,7 +21,7 @@ from d2rpick.choice.ranking import (
     rank,
     states_per_period,
 )
-from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.situation import examine
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
 from d2rpick.report.formats import Shown

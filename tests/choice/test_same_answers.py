@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.answers import Suggestion, suggest
-from d2rpick.choice.of_run import read, suggest_of
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.of_run import suggest_of
+from d2rpick.choice.question import Settings, read
 from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Selection

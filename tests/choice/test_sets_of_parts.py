@@ -10,8 +10,8 @@ import pytest
 import d2rpick as d2
 from d2rpick.base.errors import FormatError
 from d2rpick.choice.cost import CostModel, Weights
+from d2rpick.choice.question import Settings
 from d2rpick.choice.sets_of_parts import Parts, parts_of, recommended_parts
-from d2rpick.choice.situation import Settings
 from d2rpick.choice.switchable_parts import InFlight, PartFacts, PartRow, facts_of, landing_alone, rows_of, step_growth
 from d2rpick.deck import read_inventory
 from d2rpick.histories.opening import open_run

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.answers import suggest, suggest_at
-from d2rpick.choice.of_run import read
-from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.question import Settings, read
+from d2rpick.choice.situation import examine
 from d2rpick.flight.bodies import RigidBody
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from d2rpick.choice.answers import verify
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.question import Settings
 from d2rpick.choice.study import (
     NONE,
     OK,

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from d2rpick.choice.of_run import read
+from d2rpick.choice.question import read
 from d2rpick.choice.switched_run import switched_history
 from d2rpick.histories.formats import glstat, matsum
 from d2rpick.histories.history import Samples

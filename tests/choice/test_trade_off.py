@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 
 from d2rpick.choice.answers import suggest, suggest_at
 from d2rpick.choice.candidates import find_candidates
-from d2rpick.choice.of_run import Reference, read, suggest_of
+from d2rpick.choice.of_run import suggest_of
+from d2rpick.choice.question import Reference, Settings, read
 from d2rpick.choice.ranking import rank
-from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.situation import examine
 from d2rpick.choice.trade_off import Offer, TradeOff, explore_of
 from d2rpick.histories.digits import as_read
 from d2rpick.histories.history import History

@@ -9,8 +9,9 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from d2rpick.choice.answers import Suggestion, suggest, verify, verify_at
-from d2rpick.choice.of_run import read
-from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.flights import find_flights
+from d2rpick.choice.question import Settings, read
+from d2rpick.choice.situation import examine
 from d2rpick.choice.windows import (
     acceptable_windows,
     alike_windows,
@@ -19,7 +20,6 @@ from d2rpick.choice.windows import (
     coverage,
     error_at,
     error_profile,
-    find_flights,
 )
 from d2rpick.flight.flight import Flight
 from d2rpick.flight.margin import SHARE, landing_spread, margin_before_contact

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.question import Settings
+from d2rpick.choice.situation import examine
 from d2rpick.choice.warnings import cautions_of
 from d2rpick.histories.history import EXACT, Given, History, Momenta
 from d2rpick.histories.names import Part

@@ -9,7 +9,7 @@ import pytest
 import d2rpick as d2
 from d2rpick.api.asked import model_of, selected
 from d2rpick.api.request import Request
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.question import Settings
 from d2rpick.histories.names import Selection
 from d2rpick.report.formats import Shown
 from tests.command import answer, put, run, unwrapped

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.lines import Line2D
 
 from d2rpick.choice.answers import suggest
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.question import Settings
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import Outcome, RigidWindow, history_of, simulate
 from d2rpick.report import figures_models

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.choice.of_run import read
+from d2rpick.choice.question import read
 from d2rpick.flight.bodies import Bodies, RigidBody, bodies_in_flight
 from d2rpick.flight.flight import Flight, find_flight, seen_flight
 from d2rpick.flight.position_error import MOST_OF_PATH, Drift

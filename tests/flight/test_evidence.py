@@ -10,8 +10,9 @@ import pandas as pd
 import pytest
 
 from d2rpick.choice.answers import suggest, verify_at
-from d2rpick.choice.situation import Settings, examine
-from d2rpick.choice.windows import find_flights
+from d2rpick.choice.flights import find_flights
+from d2rpick.choice.question import Settings
+from d2rpick.choice.situation import examine
 from d2rpick.flight.flight import seen_flight
 from d2rpick.flight.internal_energy import quiet_time
 from d2rpick.histories.digits import window_as_read

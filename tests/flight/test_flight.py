@@ -9,7 +9,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from d2rpick.choice.answers import suggest
-from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.question import Settings
+from d2rpick.choice.situation import examine
 from d2rpick.flight.flight import Flight
 from d2rpick.flight.internal_energy import end_of_load
 from d2rpick.histories.history import History

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.answers import suggest
-from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.flights import find_flights
+from d2rpick.choice.question import Settings
+from d2rpick.choice.situation import examine
 from d2rpick.choice.warnings import cautions_of
-from d2rpick.choice.windows import find_flights
 from d2rpick.flight.flight import Flight
 from d2rpick.flight.internal_energy import moves_as_a_whole, settled_from
 from d2rpick.flight.momentum import bodies_apart, flight_around

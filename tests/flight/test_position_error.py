@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from d2rpick.choice.of_run import Reference, read
+from d2rpick.choice.question import Reference, read
 from d2rpick.flight.flight import find_flight, seen_flight
 from d2rpick.flight.position_error import Drift, drift_in_flight, drift_of
 from d2rpick.flight.turning import Flying

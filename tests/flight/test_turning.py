@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from d2rpick.choice.of_run import read
+from d2rpick.choice.question import read
 from d2rpick.deck import read_inventory
 from d2rpick.deck.geometry import Placed, Placement
 from d2rpick.flight.flight import find_flight, seen_flight

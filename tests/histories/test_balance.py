@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.answers import suggest
-from d2rpick.choice.of_run import read
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.question import Settings, read
 from d2rpick.histories.balance import spring_energy, springs_among
 from d2rpick.histories.history import Samples
 from d2rpick.histories.names import Part

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from d2rpick.choice.answers import suggest
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.question import Settings
 from d2rpick.models.box_run import history_of
 from tests.faults import some
 from tests.rehearsals import SETS, rehearse

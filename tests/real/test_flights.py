@@ -7,9 +7,9 @@ import pytest
 
 from d2rpick.base.errors import D2RPickError
 from d2rpick.choice.answers import suggest, verify
-from d2rpick.choice.of_run import Reference, suggest_of
-from d2rpick.choice.situation import Settings
-from d2rpick.choice.windows import find_flights
+from d2rpick.choice.flights import find_flights
+from d2rpick.choice.of_run import suggest_of
+from d2rpick.choice.question import Reference, Settings
 from d2rpick.histories.opening import Selection, open_run
 from tests.real.files import real
 from tests.real.test_files import MORE, PAIRS, READABLE, REFUSED

@@ -9,7 +9,7 @@ from matplotlib.patches import Rectangle
 
 import d2rpick as d2
 from d2rpick.choice.answers import suggest
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.question import Settings
 from d2rpick.choice.study import Common, Study, StudyRow
 from d2rpick.histories.history import History
 from d2rpick.report.figures_choice import draw_study, draw_suggestion, draw_trade_off

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.question import Settings
+from d2rpick.choice.situation import examine
 from d2rpick.flight.flight import Flight
 from d2rpick.histories.history import History
 from d2rpick.report.view import replayed_motion, view

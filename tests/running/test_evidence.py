@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.situation import Settings
-from d2rpick.choice.windows import flights_of
+from d2rpick.choice.flights import flights_of
+from d2rpick.choice.question import Settings
 from d2rpick.histories.history import EXACT, History, Momenta, rows_of
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run

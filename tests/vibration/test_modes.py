@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from scipy.optimize import approx_fprime
 
 from d2rpick.choice.answers import suggest
-from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.question import Settings
+from d2rpick.choice.situation import examine
 from d2rpick.histories.history import Samples
 from d2rpick.vibration.identify import identify, identify_several
 from d2rpick.vibration.measures import kinetic_share, lock_in_error, residual

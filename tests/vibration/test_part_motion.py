@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.answers import suggest
-from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.question import Settings
+from d2rpick.choice.situation import examine
 from d2rpick.histories.history import History
 from d2rpick.vibration.measures import kinetic_share, lock_in_error
 from d2rpick.vibration.part_signs import all_zeros, by_own_modes, followed, read_parts

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from d2rpick.choice.answers import suggest
 from d2rpick.choice.candidates import judge
-from d2rpick.choice.situation import Settings, Situation, examine
+from d2rpick.choice.question import Settings
+from d2rpick.choice.situation import Situation, examine
 from d2rpick.cli import d2rpick  # noqa: F401  imported first, it sets the threads
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection, open_run

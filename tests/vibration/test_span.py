@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from d2rpick.choice.situation import Settings, examine
+from d2rpick.choice.question import Settings
+from d2rpick.choice.situation import examine
 from d2rpick.histories.history import History
 from d2rpick.vibration.identify import identify, identify_several, judge_given
 from d2rpick.vibration.modes import Mode

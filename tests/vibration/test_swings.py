@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from d2rpick.choice.answers import suggest
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.question import Settings
 from d2rpick.histories.history import Samples
 from d2rpick.vibration.swings import count_swings
 from tests.records import known, table

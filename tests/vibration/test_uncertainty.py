@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from d2rpick.choice.answers import suggest
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.question import Settings
 from d2rpick.histories.history import Precision
 from d2rpick.histories.samples import find_crossings
 from d2rpick.vibration.identify import identify

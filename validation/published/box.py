@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.choice.answers import suggest
-from d2rpick.choice.situation import Settings
+from d2rpick.choice.question import Settings
 from d2rpick.choice.study import common_tr, row_of
 from d2rpick.models.box_run import BOX, RigidWindow, compare, history_of, simulate
 from validation.published.exhibits import Curve, Exhibit, Panel, Shape
