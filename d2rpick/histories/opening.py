@@ -54,21 +54,21 @@ class Reader(Protocol):
 
 
 class Listed(NamedTuple):
-    """Module of a reader, and what its files have in their head: one of these."""
+    """Module of a reader, and what its files have in their head: a regular expression that is found there."""
 
     module: str
-    hints: tuple[bytes, ...]
+    hint: bytes
 
 
 # In the order they are asked, and in which they are preferred as sources of one quantity: binary before text, since it
 # holds more digits; csv takes any text, so it comes last.
 READERS: Final[Mapping[str, Listed]] = {
-    "binout": Listed("binout", (b"\0",)),
-    "radioss-th": Listed("radioss_th", (b"\0", b"ZZZZZEOR")),
-    "glstat": Listed("glstat", (b" time.", b"ls-dyna")),
-    "matsum": Listed("matsum", (b" time =", b"{BEGIN LEGEND}")),
-    "hdf5": Listed("hdf5_file", (b"\x89HDF",)),
-    "csv": Listed("csv_table", (b"",)),
+    "binout": Listed("binout", rb"\A[\x08-\x40].{5}\0"),
+    "radioss-th": Listed("radioss_th", rb"\A\0\0\0T|ZZZZZEOR"),
+    "glstat": Listed("glstat", rb" time\.|ls-dyna"),
+    "matsum": Listed("matsum", rb" time =|{BEGIN LEGEND}"),
+    "hdf5": Listed("hdf5_file", rb"\x89HDF"),
+    "csv": Listed("csv_table", b""),
 }
 
 
@@ -146,7 +146,7 @@ def _format(source: Source) -> str:
         if re.match(begins, head, re.DOTALL):
             raise FormatError(f"{source.name}: this is {what}, an energy history was expected; {way_out}")
     for kind, listed in READERS.items():
-        if any(hint in head for hint in listed.hints) and reader(kind).recognises(head):
+        if re.search(listed.hint, head, re.DOTALL) and reader(kind).recognises(head):
             return kind
     if re.search(r"(^|[/\\])d3(plot|part|dump|thdt)[^/\\]*$", source.name):
         what = "this is a file of LS-DYNA's d3 family, which holds no energies that are read"
