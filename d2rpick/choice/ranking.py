@@ -37,7 +37,7 @@ def rank(candidates: Candidates) -> Candidates:
     others; then the rest by their error.
     """
     acceptable = candidates.acceptable
-    group = np.where(acceptable, np.where(candidates.same_swing, 1, 0), 2)
+    group = np.where(acceptable, candidates.same_swing, np.int8(2))
     rigid, room = candidates.situation.td - candidates.tr, like_quality(candidates.situation)
     places = order(group, candidates.error, rigid, candidates.out_of_place, room)
     kept = np.flatnonzero(candidates.kept[places]).tolist()
@@ -50,7 +50,7 @@ def like_quality(situation: Situation) -> float:
 
 
 def order(
-    group: NDArray[np.intp], error: Samples, rigid: Samples, off: NDArray[np.bool_], room: float = EQUALLY_GOOD
+    group: NDArray[np.int8], error: Samples, rigid: Samples, off: NDArray[np.bool_], room: float = EQUALLY_GOOD
 ) -> NDArray[np.intp]:
     """Give the places in the order of the groups, in each the errors within ``room`` of the smallest first.
 
@@ -62,7 +62,7 @@ def order(
     return np.lexsort((-rigid, np.where(good, -rigid, error), near & off, good & ~near, ~good, group))
 
 
-def _extreme(which: np.ufunc, group: NDArray[np.intp], values: Samples) -> Samples:
+def _extreme(which: np.ufunc, group: NDArray[np.int8], values: Samples) -> Samples:
     """Least or greatest of the values in each group."""
     found = np.full(int(group.max(initial=0)) + 1, np.inf if which is np.minimum else -np.inf)
     which.at(found, group, values)

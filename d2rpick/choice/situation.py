@@ -153,7 +153,7 @@ class Situation:
 
     def position_errors(self, times: Samples) -> Samples:
         """How far a body is out of place at td when it is frozen at each of ``times`` [length]; NaN where unknown."""
-        return np.full(times.shape, np.nan) if self.bodies is None else self.bodies.errors(times, self.td)
+        return np.broadcast_to(np.nan, times.shape) if self.bodies is None else self.bodies.errors(times, self.td)
 
     def errors(self, times: Samples) -> Samples:
         """What a tolerance is held against, of the shape of ``times`` [-]: at rest nothing, else the vibration's."""

@@ -30,6 +30,8 @@ Record = TypeVar("Record", bound="History | Balance | Momenta")
 LARGEST_ENERGY: Final = 1e150
 # Parts slower than this share of the fastest stand still: single precision leaves them a speed.
 _STILL: Final = 1e-6
+# Times whose energies are looked up together: what is needed for more would take a multiple of the record's memory.
+_TOGETHER: Final = 1 << 14
 
 
 class Precision(NamedTuple):
@@ -298,10 +300,10 @@ class History:
         """Largest output interval [time]: how coarsely the record samples its vibration."""
         return float(np.max(np.diff(self.time)))
 
-    @cached_property
+    @property
     def turns(self) -> Samples:
         """Times of the states at which the energy turns, ascending [time]."""
-        return np.asarray(self.time[self._turns[0]])
+        return self._turns[0]
 
     @cached_property
     def peaks(self) -> Samples:
@@ -309,8 +311,9 @@ class History:
         return np.asarray(self.turns[self._turns[1]])
 
     @cached_property
-    def _turns(self) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-        return find_turns(self.energy)
+    def _turns(self) -> tuple[Samples, NDArray[np.bool_]]:
+        places, are_peaks = find_turns(self.energy)
+        return self.time[places], are_peaks
 
     @property
     def left_beside(self) -> str:
@@ -356,6 +359,9 @@ class History:
 
     def energies_at(self, times: Samples) -> Samples:
         """Energies at many times within the record, linear between the states, of their shape."""
+        if times.ndim == 1 and times.size > _TOGETHER:
+            pieces = np.array_split(times, times.size // _TOGETHER + 1)
+            return np.concatenate([self.energies_at(piece) for piece in pieces])
         before = np.clip(np.searchsorted(self.time, times, side="right") - 1, 0, max(self.time.size - 2, 0))
         after = np.minimum(before + 1, self.time.size - 1)
         (t0, e0), (t1, e1) = ((self.time[at], self.energy[at]) for at in (before, after))

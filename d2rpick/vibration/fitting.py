@@ -311,11 +311,12 @@ def structure_of(rest: Samples, deviations: float = _DEVIATIONS) -> float:
 
     The larger of lags 1 and 2: a vibration sampled four times per period shows at the second only.
     """
-    excess = 0.0
-    for lag in (1, 2):
-        products = rest[:-lag] * rest[lag:]
-        excess = max(excess, abs(float(np.sum(products))) - deviations * float(np.linalg.norm(products)))
-    return float(np.sqrt(excess / rest.size))
+
+    def excess(products: Samples) -> float:
+        return abs(float(np.sum(products))) - deviations * float(np.linalg.norm(products))
+
+    most = max(0.0, *(excess(rest[:-lag] * rest[lag:]) for lag in (1, 2)))
+    return float(np.sqrt(most / rest.size))
 
 
 def surely_structured(rest: Samples, spread: float) -> bool:

@@ -308,6 +308,7 @@ def _judged(
 ) -> Identification:
     """Return a fit with its verdict; ``density`` is the least number of samples per period."""
     s, e = record.s, record.e
+    found_density = samples_per_period(s, attempt.scaled)  # first: it takes as much memory as all that follows
     rest = e - attempt.energy
     rms, spread, structure = float(np.sqrt(np.mean(rest**2))), float(np.std(e)), fitting.structure_of(rest)
     local = attempt.scaled.vibration_energy(s)
@@ -316,7 +317,6 @@ def _judged(
     np.maximum(local, max(rms, _FLOOR * np.max(local)), out=local)
     local_structure = fitting.structure_of(np.divide(rest, local, out=local))
     loose = _loose(attempt.name, rms / spread, structure / spread, local_structure)
-    found_density = samples_per_period(s, attempt.scaled)
     wrong = _implausible(attempt.scaled, found_density, density, least_periods, record.end - record.start)
     reason = loose or wrong
     return Identification(

@@ -56,7 +56,10 @@ class Measured(NamedTuple):
     @classmethod
     def spread(cls, compared: NDArray[np.bool_], columns: Samples | float = np.nan) -> Measured:
         """Put ``columns`` of shape (6, k) at the k times that were ``compared`` of all, shape (n,)."""
-        table = np.full((len(cls._fields), compared.size), np.nan)
+        shape = len(cls._fields), compared.size
+        if not compared.any():
+            return cls(*np.broadcast_to(np.nan, shape))  # which takes no memory
+        table = np.full(shape, np.nan)
         table[:, compared] = columns
         return cls(*table)
 
