@@ -200,12 +200,12 @@ def suggest(history: History, td: float, settings: Settings) -> Suggestion:
     return suggest_at(examine(history, td, settings))
 
 
-def suggest_at(situation: Situation, *, with_better: bool = True, found: Candidates | None = None) -> Suggestion:
+def suggest_at(situation: Situation, *, with_better: bool = True, ranked: Candidates | None = None) -> Suggestion:
     """Rank the candidates for tr in a situation that is known, and recommend one; look for a better td too.
 
-    ``found`` are the candidates where they are known; those before the flight may be missing.
+    ``ranked`` are the candidates in order where they are known, up to the recommended one at least.
     """
-    candidates = rank(find_candidates(situation) if found is None else found)
+    candidates = ranked or rank(find_candidates(situation))
     best = candidates.chosen
     better = find_better_pair(situation) if with_better else None
     cautions = list(cautions_of(situation))

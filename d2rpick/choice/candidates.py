@@ -6,7 +6,7 @@ They are judged as columns; a `Candidate` is made only where one is looked at.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, overload
 
@@ -88,6 +88,21 @@ class Candidate(NamedTuple):
         return np.inf if error is None else error
 
 
+class Best(NamedTuple):
+    """A recommended pair [time], and what it is compared with those of other td by; as of a `Candidate`."""
+
+    tr: float
+    td: float
+    residual: float | None
+    error: float
+    same_swing: bool
+
+    @property
+    def rigid_time(self) -> float:
+        """Length of the rigid window [time]."""
+        return self.td - self.tr
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Candidates(Sequence[Candidate]):
     """Candidates of one td in some order, made where they are looked at, of columns of what decides.
@@ -164,6 +179,32 @@ class Candidates(Sequence[Candidate]):
     def chosen(self) -> Candidate | None:
         """The one that is recommended."""
         return None if self.recommended is None else self[self.recommended]
+
+    @property
+    def best(self) -> Best | None:
+        """What the one that is recommended is compared by."""
+        if self.recommended is None:
+            return None
+        i, td = self.order[self.recommended], self.situation.td
+        tr, residual, error, same_swing = (
+            column[i].item() for column in (self.tr, self.known.residual, self.error, self.same_swing)
+        )
+        return Best(tr, td, None if np.isnan(residual) else residual, error, same_swing)
+
+    def without_rest(self) -> Candidates:
+        """Keep of those in order no more than up to the one that is recommended: of many td they are many together."""
+        kept = self.order[: 0 if self.recommended is None else self.recommended + 1]
+        return replace(
+            self,
+            moments=self.moments.at(kept),
+            known=Measured(*(column[kept] for column in self.known)),
+            energy=self.energy[kept],
+            level_error=self.level_error[kept],
+            same_swing=self.same_swing[kept],
+            position_error=self.position_error[kept],
+            objections=(),
+            order=np.arange(kept.size),
+        )
 
     @property
     def out_of_place(self) -> NDArray[np.bool_]:

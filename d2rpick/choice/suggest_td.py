@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.choice.answers import ROUNDING, Pair, Suggestion, suggest_at
-from d2rpick.choice.candidates import Candidate, candidates_of
+from d2rpick.choice.candidates import Best, candidates_of
 from d2rpick.choice.expectation import mean_in_flight, shortfall
 from d2rpick.choice.flights import longest_flight
 from d2rpick.choice.ranking import LIKE_LEVELS, like_quality, rank
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
 
     Look = Callable[[float], Situation]
-    Choice = tuple[Situation, Candidate]
+    Choice = tuple[Situation, Best]
 
 
 def longest_rigid_times(situation: Situation, times: Samples) -> Samples:
@@ -136,7 +136,7 @@ def offered_times(situation: Situation, window: tuple[float, float], steps: int)
     return times[times < situation.history.time[-1]], set(peaks.tolist())  # a run that ends at td is no use
 
 
-def error_of(situation: Situation, best: Candidate | None) -> float | None:
+def error_of(situation: Situation, best: Best | None) -> float | None:
     """What pairs at different td are compared by [-]; None without one, or for a level above all vibration energy."""
     if best is None:
         return None
@@ -315,7 +315,7 @@ def _acceptable(situations: Iterable[Situation]) -> list[Choice]:
     """What is recommended in each situation, where that saves something."""
     asked = list(situations)
     candidates = candidates_of(asked, in_flight=True)
-    found = ((there, rank(some).chosen) for there, some in zip(asked, candidates, strict=True))
+    found = ((there, rank(some).best) for there, some in zip(asked, candidates, strict=True))
     return [(there, best) for there, best in found if best and not best.same_swing]
 
 

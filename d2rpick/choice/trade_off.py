@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, NamedTuple
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.answers import AcceptableWindow, Suggestion, suggest_at
-from d2rpick.choice.candidates import Candidate, Candidates, candidates_of
+from d2rpick.choice.answers import Suggestion, suggest_at
+from d2rpick.choice.candidates import candidates_of, find_candidates
 from d2rpick.choice.flights import longest_flight
 from d2rpick.choice.health import refuse_unsound
 from d2rpick.choice.of_run import suggest_of
 from d2rpick.choice.question import Reference, check_units
-from d2rpick.choice.ranking import EQUALLY_GOOD, Quality
+from d2rpick.choice.ranking import EQUALLY_GOOD, rank
 from d2rpick.choice.suggest_td import STEPS, as_printed, error_of, looking, offered_times, within_flight
 from d2rpick.choice.warnings import Caution, cautions_of
 from d2rpick.histories.digits import as_read
@@ -23,44 +24,78 @@ from d2rpick.vibration.span import Fits
 if TYPE_CHECKING:
     from collections.abc import Container, Iterator, Sequence
 
+    from d2rpick.choice.answers import AcceptableWindow
+    from d2rpick.choice.candidates import Best, Candidate, Candidates
     from d2rpick.choice.expectation import Expectation
     from d2rpick.choice.plan import Plan
     from d2rpick.choice.question import Settings
+    from d2rpick.choice.ranking import Quality
     from d2rpick.choice.situation import Situation
 
 
-class Offer(NamedTuple):
-    """A td [time] and the tr that is recommended for it, None where none is: then ``reason`` says why.
+@dataclass(frozen=True, eq=False)
+class Offer:
+    """What ``suggest`` says of a td, looked up where it is asked for: of most td only what they are compared by.
 
-    ``peak``: the energy peaks at td.  ``error`` is what offers are compared by [-]: the residual, on basis "energy"
-    how far the level at td stays below all vibration energy, 1 - sqrt(E(td)/(2 <E>)).  ``windows`` of acceptable tr
-    and what is ``expected`` after td are known on basis "energy" only.  ``unbeaten``: no other offer has less error and
-    saves as much, or saves more with no more error.  ``recommended``: it is that of ``suggest`` where td is chosen too.
+    ``candidates`` up to the recommended one, if any.  ``peak``: the energy peaks at td.  ``unbeaten``: no other offer
+    has less error and saves as much, or saves more with no more error.  ``recommended``: it is that of ``suggest``
+    where td is chosen too.
     """
 
-    td: float
+    situation: Situation
+    candidates: Candidates
     peak: bool
-    basis: str
-    energy_td: float
-    kinetic_share: float | None
-    best: Candidate | None
-    error: float | None
-    quality: Quality | None
-    windows: tuple[AcceptableWindow, ...] | None
-    expected: Expectation | None
-    reason: str | None
     unbeaten: bool = False
     recommended: bool = False
 
     @property
+    def td(self) -> float:
+        """When the parts are switched back [time]."""
+        return self.situation.td
+
+    @property
+    def basis(self) -> str:
+        """What the choice rests on."""
+        return self.situation.basis
+
+    @property
+    def energy_td(self) -> float:
+        """Energy level at td [energy]."""
+        return self.situation.energy_td
+
+    @property
+    def kinetic_share(self) -> float | None:
+        """K at td [-]."""
+        return self.situation.kinetic_share
+
+    @cached_property
+    def pair(self) -> Best | None:
+        """What offers are compared by; None where no tr is recommended."""
+        return self.candidates.best
+
+    @cached_property
+    def error(self) -> float | None:
+        """What offers are compared by [-].
+
+        The residual, on basis "energy" how far the level at td stays below all vibration energy,
+        1 - sqrt(E(td)/(2 <E>)).
+        """
+        return error_of(self.situation, self.pair)
+
+    @property
     def tr(self) -> float | None:
         """The recommended tr [time]."""
-        return self.best.tr if self.best else None
+        return self.pair.tr if self.pair else None
 
     @property
     def rigid_time(self) -> float | None:
         """How long the parts are rigid [time]."""
-        return self.best.rigid_time if self.best else None
+        return self.pair.rigid_time if self.pair else None
+
+    @property
+    def best(self) -> Candidate | None:
+        """The recommended tr with its measures."""
+        return self.candidates.chosen
 
     @property
     def saving(self) -> float | None:
@@ -68,31 +103,38 @@ class Offer(NamedTuple):
         share = self.best.run_time_share if self.best else None
         return None if share is None else 1 - share
 
+    @cached_property
+    def answer(self) -> Suggestion:
+        """What ``suggest`` says: of windows by all candidates, of why there is none by those before the flight too."""
+        again = self.pair and self.basis == "energy"
+        ranked = rank(find_candidates(self.situation, in_flight=True)) if again else self.candidates
+        return suggest_at(self.situation, with_better=False, ranked=ranked)
+
+    @property
+    def quality(self) -> Quality | None:
+        """How good the recommended pair is."""
+        return self.answer.quality
+
+    @property
+    def windows(self) -> tuple[AcceptableWindow, ...] | None:
+        """Windows of acceptable tr, known on basis "energy" only."""
+        return self.answer.windows
+
+    @property
+    def expected(self) -> Expectation | None:
+        """What the energy lets expect after td, known on basis "energy" only."""
+        return self.answer.expected
+
+    @property
+    def reason(self) -> str | None:
+        """Why no tr is recommended."""
+        return self.answer.why_none or None
+
 
 def offers_of(situations: Sequence[Situation], peaks: Container[float]) -> Iterator[Offer]:
     """Give what ``suggest`` says of each td; ``peaks`` are the times where the energy peaks."""
-    found = candidates_of(situations, in_flight=True)
-    yield from (_offer(one, candidates, one.td in peaks) for one, candidates in zip(situations, found, strict=True))
-
-
-def _offer(situation: Situation, found: Candidates, peak: bool) -> Offer:
-    answer = suggest_at(situation, with_better=False, found=found)
-    if answer.chosen is None:  # the reason tells of all candidates
-        answer = suggest_at(situation, with_better=False)
-    best = answer.chosen
-    return Offer(
-        td=situation.td,
-        peak=peak,
-        basis=situation.basis,
-        energy_td=situation.energy_td,
-        kinetic_share=situation.kinetic_share,
-        best=best,
-        error=error_of(situation, best),
-        quality=answer.quality,
-        windows=answer.windows,
-        expected=answer.expected,
-        reason=answer.why_none or None,
-    )
+    for found in map(rank, candidates_of(situations, in_flight=True)):
+        yield Offer(found.situation, found.without_rest(), found.situation.td in peaks)
 
 
 # Another td is worth a step where it leaves at most this share of the error, and that is more than people pass over.
@@ -167,7 +209,7 @@ def explore_of(
     fully = looking(history, settings, fits, since, quick=False)
     asked_at = map(look, sorted({*times, *([] if chosen is None else [chosen])}))
     situations = [one if one.evidence.span else fully(one.td) for one in asked_at]  # why none is seen is told of each
-    offers = [one._replace(recommended=one.td == chosen) for one in _marked([*offers_of(situations, peaks)])]
+    offers = [replace(one, recommended=one.td == chosen) for one in _marked([*offers_of(situations, peaks)])]
     asked = next((one for one in offers if one.td == td), None)
     situation = fully(known_best.td)
     told = suggestion.situation  # the first td of the flight has too little before it to tell of a vibration
@@ -189,7 +231,7 @@ def explore_of(
 
 def _found(offer: Offer) -> bool:
     """Whether there is something to compare: a pair that saves something."""
-    return offer.best is not None and offer.error is not None and not offer.best.same_swing
+    return offer.pair is not None and offer.error is not None and not offer.pair.same_swing
 
 
 def _marked(offers: Sequence[Offer]) -> Iterator[Offer]:
@@ -204,14 +246,14 @@ def _marked(offers: Sequence[Offer]) -> Iterator[Offer]:
             if error < least or (error, rigid) == (least, longest):  # equal pairs do not beat each other
                 unbeaten.add(one.td)
                 least, longest = error, rigid
-    return (one._replace(unbeaten=one.td in unbeaten) for one in offers)
+    return (replace(one, unbeaten=one.td in unbeaten) for one in offers)
 
 
 def _step(start: Offer, offers: Sequence[Offer]) -> Offer | None:
     """Give the nearest unbeaten td with half the error, else the recommended one where it has less, else None."""
     error = np.inf if start.error is None else start.error
     kept = _LEAST_KEPT * (start.rigid_time or 0.0)
-    alike = [one for one in offers if start.best is None or (one.basis == "energy") == (start.basis == "energy")]
+    alike = [one for one in offers if start.pair is None or (one.basis == "energy") == (start.basis == "energy")]
     less = [one for one in alike if _found(one) and (one.error or 0.0) < error - EQUALLY_GOOD]
     halved = [one for one in less if one.unbeaten and (one.error or 0.0) <= _MUCH_LESS * error]
     near = [one for one in halved if (one.rigid_time or 0.0) >= kept]
