@@ -327,12 +327,13 @@ def _as_found(situation: Situation, moments: Moments) -> Moments:
 
 def _distinct(situation: Situation, found: Moments) -> Moments:
     """Give the moments in time order, without the matches that lie next to a crossing or an extremum."""
-    kept, matches = np.ones(len(found), dtype=bool), found.are("match")
-    of_level = found.tr[~matches]
-    for place in np.flatnonzero(matches).tolist():
-        kept[place] = np.all(np.abs(of_level - found.tr[place]) > situation.history.step)
-    found = found.at(kept)
-    return found.at(np.argsort(found.tr, kind="stable"))
+    matches = found.are("match")
+    if matches.any():
+        kept, of_level = ~matches, found.tr[~matches]
+        for place in np.flatnonzero(matches).tolist():
+            kept[place] = np.all(np.abs(of_level - found.tr[place]) > situation.history.step)
+        found = found.at(kept)
+    return found if np.all(found.tr[1:] >= found.tr[:-1]) else found.at(np.argsort(found.tr, kind="stable"))
 
 
 def _remarks(situation: Situation, reach: float, known: Mapping[str, Any], parts: Sequence[PartMatch]) -> Iterator[str]:

@@ -93,7 +93,12 @@ class Situation:
     @cached_property
     def vibration(self) -> Vibration:
         """What can be relied on at td."""
-        return model_at(self.history, self.td, self.evidence)
+        return model_at(self.whole, self.evidence)
+
+    @cached_property
+    def whole(self) -> Vibration:
+        """What of it the whole energy shows."""
+        return energy_at(self.history, self.td, self.evidence)
 
     @property
     def basis(self) -> str:
@@ -220,11 +225,12 @@ def examine(
         start = min(td, float(history.time[0]) if flight.start is None else flight.start)
         if history.part_energies is not None:
             evidence = _with_parts(evidence, history, Span(start, end), fits)
-        if flight.start is not None and not evidence.signed and doubtful(energy_at(history, td, evidence)):
-            settled = flight.start if flight.settled is None else flight.settled
-            within = Span(settled, flight.end or float(history.time[-1]))
-            evidence = evidence._replace(swings=_swings(history, within, fits))
-    return Situation(history, td, settings, flight, evidence, fits)
+    situation = Situation(history, td, settings, flight, evidence, fits)
+    if not settings.replay or flight.start is None or evidence.signed or not doubtful(situation.whole):
+        return situation
+    settled = flight.start if flight.settled is None else flight.settled
+    within = Span(settled, flight.end or float(history.time[-1]))
+    return replace(situation, evidence=evidence._replace(swings=_swings(history, within, fits)))
 
 
 def _between_supports(history: History, flight: Flight, td: float) -> Flight:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from itertools import pairwise
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from d2rpick.vibration.fitting import MAX_MISFIT
 from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD, Identification, samples_per_period
 from d2rpick.vibration.measures import Measured
 from d2rpick.vibration.modes import Mode
-from d2rpick.vibration.moments import ModalEnergy, Moments, Profile, SampledEnergy
+from d2rpick.vibration.moments import ModalEnergy, Moments, Profile, SampledEnergy, moments_of_mode
 from d2rpick.vibration.uncertainty import residual_bound
 
 if TYPE_CHECKING:
@@ -108,10 +109,10 @@ class Vibration:
             return None
         return Profile.of(self.compared.deformation, self.compared.times, self.td)
 
-    def moments(self, tolerance: float, since: float = -np.inf, passed: Samples | None = None) -> Moments:
+    def moments(self, tolerance: float, since: float = -np.inf) -> Moments:
         """Times before td that may serve as tr: crossings, standstills within the tolerance, and closest matches.
 
-        Those before ``since`` [time] may be left out.  ``passed``: when modes pass the level, where that is known.
+        Those before ``since`` [time] may be left out.
         """
         if self.compared and isinstance(self.whole, ModalEnergy):
             turns = self.whole.standstills()
@@ -120,7 +121,7 @@ class Vibration:
         else:
             turns = self.whole.turns_near(tolerance, since)
         matches = self.profile.minima() if self.profile else ()
-        crossings = self.whole.crossings(since, passed)
+        crossings = self.whole.crossings(since)
         return Moments.of_level(*crossings, Moments.of("extremum", turns), Moments.of("match", matches))
 
     def measured(self, times: Samples) -> Measured:
@@ -187,27 +188,27 @@ def moments_of(vibrations: Sequence[Vibration], tolerance: float, since: Sequenc
     since : sequence of length n
         [time]
     """
-    passed: dict[int, Samples] = {}
+    found: dict[int, Moments] = {}
     for places in _alike(vibrations):
-        whole = vibrations[places[0]].whole
-        if len(places) > 1 and isinstance(whole, ModalEnergy) and isinstance(whole.mode, Mode):
-            seen_from = np.array([vibrations[i].td for i in places])
-            passed |= zip(places, whole.mode.all_level_crossings(seen_from, whole.before), strict=True)
-    return [one.moments(tolerance, since[i], passed.get(i)) for i, one in enumerate(vibrations)]
+        first, times = vibrations[places[0]], [since[i] for i in places]
+        if len(places) > 1:
+            seen = [one.whole for one in map(vibrations.__getitem__, places) if isinstance(one.whole, ModalEnergy)]
+            found |= zip(places, moments_of_mode(seen, tolerance, times), strict=True)
+        else:
+            found[places[0]] = first.moments(tolerance, *times)
+    return [found[i] for i in range(len(vibrations))]
 
 
 def measured_of(vibrations: Sequence[Vibration], times: Sequence[Samples]) -> list[Measured]:
     """Give the measures of the times of each vibration, as far as its deformation is comparable to that at td."""
     known: dict[int, Measured] = {}
     for places in _alike(vibrations):
-        inside = [vibrations[i].comparable(times[i]) for i in places]
-        tr = np.concatenate([times[i][here] for i, here in zip(places, inside, strict=True)])
-        seen_from = [vibrations[i].td for i in places]
-        counts = [np.count_nonzero(here) for here in inside]
-        td = np.repeat(seen_from, counts) if len(places) > 1 else seen_from[0]
-        found = vibrations[places[0]].measures_of(tr, td) if tr.size else np.zeros((len(Measured._fields), 0))
-        own = np.split(found, np.cumsum(counts)[:-1], axis=1)
-        known |= zip(places, map(Measured.spread, inside, own), strict=True)
+        first, tr = vibrations[places[0]], np.concatenate([times[i] for i in places])
+        inside, counts = first.comparable(tr), [times[i].size for i in places]
+        td = np.repeat([vibrations[i].td for i in places], counts)[inside] if len(places) > 1 else first.td
+        found = Measured.spread(inside, first.measures_of(tr[inside], td) if inside.any() else np.nan)
+        ends = pairwise([0, *np.cumsum(counts).tolist()])
+        known |= zip(places, (Measured(*(column[slice(*each)] for column in found)) for each in ends), strict=True)
     return [known[i] for i in range(len(vibrations))]
 
 
@@ -216,7 +217,7 @@ def _alike(vibrations: Sequence[Vibration]) -> Iterable[list[int]]:
     groups: dict[object, list[int]] = {}
     for place, one in enumerate(vibrations):
         whole, single = one.whole, one.compared is not None and isinstance(one.compared.deformation, Mode)
-        key = (id(whole.fit), whole.span.start) if single and isinstance(whole, ModalEnergy) else place
+        key = (id(whole.fit), whole.span) if single and isinstance(whole, ModalEnergy) else place
         groups.setdefault(key, []).append(place)
     return groups.values()
 
@@ -249,9 +250,9 @@ class Evidence(NamedTuple):
         return bool(self.signed or self.swings or (fit and fit.mode and self.span and not fit.reason))
 
 
-def model_at(history: History, td: float, evidence: Evidence) -> Vibration:
-    """Give the best model that can be relied on at ``td``."""
-    whole, signed, swings = energy_at(history, td, evidence), evidence.signed, evidence.swings
+def model_at(whole: Vibration, evidence: Evidence) -> Vibration:
+    """Give the best model that can be relied on where ``whole`` is that of the whole energy."""
+    history, td, signed, swings = whole.whole.history, whole.td, evidence.signed, evidence.swings
     sunk = signed is not None and whole.compared is None and signed.sunk(td)  # a model of the whole tells more
     if signed and not sunk:
         return replace(

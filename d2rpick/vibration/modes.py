@@ -174,10 +174,10 @@ class Mode:
 
     def level_crossings(self, td: float, start: float) -> tuple[float, ...]:
         """Find the times in (start, td), ascending, where the energy passes its level at ``td`` [time]."""
-        return tuple(self.all_level_crossings(np.array([td]), start)[0].tolist())
+        return tuple(self.all_level_crossings(np.array([td]), start)[1].tolist())
 
-    def all_level_crossings(self, td: Samples, start: float) -> list[Samples]:
-        """Find the same for each ``td`` of shape (n,), all at once."""
+    def all_level_crossings(self, td: Samples, start: float) -> tuple[NDArray[np.intp], Samples]:
+        """Find the same for each ``td`` of shape (n,), all at once: its place among them, and the time."""
         level = self.deformation(td)
         # a level of zero is met once by each passage, whatever rounding makes of its sign
         zero = np.abs(level) <= _ZERO * np.sqrt(self.vibration_energy(td))
@@ -186,7 +186,7 @@ class Mode:
         place, times = self._passages(np.append(level, -level), start, ends)
         place %= td.size
         order = np.lexsort((times, place))
-        return np.split(times[order], np.searchsorted(place[order], np.arange(1, td.size)))
+        return place[order], times[order]
 
     def _passages(self, levels: Samples, start: float, ends: Samples) -> tuple[NDArray[np.intp], Samples]:
         """Find the times in (start, end) where q passes a level, for each level and its end, both of shape (n,).

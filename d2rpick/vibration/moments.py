@@ -7,12 +7,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from d2rpick.histories.samples import find_crossings, find_turns, first_above
 from d2rpick.vibration import measures
+from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.uncertainty import fitted_reach, sampled_reach
 
 if TYPE_CHECKING:
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.identify import Identification
     from d2rpick.vibration.measures import Deformation
-    from d2rpick.vibration.modes import Mode, Modes
+    from d2rpick.vibration.modes import Modes
     from d2rpick.vibration.span import Span
 
     Passages = tuple[Samples, NDArray[np.bool_]]
@@ -61,11 +63,8 @@ class SampledEnergy:
         peaks = self.history.peaks
         return tuple(peaks[(start < peaks) & (peaks <= end)].tolist())
 
-    def crossings(self, since: float, passed: Samples | None = None) -> Passages:  # noqa: ARG002
-        """Times of the crossings of the level before td, none before ``since``, and which of them rise, shape (k,).
-
-        ``passed``: when modes pass the level, where that is known [time].
-        """
+    def crossings(self, since: float) -> Passages:
+        """Times of the crossings of the level before td, none before ``since``, and which of them rise, shape (k,)."""
         time, energy = self._sampled_before(since)
         times, rising = find_crossings(time, energy, energy[-1])
         asked = (since <= times) & (times < self.td)
@@ -109,8 +108,11 @@ class ModalEnergy(SampledEnergy):
         """Say so when the vibration at td is no more than the scatter of the record about it."""
         start, end = max(self.td - 2 * np.pi / self.mode.omega, self.span.start), max(self.td, self.span.start)
         time, energy = self.history.between(start, end)
+        vibration, fit = float(self.mode.vibration_energy(self.td)), self.fit
+        fitted = fit.start <= start and end <= fit.end
+        if fitted and fit.rms * np.sqrt(self.history.time.size / time.size) < _DROWNED * vibration:
+            return None  # nor could it be, if all scatter of the fit lay here
         scatter = float(np.sqrt(np.mean((energy - self.mode.energy(time)) ** 2)))
-        vibration = float(self.mode.vibration_energy(self.td))
         if vibration > 0 and scatter <= _DROWNED * vibration:  # both may be too small for a number
             return None
         found = f"at td the vibration energy {vibration:.3g} is below the noise of the record, {scatter:.3g}"
@@ -133,15 +135,18 @@ class ModalEnergy(SampledEnergy):
         """Just before the span: its first sample counts like any other [time]."""
         return self.span.start - _ZERO / self.mode.fastest
 
-    def crossings(self, since: float, passed: Samples | None = None) -> Passages:
+    def crossings(self, since: float) -> Passages:
         """Times of the crossings: of the samples before the span, exact ones within it, and which of them rise."""
-        start, known = self.span.start, self.mode.level_crossings(self.td, self.before) if passed is None else passed
-        times = np.maximum(known, start)
-        rising = self.mode.energy_slopes(times)[0] > 0
-        if start <= self.history.time[0]:
-            return times, rising
+        times = np.maximum(self.mode.level_crossings(self.td, self.before), self.span.start)
+        (sampled, up), rising = self.crossings_before(since), self.mode.energy_slopes(times)[0] > 0
+        return np.append(sampled, times), np.append(up, rising)
+
+    def crossings_before(self, since: float) -> Passages:
+        """Those of them that are of the samples, before the span."""
+        if self.span.start <= max(since, self.history.time[0]):
+            return np.zeros(0), np.zeros(0, dtype=bool)
         sampled, up = super().crossings(since)
-        return np.append(sampled[sampled < start], times), np.append(up[sampled < start], rising)
+        return sampled[sampled < self.span.start], up[sampled < self.span.start]
 
     def standstills(self) -> Samples:
         """Times within the span, up to td itself, where the energy turns [time]."""
@@ -220,6 +225,28 @@ class Moments:
         """Give tr, kind and whether it rises, None where the energy turns, of the moment at a place."""
         rising = int(self.rising[place])
         return float(self.tr[place]), _KINDS[self.kind[place]], rising > 0 if rising else None
+
+
+def moments_of_mode(seen: Sequence[ModalEnergy], tolerance: float, since: Sequence[float]) -> list[Moments]:
+    """Give the moments of one mode in one window, ascending in time, for each td that it is ``seen`` from.
+
+    Standstills count within the ``tolerance``; crossings before each of ``since`` [time] may be left out.
+    """
+    mode, td = seen[0].mode, np.array([one.td for one in seen])
+    assert isinstance(mode, Mode)
+    place, times = mode.all_level_crossings(td, seen[0].before)
+    times = np.maximum(times, seen[0].span.start)
+    early = [one.crossings_before(first) for one, first in zip(seen, since, strict=True)]
+    crossings = np.concatenate([*(sampled for sampled, _ in early), times])
+    rising = np.concatenate([*(up for _, up in early), mode.energy_slopes(times)[0] > 0])
+    turns = seen[int(td.argmax())].standstills()
+    of, which = np.nonzero(turns < (td - _ZERO / mode.omega)[:, np.newaxis])  # td may be an extremum itself
+    near = measures.lock_in_error(mode, turns[which], td[of]) <= tolerance
+    found = Moments.of_level(crossings, rising, Moments.of("extremum", turns[which[near]]))
+    place = np.concatenate([np.repeat(np.arange(td.size), [sampled.size for sampled, _ in early]), place, of[near]])
+    order = np.lexsort((found.tr, place))
+    found, ends = found.at(order), np.searchsorted(place[order], np.arange(td.size + 1)).tolist()
+    return [found.at(slice(*each)) for each in pairwise(ends)]
 
 
 class Profile(NamedTuple):
