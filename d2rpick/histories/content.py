@@ -124,7 +124,9 @@ class OnDisk(Content):
         if begin < end and (begin < first or end > first + len(window)):
             if end - begin > self._window:
                 return self.view(begin, end).tobytes()
-            window, first = self.view(begin, min(begin + self._window, self._size)).tobytes(), begin
+            # who goes backwards will want more before it
+            first = begin if begin >= first else max(0, end - self._window)
+            window = self.view(first, min(first + self._window, self._size)).tobytes()
             self._own.window = window, first
         return bytes(window[begin - first : end - first]) if begin < end else b""
 
@@ -138,8 +140,8 @@ class OnDisk(Content):
 
     def rfind(self, wanted: bytes, begin: int, end: int) -> int:
         """Address of the last byte ``wanted`` from ``begin`` on and before ``end``, -1 where there is none."""
-        for stop in range(end, begin, -self._window):
-            first = max(begin, stop - self._window)
+        for stop in range(end, begin, -self._gap):
+            first = max(begin, stop - self._gap)
             found = self[first:stop].rfind(wanted)
             if found >= 0:
                 return first + found

@@ -46,7 +46,8 @@ def _plain_piece(text: Text, piece: bytes, layout: Layout, used: Sequence[int]) 
         table = _by_pandas(piece, layout, chosen) if text.is_large else _by_numpy(piece, layout, chosen, cuts)
     except ValueError:
         return None
-    if table.shape != (piece.count(b"\n"), len(taken)):
+    lines = np.count_nonzero(np.frombuffer(piece, np.uint8) == ord("\n"))  # count() is slow where they are short
+    if table.shape != (lines, len(taken)):
         return None  # blank lines were passed over
     return table if taken == [*used] else table[:, np.searchsorted(taken, used)]
 
@@ -116,7 +117,7 @@ def _tables(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> Iter
     """Numbers of lines and their values piece by piece: line by line only where they are not all alike."""
     curve = _Curve(text.name, layout, used)
     number = layout.start + 1
-    for piece in text.pieces(begin):
+    for piece in text.pieces(begin, large=text.is_large):
         table = _plain_piece(text, piece, layout, used)
         if table is not None and np.isfinite(table).all() and not curve.stops_before(float(table[0, 0])):
             rows = len(table)

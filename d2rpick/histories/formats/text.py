@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from itertools import islice
+from itertools import chain, islice
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import FormatError
@@ -64,8 +64,10 @@ class Text:
 
     def place(self, line: int) -> int:
         """Where a line begins, counted from 0 [byte]; the end of the lines where there are fewer."""
-        lengths = (len(one) for piece in self.pieces(0) for one in piece.splitlines(keepends=True))
-        return min(sum(islice(lengths, line)), self._end)
+        at = 0
+        for _ in range(line):
+            at = self._data.find(b"\n", at) + 1 or self._end
+        return at
 
     def take_rest(self) -> None:
         """Count the last line, which has no end, as whole."""
@@ -76,12 +78,12 @@ class Text:
         """Whether it stayed on its disk, and so is plain ASCII."""
         return isinstance(self._data, OnDisk)
 
-    def pieces(self, begin: int) -> Iterator[bytes]:
-        """Whole lines from byte ``begin`` on, some at a time, each with its end.
+    def pieces(self, begin: int, *, large: bool = False) -> Iterator[bytes]:
+        """Whole lines from byte ``begin`` on, some or many at a time, each with its end.
 
         FormatError behind the last of them where the file was written anew meanwhile.
         """
-        size = self._portions.large if self.is_large else self._portions.piece
+        size = self._portions.large if large else self._portions.piece
         while begin < self._end:
             piece = self._data[begin : min(begin + size, self._end)]
             end = piece.rfind(b"\n") + 1
@@ -114,8 +116,9 @@ class Text:
             last = data.rfind(b"\n", 0, max(last - 1, 0)) + 1
             starts.append(last)
         between = ((first * (count - i) + last * i) // count for i in range(count))
-        starts += (data.find(b"\n", at) + 1 for at in between)
-        spans = [(at, data.find(b"\n", at)) for at in starts if begin <= at < end]
+        # each is read as soon as its place is known: what lies behind that is then at hand
+        every = chain(starts, (data.find(b"\n", at) + 1 for at in between))
+        spans = ((at, data.find(b"\n", at)) for at in every if begin <= at < end)
         lines = [self._text(data[at : to if to >= 0 else end]) for at, to in spans]
         data.check()
         return lines
