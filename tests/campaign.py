@@ -18,7 +18,7 @@ from tempfile import TemporaryDirectory
 from typing import Final
 
 from d2rpick.base.errors import D2RPickError
-from d2rpick.base.workers import answers, cores, on_cores
+from d2rpick.base.workers import cores, on_cores
 from d2rpick.deck.reader import read_deck
 from d2rpick.histories.formats import csv_table, hdf5_file
 from d2rpick.histories.history import History
@@ -153,7 +153,7 @@ def main() -> int:
     tasks = [(form, range(at, min(at + _CHUNK, each))) for at in range(0, each, _CHUNK) for form in FORMATS]
     found: dict[str, Counter[str]] = {form: Counter() for form in FORMATS}
     with on_cores(cores(), "tests.faults") as farm:
-        for answer in answers(farm, partial(chunk, options.seed), tasks):
+        for answer in farm.answers(partial(chunk, options.seed), tasks):
             form, numbers = tasks[answer.number]
             found[form] += Counter({f"{numbers}: {answer.error}": 1}) if answer.error else answer.result[1]
     print(f"{'format':<12} {'inputs':>9} {'read':>9} {'refused':>9} {'faults':>9}")

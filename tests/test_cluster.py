@@ -97,6 +97,26 @@ def test_a_study_on_a_cluster_outlives_the_death_of_a_worker(tmp_path: Path) -> 
 
 
 @pytest.mark.slow
+def test_what_a_worker_found_before_it_died_is_not_lost(tmp_path: Path) -> None:
+    from distributed import Client  # slow
+
+    found = []
+    with (
+        cluster(tmp_path, ("one", "two")) as (address, workers),
+        Cluster(address) as farm,
+        Client(address, set_as_default=False) as client,
+    ):
+        for answer in farm.answers(abs, range(500)):
+            found.append(answer)
+            if len(found) == 100:
+                until(lambda: not any(client.processing().values()))  # so all that was begun is found
+            if len(found) == 101:
+                workers["one"].kill()
+                until(lambda: len(client.scheduler_info(n_workers=-1)["workers"]) == 1)
+    assert sorted(found) == [(number, number, None) for number in range(500)]
+
+
+@pytest.mark.slow
 def test_what_cannot_be_read_on_a_cluster_is_a_row_and_no_scheduler_an_error(tmp_path: Path) -> None:
     with cluster(tmp_path, ("one",)) as (address, _):
         args = ("study", "--td", str(variants.TD), "--scheduler", address)

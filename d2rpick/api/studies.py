@@ -19,7 +19,7 @@ from d2rpick.api.asked import request_of
 from d2rpick.api.request import Request, needed_time, time_or_window
 from d2rpick.base.errors import INTERNAL_ERROR, FormatError
 from d2rpick.base.files import append_whole, record_of, signed
-from d2rpick.base.workers import Farm, answers, on_cores
+from d2rpick.base.workers import Farm, on_cores
 from d2rpick.choice import study as core
 from d2rpick.choice.study import FAILED, UNREADABLE, Question, Stamp, StudyRow, stamps
 from d2rpick.report.study import PLAIN, RUN
@@ -270,7 +270,7 @@ def rows_of(
     new = [number for number in range(len(sources)) if number not in known]
     done, following = len(known), 0
     names = [abspath(sources[number]) if absolute else sources[number] for number in new]  # noqa: PTH100
-    for answer in chain((None,), answers(farm, partial(core.ask, question), names)):
+    for answer in chain((None,), farm.answers(partial(core.ask, question), names)):
         if answer:
             number = new[answer.number]
             row = core.failed(sources[number], answer.error) if answer.error else answer.result

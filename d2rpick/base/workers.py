@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from itertools import islice
 from multiprocessing import Pipe, get_all_start_methods, get_context, set_forkserver_preload
@@ -32,15 +32,10 @@ _PATIENCE = 10
 
 
 class Farm(Protocol):
-    """What computes calls: up to ``room`` at a time."""
+    """What computes calls."""
 
-    room: int
-
-    def submit(self, function: Callable[[Item], Result], item: Item) -> Future[Result]:
-        """Begin a call."""
-
-    def alone(self, function: Callable[[Item], Result], item: Item) -> Future[Result]:
-        """Repeat a call that may have ended the process it ran in, where it harms no other."""
+    def answers(self, function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Finished]:
+        """Compute ``function`` for all items, taken as there is room; answers come as they are finished."""
 
     def __enter__(self) -> Self: ...
 
@@ -66,43 +61,8 @@ class Finished(NamedTuple):
     error: BaseException | None
 
 
-def answers(farm: Farm, function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Finished]:
-    """Compute ``function`` for all items; answers come as they are finished, whatever their order.
-
-    A call whose process died is repeated once, alone: the death breaks a whole pool, and not all of its calls are to
-    blame.
-    """
-    queue = iter(enumerate(items))
-    running: dict[Future[Result], tuple[int, Item]] = {}
-    while True:
-        for number, item in islice(queue, farm.room - len(running)):
-            running[farm.submit(function, item)] = number, item
-        if not running:
-            return
-        suspects = []
-        for future in wait(running, return_when=FIRST_COMPLETED).done:
-            number, item = running.pop(future)
-            if not future.cancelled() and isinstance(future.exception(), BrokenProcessPool):
-                suspects.append((number, item))
-            else:
-                yield _answer(number, future)
-        for number, item in suspects:
-            yield _answer(number, farm.alone(function, item))
-
-
-def _answer(number: int, future: Future[Any]) -> Finished:
-    if future.cancelled():
-        return Finished(number, None, D2RPickError("cancelled by the cluster; is its scheduler still running?"))
-    error = future.exception()
-    if isinstance(error, BrokenProcessPool):
-        error = D2RPickError("its process ended without a result; was there enough memory?")
-    return Finished(number, None if error else future.result(), error)
-
-
 class Here:
     """In the calling process, one call after the other."""
-
-    room = 1
 
     def __enter__(self) -> Self:
         return self
@@ -110,16 +70,16 @@ class Here:
     def __exit__(self, *_: object) -> None:
         pass
 
-    def submit(self, function: Callable[[Item], Result], item: Item) -> Future[Result]:
-        """Compute the call at once."""
-        future: Future[Result] = Future()
-        try:
-            future.set_result(function(item))
-        except Exception as error:  # noqa: BLE001  told by the future, as a pool does
-            future.set_exception(error)
-        return future
+    def answers(self, function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Finished]:
+        """Compute each call when its answer is asked for."""
+        return (_computed(number, function, item) for number, item in enumerate(items))
 
-    alone = submit
+
+def _computed(number: int, function: Callable[[Item], Any], item: Item) -> Finished:
+    try:
+        return Finished(number, function(item), None)
+    except Exception as error:  # noqa: BLE001  told by the answer, as a pool does
+        return Finished(number, None, error)
 
 
 class Cores:
@@ -138,7 +98,31 @@ class Cores:
         self._pool.shutdown(wait=False, cancel_futures=True)
         self._leash.close()
 
-    def submit(self, function: Callable[[Item], Result], item: Item) -> Future[Result]:
+    def answers(self, function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Finished]:
+        """Compute up to ``room`` calls at a time.
+
+        A call whose process died is repeated once, alone: the death breaks a whole pool, and not all of its calls are
+        to blame.
+        """
+        queue = iter(enumerate(items))
+        running: dict[Future[Result], tuple[int, Item]] = {}
+        while True:
+            for number, item in islice(queue, self.room - len(running)):
+                running[self._submit(function, item)] = number, item
+            if not running:
+                return
+            suspects = []
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                number, item = running.pop(future)
+                if isinstance(future.exception(), BrokenProcessPool):
+                    suspects.append((number, item))
+                else:
+                    yield _answer(number, future)
+            for number, item in suspects:
+                with self._new(1) as pool:
+                    yield _answer(number, pool.submit(function, item))
+
+    def _submit(self, function: Callable[[Item], Result], item: Item) -> Future[Result]:
         """Hand the call to the pool; to a new one when the last is broken."""
         try:
             return self._pool.submit(function, item)
@@ -147,13 +131,15 @@ class Cores:
             self._pool = self._new(self.processes)
             return self._pool.submit(function, item)
 
-    def alone(self, function: Callable[[Item], Result], item: Item) -> Future[Result]:
-        """Compute the call in a process of its own."""
-        with self._new(1) as pool:
-            return pool.submit(function, item)
-
     def _new(self, processes: int) -> ProcessPoolExecutor:
         return ProcessPoolExecutor(processes, get_context(_METHOD), _begin_work, (self._held,))
+
+
+def _answer(number: int, future: Future[Any]) -> Finished:
+    error = future.exception()
+    if isinstance(error, BrokenProcessPool):
+        error = D2RPickError("its process ended without a result; was there enough memory?")
+    return Finished(number, None if error else future.result(), error)
 
 
 def _begin_work(held: Connection) -> None:
@@ -219,7 +205,6 @@ class Cluster:
         except (OSError, ValueError) as error:
             what = " ".join(str(error).split())
             raise D2RPickError(f"{address}: no answer from a Dask scheduler ({what}); check the address") from None
-        self._executor = self._client.get_executor(pure=False)
         self.threads = sum(self._client.nthreads().values())
         self.room = max(_LEAST_ON_CLUSTER, (1 + _WAITING) * self.threads)
 
@@ -229,9 +214,32 @@ class Cluster:
     def __exit__(self, *_: object) -> None:
         self._client.close()
 
-    def submit(self, function: Callable[[Item], Result], item: Item) -> Future[Result]:
-        """Hand the call to the scheduler, which repeats it where a worker dies."""
-        future: Future[Result] = self._executor.submit(function, item)
-        return future
+    def answers(self, function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Finished]:
+        """Hand up to ``room`` calls to the scheduler, which repeats them where a worker dies.
 
-    alone = submit
+        They go by the half of it, since each message costs as much as a call.
+        """
+        from distributed import as_completed
+
+        queue, numbers = enumerate(items), dict[str, int]()
+        done = as_completed(loop=self._client.loop, with_results=True, raise_errors=False)
+        while True:
+            wanted = self.room - len(numbers)
+            if wanted >= self.room // 2 and (more := list(islice(queue, wanted))):
+                begun = self._client.map(function, [item for _, item in more], pure=False)
+                numbers.update((future.key, number) for future, (number, _) in zip(begun, more, strict=True))
+                done.update(begun)
+            if not numbers:
+                return
+            for future, result in done.next_batch():
+                yield _of_cluster(numbers.pop(future.key), future.status, result)
+
+
+def _of_cluster(number: int, status: str, result: Any) -> Finished:
+    """Give what a task of a cluster ended with: of one that failed, ``result`` is the kind, the error and its trace.
+
+    The status of one that did not may be another by now: its worker may have died since it was asked for the result.
+    """
+    if isinstance(result, CancelledError):
+        return Finished(number, None, D2RPickError("cancelled by the cluster; is its scheduler still running?"))
+    return Finished(number, None, result[1]) if status == "error" else Finished(number, result, None)

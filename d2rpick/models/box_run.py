@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import RangeError
-from d2rpick.base.workers import answers, cores, on_cores
+from d2rpick.base.workers import cores, on_cores
 from d2rpick.histories.history import EXACT, Given, History, Momenta
 from d2rpick.histories.names import Part
 from d2rpick.models.box_motion import Motion
@@ -320,7 +320,7 @@ def scan(
     ordered = sorted(times)
     following = 0
     with on_cores(jobs or cores(), "d2rpick.models.box_run") as farm:
-        for answer in answers(farm, _switched, _branches(Motion(parameters, _interval(reference)), ordered, td, end)):
+        for answer in farm.answers(_switched, _branches(Motion(parameters, _interval(reference)), ordered, td, end)):
             if answer.error:
                 raise answer.error
             ready[answer.number] = answer.result

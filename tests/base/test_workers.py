@@ -11,7 +11,7 @@ from subprocess import PIPE, Popen
 import pytest
 
 from d2rpick.base.errors import D2RPickError
-from d2rpick.base.workers import Cores, Farm, Here, answers, cores
+from d2rpick.base.workers import Cores, Farm, Here, cores
 from tests.command import TIME_LIMIT
 
 FARMS = [Here, lambda: Cores(2, __name__)]
@@ -30,14 +30,14 @@ def square(number: int) -> int:
 @pytest.mark.parametrize("farm", FARMS)
 def test_every_item_is_answered_once_by_its_number(farm: Callable[[], Farm]) -> None:
     with farm() as place:
-        found = {answer.number: answer.result for answer in answers(place, square, range(12))}
+        found = {answer.number: answer.result for answer in place.answers(square, range(12))}
     assert found == {i: i**2 for i in range(12)}
 
 
 @pytest.mark.parametrize("farm", FARMS)
 def test_an_error_is_the_answer_of_its_item_alone(farm: Callable[[], Farm]) -> None:
     with farm() as place:
-        found = {answer.number: answer for answer in answers(place, square, (1, 13, 2))}
+        found = {answer.number: answer for answer in place.answers(square, (1, 13, 2))}
     assert [found[i].result for i in range(3)] == [1, None, 4]
     assert str(found[1].error) == "thirteen"
     assert found[0].error is found[2].error is None
@@ -46,7 +46,7 @@ def test_an_error_is_the_answer_of_its_item_alone(farm: Callable[[], Farm]) -> N
 def test_a_process_that_dies_is_told_for_its_item_alone() -> None:
     items = [*range(8), 99, *range(8, 12), 99, 12]
     with Cores(2, __name__) as place:
-        found = {answer.number: answer for answer in answers(place, square, items)}
+        found = {answer.number: answer for answer in place.answers(square, items)}
     dead = [number for number, answer in found.items() if answer.error]
     assert sorted(dead) == [8, 13]
     assert all(isinstance(found[number].error, D2RPickError) for number in dead)
@@ -65,8 +65,8 @@ def test_items_are_taken_as_there_is_room(farm: Callable[[], Farm]) -> None:
             yield number
 
     with farm() as place:
-        for done, _ in enumerate(answers(place, square, items())):
-            assert taken <= done + place.room
+        for done, _ in enumerate(place.answers(square, items())):
+            assert taken <= done + getattr(place, "room", 1)
 
 
 def test_there_is_a_core() -> None:
@@ -80,7 +80,7 @@ def test_an_interrupt_while_the_first_process_imports_is_no_traceback(tmp_path: 
         "import signal; from d2rpick.base.workers import Cores, begin\n"
         "signal.signal(signal.SIGINT, lambda *_: None)\n"  # an ignored one would be inherited
         "begin(2, 'slow')\n"
-        "with Cores(2, 'slow') as farm: print(farm.submit(abs, -7).result())\n"
+        "with Cores(2, 'slow') as farm: print(next(farm.answers(abs, [-7])).result)\n"
     )
     command = [sys.executable, "-c", code]
     with Popen(

@@ -91,8 +91,8 @@ def measured(module: str, name: str, *args: int | str | None) -> Callable[[], fl
     return measure
 
 
-reading, choosing, deck, identification = (
-    partial(measured, module) for module in ("reading", "choosing", "deck", "identification")
+reading, choosing, deck, identification, study = (
+    partial(measured, module) for module in ("reading", "choosing", "deck", "identification", "study")
 )
 
 
@@ -166,6 +166,7 @@ ROWS = (
     Row("suggest of 500 parts, 2000 states / reading matsum", choosing("parts_to_matsum", 500), most=4.0),
     Row("study, 1e4 noisy states / suggest, per run", choosing("study_to_loop"), most=1.15),
     Row("study: speed-up with 2 processes", choosing("study_speed_up"), least=1.8),
+    Row("study on a cluster of 8 workers: overhead [ms a run]", study("cluster_overhead", 8), most=5.0),
     Row("rollover --scan: speed-up with 2 processes", choosing("scan_speed_up"), least=1.6),
     Row("--report / matplotlib and one Figure to svg", choosing("report_to_matplotlib"), most=1.5),
     Row("identification / least_squares from the right answer", identification("to_scipy"), most=3.0),

@@ -12,14 +12,18 @@ import json
 import os
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
+from time import perf_counter
 
 import numpy as np
 
+from d2rpick.base.workers import Cluster
 from tests.paper import OMEGA_2
 from tests.records import MODE
+from tests.test_cluster import cluster
 
 ROOT = Path(__file__).resolve().parents[2]
 TD = 0.0687534
@@ -52,6 +56,27 @@ def write_runs(folder: Path, number: int, states: int, noise: float = 0.0) -> li
         table = np.stack([time, energy], axis=1)
         np.savetxt(names[-1], table, delimiter=",", header="time,internal_energy", comments="", fmt="%.7g")
     return names
+
+
+def cluster_overhead(workers: int) -> float | None:
+    """Milliseconds that a run takes which does nothing, on a Dask cluster of so many workers on this machine."""
+    if not find_spec("distributed"):
+        return None
+    from distributed import Client
+
+    names, seconds = tuple(map(str, range(workers))), []
+    with (
+        TemporaryDirectory() as folder,
+        cluster(Path(folder), names) as (address, _),
+        Client(address, set_as_default=False) as client,
+        Cluster(address) as farm,
+    ):
+        client.wait_for_workers(workers)
+        for _ in range(ROUNDS):
+            start = perf_counter()
+            assert {answer.result for answer in farm.answers(abs, range(RUNS))} == set(range(RUNS))
+            seconds.append(perf_counter() - start)
+    return 1e3 * median(seconds) / RUNS
 
 
 def process(*args: str) -> tuple[float, float, bytes]:
