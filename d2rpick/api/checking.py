@@ -18,7 +18,7 @@ from d2rpick.deck.source import STDIN
 from d2rpick.report.findings import FINDING, Checks
 from d2rpick.report.tables import positional
 from d2rpick.rules import RULES, Checked, Configuration, check_deck, configuration_for
-from d2rpick.rules.base import Unreadable
+from d2rpick.rules.base import LS_DYNA, Unreadable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from d2rpick.api.arguments import Choosing
     from d2rpick.api.request import Request
     from d2rpick.api.runs import Run
-    from d2rpick.deck.switching import Window
+    from d2rpick.rules import CheckedWindow
     from d2rpick.rules.base import Finding
     from d2rpick.rules.judgement import HistoryJudge
 
@@ -62,7 +62,7 @@ class Findings(Answer, Checks):
         return tuple(finding for one in self.results for finding in one.findings)
 
     @property
-    def windows(self) -> tuple[Window, ...]:
+    def windows(self) -> tuple[CheckedWindow, ...]:
         """Windows in which parts are rigid, of all decks."""
         return tuple(window for one in self.results for window in one.windows)
 
@@ -164,6 +164,7 @@ def findings_of(decks: Sequence[str], rules: Configuration, run: Run | None, req
 def _each(named: Sequence[str], rules: Configuration, judge: HistoryJudge | None) -> Iterator[Checked | Unreadable]:
     """Check each deck once, by one of its spellings, a run by the first of its files; a folder stands for its decks."""
     seen: set[str] = set()
+    real_folder = cache(os.path.realpath)  # which asks the system for each folder above
     configured = cache(lambda folder: configuration_for(os.path.join(folder, ""), rules, SETTINGS))  # noqa: PTH118
     for name in named:
         try:
@@ -172,10 +173,13 @@ def _each(named: Sequence[str], rules: Configuration, judge: HistoryJudge | None
             yield Unreadable(name, error)
             continue
         for deck in decks:
-            real = os.path.realpath(deck)
+            folder, file = os.path.split(deck)
+            real = os.path.realpath(deck) if os.path.islink(deck) else os.path.join(real_folder(folder), file)  # noqa: PTH114, PTH118
             if real not in seen:
-                seen.update([real, *map(os.path.realpath, run_files(deck))])
-                yield _found(deck, configured, judge)
+                found = _found(deck, configured, judge)
+                others = [] if isinstance(found, Checked) and found.solver == LS_DYNA else run_files(deck)
+                seen.update([real, *map(os.path.realpath, others)])
+                yield found
 
 
 def _found(name: str, configured: Callable[[str], Configuration], judge: HistoryJudge | None) -> Checked | Unreadable:

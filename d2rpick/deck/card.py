@@ -187,7 +187,7 @@ class Scope:
             found = self.definition(reference[1].lower())
             return found.value if found and isinstance(found.value, str) else reference[0]
 
-        return _REFERENCE.sub(value, text)
+        return _REFERENCE.sub(value, text) if "&" in text else text
 
     def define(self, keyword: str, rows: Sequence[Row]) -> None:
         """Take over the definitions of a ``*PARAMETER`` card."""
@@ -367,13 +367,13 @@ class Card:
         text = found.text
         if not text:
             return Value(default, found)
+        names = names_in(text) if "&" in text else ()
         try:
             value = kind(exact := float(self.scope.value(text)))
         except (ExpressionError, OverflowError) as error:
-            return Value(default, found, str(error), names_in(text))
-        if value != exact:
-            return Value(default, found, f"{text!r} is not an integer", names_in(text))
-        return Value(value, found, "", names_in(text))
+            return Value(default, found, str(error), names)
+        problem = "" if value == exact else f"{text!r} is not an integer"
+        return Value(default if problem else value, found, problem, names)
 
     def positive(self, row: Row, position: int) -> float | None:
         """Read a positive number, or None; of an include in other units none is known."""

@@ -270,6 +270,8 @@ class Constraint(NamedTuple):
 
 def read_constraints(deck: Deck) -> list[Constraint]:
     """Collect the constraints of a deck; one whose nodes cannot be known has none."""
+    if not deck.named("CONSTRAINED"):
+        return []
     sets = node_sets(deck)
     bodies = (one for card in deck.named(_BODY) for one in _nodal_rigid_bodies(card, sets))
     extra = (one for card in deck.named(_EXTRA) for one in _extra_nodes(card, sets))

@@ -148,7 +148,7 @@ class Deck:
     @property
     def silencing(self) -> list[Card]:
         """Cards before which a comment silences rules."""
-        return [card for card in self._all if card.block.silenced]
+        return [card for card in self._all if card.block.source.silences and card.block.silenced]
 
     @property
     def _all(self) -> list[Card]:

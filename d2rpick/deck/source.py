@@ -325,6 +325,11 @@ class SourceFile:
         """Whether the last line has its line end; an empty file has."""
         return self.read(max(0, self._file.size - 1)) in (b"", b"\n")
 
+    @cached_property
+    def silences(self) -> bool:
+        """Whether comments may silence rules; of a large file, which is not read for that, it is not known."""
+        return self._file.size > _HELD or b"d2rpick" in self.read(0).lower()
+
     def line_at(self, offset: int) -> int:
         """Return the number of the line, from 1, that holds the byte at ``offset``."""
         known = bisect_right(self._counted, (offset, 1 << 62)) - 1
@@ -354,9 +359,9 @@ class Block:
         return self.head.startswith("-")
 
     @property
-    def _comment(self) -> tuple[bytes, ...]:
+    def _comment(self) -> tuple[str, ...]:
         """What begins a comment line: ``$`` in LS-DYNA's decks, ``#`` too in those of Radioss."""
-        return (b"$", b"#") if self.head.startswith("/") else (b"$",)
+        return ("$", "#") if self.head.startswith("/") else ("$",)
 
     @cached_property
     def line(self) -> int:
@@ -365,7 +370,7 @@ class Block:
 
     def lines(self) -> Iterator[tuple[int, str]]:
         """Read the data lines, with their distance to the keyword, without comments."""
-        distance, comment = -1, tuple(sign.decode() for sign in self._comment)
+        distance, comment = -1, self._comment
         for piece in self.source.pieces(self.start, self.end):
             *lines, rest = piece.decode("latin-1").split("\n")
             if rest and self.end is None:  # otherwise these are the blanks in front of the next keyword
@@ -381,14 +386,10 @@ class Block:
 
         Only what stands directly behind it counts, so that a reason may follow; a word that is no id is given too.
         """
-        above = self.source.read(max(0, self.start - _BEFORE), self.start)
-        if b"d2rpick" not in above.lower():  # as nearly always
-            return ()
-        before = above.removeprefix(BYTE_ORDER_MARK).decode("latin-1")
+        above = self.source.read(max(0, self.start - _BEFORE), self.start).removeprefix(BYTE_ORDER_MARK)
+        lines = above.decode("latin-1").split("\n")[:-1]  # without the blanks in front of the keyword
         rules: list[str] = []
-        for line in reversed(before.split("\n")[:-1]):
-            if not line.encode("latin-1").startswith(self._comment):
-                break
+        while lines and (line := lines.pop()).startswith(self._comment):
             if found := re.match(_SILENCE, line, re.IGNORECASE):
                 rules += re.split(r"[\s,]+", found[1].strip(" \t\r,").upper())
         return tuple(rules)

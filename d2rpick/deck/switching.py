@@ -269,6 +269,11 @@ class Unit(NamedTuple):
         """What the id is one of."""
         return "part set" if self.is_set else "main node" if self.is_body else "part"
 
+    @property
+    def part(self) -> int | None:
+        """The part; None for a part set or rigid body whose parts cannot be known."""
+        return None if self.is_set or self.is_body else self.id
+
 
 class Event(NamedTuple):
     """A unit is switched by a line of a card."""
@@ -292,8 +297,8 @@ class Window(NamedTuple):
 
     @property
     def part(self) -> int | None:
-        """The part; None for a part set or rigid body whose parts cannot be known."""
-        return self.unit.id if self.unit.kind == "part" else None
+        """The part; None where it cannot be known."""
+        return self.unit.part
 
 
 class Windows(NamedTuple):

@@ -14,13 +14,12 @@ from d2rpick.choice.warnings import Caution
 from d2rpick.deck.source import STDIN
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, kind_of, many, one_of, row
-from d2rpick.rules import RULES, Checked
-from d2rpick.rules.base import MAIN_DECK, Example, Rule, Severity, Unreadable
+from d2rpick.rules import RULES, Checked, CheckedWindow
+from d2rpick.rules.base import MAIN_DECK, Example, Rule, Severity, Unreadable, grouped
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from d2rpick.deck.switching import Window
     from d2rpick.report.formats import Shown
 
 
@@ -200,32 +199,27 @@ def as_sarif(checks: Checks, _: Shown) -> str:
     return tables.as_json({"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]})
 
 
-def _window_lines(windows: Sequence[Window], root: str) -> Iterator[str]:
+def _window_lines(windows: Sequence[CheckedWindow], root: str) -> Iterator[str]:
     """Windows that the same cards make are one line."""
-    groups: dict[tuple[int, int | None, str], list[Window]] = {}
-    for window in windows:
-        closed = None if window.closed is None else id(window.closed.by)
-        groups.setdefault((id(window.opened.by), closed, window.unit.kind), []).append(window)
-    for group in groups.values():
+    for group in grouped(((window.cards, window.unit.kind), window) for window in windows).values():
         first = group[0]
-        card = first.opened.by.card
         until = "the end" if first.td is None else f"{first.td:g}"
         names = name_units((window.unit.id for window in group), first.unit.kind)
-        yield f"{names}: rigid from {first.tr:g} to {until} ({_shown(card.file, root)}:{card.line})"
+        yield f"{names}: rigid from {first.tr:g} to {until} ({_shown(first.place.file, root)}:{first.place.line})"
 
 
 def _windows(checks: Checks) -> Iterator[dict[str, Any]]:
     for result in checks.results:
         for window in result.windows:
-            card, unit = window.opened.by.card, window.unit
+            place, unit = window.place, window.unit
             yield {
                 "part": window.part,
                 "part_set": unit.id if unit.is_set else None,
                 "node": unit.id if unit.is_body else None,
                 "tr": window.tr,
                 "td": window.td,
-                "file": _shown(card.file, checks.root),
-                "line": card.line,
+                "file": _shown(place.file, checks.root),
+                "line": place.line,
                 "deck": _shown(result.deck, checks.root),
             }
 

@@ -16,12 +16,13 @@ from d2rpick.deck import radioss_run
 from d2rpick.deck.reader import Deck, read_deck
 from d2rpick.deck.source import SourceFile
 from d2rpick.rules import reading, runs, sets, switched_parts, times
-from d2rpick.rules.base import Case, Finding, Rule, RunCase, Severity
+from d2rpick.rules.base import LS_DYNA, Case, Finding, Rule, RunCase, Severity
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
-    from d2rpick.deck.switching import Window
+    from d2rpick.deck.card import Field
+    from d2rpick.deck.switching import SwitchSet, Unit, Window
     from d2rpick.rules.judgement import HistoryJudge as Judge
 
 
@@ -109,6 +110,24 @@ def _names(table: Mapping[str, object], key: str, source: str) -> tuple[str, ...
     return tuple(value)
 
 
+class CheckedWindow(NamedTuple):
+    """A window without the deck behind it, of which there may be thousands: where the card stands that opens it.
+
+    ``cards`` number those that open and close it, None where none closes it.
+    """
+
+    unit: Unit
+    tr: float
+    td: float | None
+    place: Field
+    cards: tuple[int, int | None]
+
+    @property
+    def part(self) -> int | None:
+        """The part; None for a part set or rigid body whose parts cannot be known."""
+        return self.unit.part
+
+
 class Checked(NamedTuple):
     """What was found in one deck; ``cards`` is the number of its switching cards, ``files`` all that were read.
 
@@ -116,11 +135,12 @@ class Checked(NamedTuple):
     """
 
     deck: str
-    windows: tuple[Window, ...]
+    windows: tuple[CheckedWindow, ...]
     findings: tuple[Finding, ...]
     cards: int = 0
     files: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
+    solver: str = LS_DYNA
 
 
 def configuration_for(deck: str, asked: Configuration, others: Collection[str] = ()) -> Configuration:
@@ -175,9 +195,16 @@ def check_deck(
     for finding in findings:
         order.setdefault(finding.file, len(order))
     findings.sort(key=lambda finding: (order[finding.file], finding.line, finding.column, finding.rule))
-    return Checked(
-        path, case.windows.windows, tuple(findings), len(case.sets), tuple(case.deck.files), tuple(_remarks(case.deck))
-    )
+    windows, remarks = tuple(_told(case.windows.windows)), tuple(_remarks(case.deck))
+    return Checked(path, windows, tuple(findings), len(case.sets), tuple(case.deck.files), remarks, case.solver)
+
+
+def _told(windows: Iterable[Window]) -> Iterator[CheckedWindow]:
+    numbers: dict[SwitchSet, int] = {}
+    for unit, tr, td, opened, closed in windows:
+        opening = numbers.setdefault(opened.by, len(numbers))
+        closing = numbers.setdefault(closed.by, len(numbers)) if closed else None
+        yield CheckedWindow(unit, tr, td, opened.by.card.here, (opening, closing))
 
 
 def _findings(case: Case, configuration: Configuration) -> Iterator[Finding]:

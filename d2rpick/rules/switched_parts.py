@@ -196,6 +196,8 @@ def _torn(case: Case) -> Iterator[Objection]:
     them: the lead part with LRB 0, the others with LRB = the lead.
     """
     first = {event.unit.id: event for event in reversed(case.made_rigid)}
+    if len(first) < 2:
+        return
     leads = {part: event.line.lead.value for part, event in first.items() if event.line.lead}
     # each with the lead at the end of the LRB chain; a part that merges into nobody leads itself
     bodies = {part: reached([part], lambda one: [lead] if (lead := leads.get(one)) else [])[-1] for part in first}

@@ -96,7 +96,7 @@ CHANGES = [cut, empty, rewrite, rewrite_in_place, replace]
 def verdict(path: str) -> Hashable:
     found = check_deck(path)
     return (
-        tuple((window.part, window.tr, window.td, window.opened.by.card.line) for window in found.windows),
+        tuple((window.part, window.tr, window.td, window.place.line) for window in found.windows),
         tuple((one.rule, one.file, one.line, one.message) for one in found.findings),
     )
 
