@@ -6,8 +6,9 @@ They are judged as columns; a `Candidate` is made only where one is looked at.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
+from itertools import accumulate, chain, pairwise
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, overload
 
 import numpy as np
@@ -104,17 +105,16 @@ class Best(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Candidates(Sequence[Candidate]):
-    """Candidates of one td in some order, made where they are looked at, of columns of what decides.
+class Judged:
+    """Times that may serve as tr for one td or many of a record, held against flight, sign and tolerance.
 
-    All columns are of shape (n,), in the order of time: ``energy`` [energy]; ``level_error`` [-], NaN where an energy
-    is not positive; ``same_swing``; ``position_error`` [length], NaN where unknown; ``moments`` and ``known``, as the
-    vibration gave them.
-    ``order`` has the places in these of the candidates in their order, that of the ranks where it is ``ranked``;
-    ``recommended`` is the place in it of the one that is.
+    All columns are of shape (n,), those of each td together, in the order of the ``situations``: ``place`` in these,
+    ``moments``, and ``known`` of them; ``energy`` [energy]; ``level_error`` [-], NaN where an energy is not positive;
+    ``same_swing``; ``position_error`` [length], NaN where unknown.
     """
 
-    situation: Situation
+    situations: Sequence[Situation]
+    place: NDArray[np.intp]
     moments: Moments
     known: Measured
     energy: Samples
@@ -122,37 +122,45 @@ class Candidates(Sequence[Candidate]):
     same_swing: NDArray[np.bool_]
     position_error: Samples
     objections: tuple[Objection, ...]
-    order: NDArray[np.intp]
-    ranked: bool = False
-    recommended: int | None = None
 
     @classmethod
-    def of(cls, situation: Situation, moments: Moments, known: Measured) -> Candidates:
-        """Hold each tr, of which is ``known`` what was measured, against flight, sign and tolerance.
-
-        Where nothing vibrates, no measure counts.
-        """
-        vibration, still = situation.vibration, situation.at_rest
-        tr, known = moments.tr, Measured.spread(np.zeros(len(moments), dtype=bool)) if still else known
-        energy = vibration.whole.energies(tr)
-        # beside nothing that vibrates the ratio of two rests of round-off is no error
-        level_error = np.zeros(tr.shape) if still else measures.level_error(energy, situation.energy_td)
+    def of(cls, situations: Sequence[Situation], each: Sequence[Moments]) -> Judged:
+        """Measure the moments of each situation, and judge them; where nothing vibrates, no measure counts."""
+        moments, sizes = Moments.joined(each), [len(one) for one in each]
+        tr, place = moments.tr, np.repeat(np.arange(len(sizes)), sizes)
+        ends = [0, *accumulate(sizes)]
+        energy, known = measured_of([one.vibration for one in situations], tr, ends)
+        level = np.array([one.energy_td for one in situations])[place]
+        still = np.array([one.at_rest for one in situations])[place]
+        level_error = measures.level_error(energy, level)
+        if still.any():  # beside nothing that vibrates the ratio of two rests of round-off is no error
+            level_error[still] = 0.0
+            known = Measured(*(np.where(still, np.nan, column) for column in known))
+        turns = situations[0].history.turns
+        turned = np.searchsorted(turns, [one.td for one in situations])[place] - np.searchsorted(turns, tr, "right")
+        off = [one.position_errors(tr[slice(*rows)]) for one, rows in zip(situations, pairwise(ends), strict=True)]
         return cls(
-            situation=situation,
+            situations=situations,
+            place=place,
             moments=moments,
             known=known,
             energy=energy,
             level_error=level_error,
-            same_swing=(situation.turns_since(tr) < 2) & (not still),
-            position_error=situation.position_errors(tr),
-            objections=tuple(objections(situation, tr, known, energy, level_error)),
-            order=np.arange(tr.size),
+            same_swing=(turned < 2) & ~still,
+            position_error=off[0] if len(off) == 1 else np.concatenate(off),
+            objections=tuple(objections(situations, place, tr, known, energy, level_error)),
         )
 
     @property
-    def tr(self) -> Samples:
-        """Times of the switch to rigid [time]."""
-        return self.moments.tr
+    def ends(self) -> list[int]:
+        """Where the candidates of each situation begin, and where the last ones end."""
+        ends: list[int] = np.searchsorted(self.place, np.arange(len(self.situations) + 1)).tolist()
+        return ends
+
+    @property
+    def td(self) -> Samples:
+        """That of each candidate [time]."""
+        return np.array([one.td for one in self.situations])[self.place]
 
     @cached_property
     def acceptable(self) -> NDArray[np.bool_]:
@@ -162,60 +170,88 @@ class Candidates(Sequence[Candidate]):
     @property
     def kept(self) -> NDArray[np.bool_]:
         """Which of them are acceptable and keep the limits asked for: the rule of ``suggest`` and ``verify``."""
-        share, settings, found = self.situation.kinetic_share, self.situation.settings, self.acceptable
+        settings, found = self.situations[0].settings, self.acceptable
         if settings.max_kinetic_share is not None:
-            found = found & (share is not None and share <= settings.max_kinetic_share)
+            shares = [np.inf if one.kinetic_share is None else one.kinetic_share for one in self.situations]
+            found = found & (np.array(shares) <= settings.max_kinetic_share)[self.place]
         if settings.max_residual is not None:
             found = found & (self.known.residual <= settings.max_residual)  # not where unknown, NaN
         return found
 
-    @property
+    @cached_property
     def error(self) -> Samples:
         """What the order goes by, as ``Candidate.error`` [-]."""
         error = np.where(np.isnan(self.known.residual), self.level_error, self.known.residual)
         return np.where(np.isnan(error), np.inf, error)
+
+    @property
+    def out_of_place(self) -> NDArray[np.bool_]:
+        """Which of them leave a body so far out of place that it is worth a warning."""
+        limits = [np.inf if one.bodies is None else one.bodies.limit for one in self.situations]
+        return np.asarray(self.position_error > np.array(limits)[self.place])
+
+    def at(self, rows: NDArray[np.intp]) -> Judged:
+        """Keep some that nothing speaks against, in ascending order."""
+        return Judged(
+            situations=self.situations,
+            place=self.place[rows],
+            moments=self.moments.at(rows),
+            known=Measured(*(column[rows] for column in self.known)),
+            energy=self.energy[rows],
+            level_error=self.level_error[rows],
+            same_swing=self.same_swing[rows],
+            position_error=self.position_error[rows],
+            objections=(),
+        )
+
+    def each(self) -> Iterator[Candidates]:
+        """Give the candidates of each situation, in the order of time."""
+        for situation, rows in zip(self.situations, pairwise(self.ends), strict=True):
+            yield Candidates(situation, self, np.arange(*rows))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Candidates(Sequence[Candidate]):
+    """Candidates of one td in some order, made where they are looked at, of what was ``judged``.
+
+    ``order`` has the places there of the candidates in their order, that of the ranks where it is ``ranked``;
+    ``recommended`` is the place in it of the one that is.
+    """
+
+    situation: Situation
+    judged: Judged
+    order: NDArray[np.intp]
+    ranked: bool = False
+    recommended: int | None = None
+
+    @property
+    def tr(self) -> Samples:
+        """Times of the switch to rigid, in their order [time]."""
+        return self.judged.moments.tr[self.order]
+
+    @property
+    def kept(self) -> NDArray[np.bool_]:
+        """Which of them, in their order, are acceptable and keep the limits asked for."""
+        return self.judged.kept[self.order]
 
     @cached_property
     def chosen(self) -> Candidate | None:
         """The one that is recommended."""
         return None if self.recommended is None else self[self.recommended]
 
-    @property
+    @cached_property
     def best(self) -> Best | None:
         """What the one that is recommended is compared by."""
         if self.recommended is None:
             return None
-        i, td = self.order[self.recommended], self.situation.td
-        tr, residual, error, same_swing = (
-            column[i].item() for column in (self.tr, self.known.residual, self.error, self.same_swing)
-        )
+        i, found = self.order[self.recommended], self.judged
+        residual = found.known.residual[i].item()
+        error, same_swing = found.error[i].item(), found.same_swing[i].item()
+        tr, td = found.moments.tr[i].item(), self.situation.td
         return Best(tr, td, None if np.isnan(residual) else residual, error, same_swing)
 
-    def without_rest(self) -> Candidates:
-        """Keep of those in order no more than up to the one that is recommended: of many td they are many together."""
-        kept = self.order[: 0 if self.recommended is None else self.recommended + 1]
-        return replace(
-            self,
-            moments=self.moments.at(kept),
-            known=Measured(*(column[kept] for column in self.known)),
-            energy=self.energy[kept],
-            level_error=self.level_error[kept],
-            same_swing=self.same_swing[kept],
-            position_error=self.position_error[kept],
-            objections=(),
-            order=np.arange(kept.size),
-        )
-
-    @property
-    def out_of_place(self) -> NDArray[np.bool_]:
-        """Which of them leave a body so far out of place that it is worth a warning."""
-        bodies = self.situation.bodies
-        if bodies is None:
-            return np.zeros(len(self), dtype=bool)
-        return np.asarray(self.position_error > bodies.limit)
-
     def __len__(self) -> int:
-        return len(self.moments)
+        return self.order.size
 
     @overload
     def __getitem__(self, place: int) -> Candidate: ...
@@ -227,23 +263,23 @@ class Candidates(Sequence[Candidate]):
             i = range(len(self))[place]
             return self[i : i + 1][0]
         # how far the true time may lie away is asked of these only: of all it takes longer than the choice
-        reach = self.situation.vibration.reach(_as_found(self.situation, self.moments.at(self.order[place])))
+        reach = self.situation.vibration.reach(_as_found(self.situation, self.judged.moments.at(self.order[place])))
         return tuple(map(self._candidate, range(len(self))[place], reach.tolist()))
 
     def __iter__(self) -> Iterator[Candidate]:
         return iter(self[:])
 
     def _candidate(self, rank: int, reach: float) -> Candidate:
-        i = int(self.order[rank])
-        situation, known, (tr, kind, rising) = self.situation, self.known.of(i), self.moments[i]
+        i, situation, found = int(self.order[rank]), self.situation, self.judged
+        known, (tr, kind, rising) = found.known.of(i), found.moments[i]
         history, td = situation.history, situation.td
         energy, level, same_swing, off = (
-            column[i].item() for column in (self.energy, self.level_error, self.same_swing, self.position_error)
+            column[i].item() for column in (found.energy, found.level_error, found.same_swing, found.position_error)
         )
         worst = None if np.isnan(off) or situation.bodies is None else situation.bodies.worst(tr, td)
         rigid_fraction = (td - tr) / float(history.time[-1] - history.time[0])
         parts = situation.vibration.part_matches(tr) if known else ()
-        against = tuple(one.sentence(i) for one in self.objections if one.holds[i])
+        against = tuple(chain.from_iterable(one.told(i) for one in found.objections if one.holds[i]))
         return Candidate(
             rank=(rank + 1) * self.ranked,
             tr=tr,
@@ -273,33 +309,24 @@ def find_candidates(situation: Situation, *, in_flight: bool = False) -> Candida
     Where nothing vibrates in the flight, its start alone.  With ``in_flight`` those before the flight, of which none is
     acceptable, may be left out: noise in a long record makes tens of thousands.
     """
-    return next(candidates_of([situation], in_flight=in_flight))
+    return next(next(judged_of([situation], in_flight=in_flight)).each())
 
 
-def candidates_of(
-    situations: Sequence[Situation], *, in_flight: bool = False, most: int = _MOST
-) -> Iterator[Candidates]:
+def judged_of(situations: Sequence[Situation], *, in_flight: bool = False, most: int = _MOST) -> Iterator[Judged]:
     """The same of many td of one record, by one set of rules: at once so many td as have ``most`` candidates."""
     first, together = 0, 1
     while first < len(situations):
-        found = _found_together(situations[first : first + together], in_flight=in_flight)
-        yield from found
-        first, together = first + together, max(1, most // max(1, *map(len, found)))
-
-
-def _found_together(situations: Sequence[Situation], *, in_flight: bool) -> list[Candidates]:
-    vibrations = [one.vibration for one in situations]
-    starts = [one.earliest_tr if in_flight and one.earliest_tr is not None else -np.inf for one in situations]
-    found = moments_of(vibrations, situations[0].settings.tolerance, starts)
-    kept = [_at_start(one) or _distinct(one, moments) for one, moments in zip(situations, found, strict=True)]
-    known = measured_of(vibrations, [moments.tr for moments in kept])
-    return [Candidates.of(*row) for row in zip(situations, kept, known, strict=True)]
+        asked = situations[first : first + together]
+        starts = [one.earliest_tr if in_flight and one.earliest_tr is not None else -np.inf for one in asked]
+        found = moments_of([one.vibration for one in asked], asked[0].settings.tolerance, starts)
+        kept = [_at_start(one) or _distinct(one, moments) for one, moments in zip(asked, found, strict=True)]
+        yield Judged.of(asked, kept)
+        first, together = first + together, max(1, most // max(1, *map(len, kept)))
 
 
 def judge(situation: Situation, times: Iterable[float]) -> Candidates:
     """Measure each of the ``times`` before td as tr, and hold it against flight, sign and tolerance."""
-    moments = Moments.of("given", [*times])
-    return Candidates.of(situation, moments, situation.vibration.measured(moments.tr))
+    return next(Judged.of([situation], [Moments.of("given", [*times])]).each())
 
 
 def _at_start(situation: Situation) -> Moments | None:

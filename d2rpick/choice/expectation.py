@@ -11,7 +11,7 @@ from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.digits import above, first_as_read
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -95,8 +95,10 @@ class Means(NamedTuple):
 
 def means_of(situation: Situation) -> Means | None:
     """Read them off the flight; None on another basis than "energy", without a flight or energy, and at rest."""
+    if situation.basis != "energy":
+        return None
     mean = mean_in_flight(situation)
-    if situation.basis != "energy" or mean is None or not situation.energy_td > 0 or situation.at_rest:
+    if mean is None or not situation.energy_td > 0 or situation.at_rest:
         return None
     time, energy = _flight(situation)
     lowest = max(0.0, float(energy.min()))
@@ -158,29 +160,28 @@ def shortfall(energy: Samples, mean: float) -> Samples:
 
 
 class Objection(NamedTuple):
-    """A reason and the candidates that it ``holds`` for, of shape (n,).
-
-    ``error`` (n,) and the ``limit`` that it is above where the reason names them, the error as {}.
-    """
+    """What speaks against the candidates that it ``holds`` for, of shape (n,); ``told`` says it of one by its place."""
 
     holds: NDArray[np.bool_]
-    reason: str
-    error: Samples | None = None
-    limit: float = 0.0
-
-    def sentence(self, place: int) -> str:
-        """Say it of the candidate at a place."""
-        return self.reason if self.error is None else self.reason.format(above(self.error[place], self.limit))
+    told: Callable[[int], Iterable[str]]
 
 
 def objections(
-    situation: Situation, tr: Samples, known: Measured, energy: Samples, level_error: Samples
+    situations: Sequence[Situation],
+    place: NDArray[np.intp],
+    tr: Samples,
+    known: Measured,
+    energy: Samples,
+    level_error: Samples,
 ) -> Iterator[Objection]:
     """Give every reason against some of the candidates.
 
     Parameters
     ----------
-    situation : Situation
+    situations : sequence
+        Of one record, by one set of rules.
+    place : array of shape (n,)
+        Of the situation of each candidate.
     tr : array of shape (n,)
         [time]
     known : Measured
@@ -190,35 +191,42 @@ def objections(
     level_error : array of shape (n,)
         NaN where an energy is not positive [-].
     """
-    everywhere = np.ones(tr.size, dtype=bool)
-    earliest, vibration = situation.earliest_tr, situation.vibration
-    if earliest is None:
-        yield Objection(everywhere, situation.flight.refusal or "unknown: nothing shows when the load is over")
-    else:
-        yield Objection(tr < first_as_read(earliest), f"before {end_of_load(situation)}")
-    yield from (Objection(everywhere, reason) for reason in against_td(situation))
-    if situation.at_rest:
-        return
+    begun = np.array([np.nan if one.earliest_tr is None else first_as_read(one.earliest_tr) for one in situations])
+    yield Objection(~(tr >= begun[place]), lambda i: [_in_load(situations[place[i]])])
+    refused = np.array([any(True for _ in against_td(one)) for one in situations])
+    yield Objection(refused[place], lambda i: against_td(situations[place[i]]))
+    moves = np.array([not one.at_rest for one in situations])[place]
     compared = known.compared
-    described = compared | bool(vibration.unknown)
+    described = compared | np.array([bool(one.vibration.unknown) for one in situations])[place]
     same_sign = known.sign_match != 0
-    yield Objection(~described, vibration.undescribed)
-    yield Objection(~same_sign, "opposite sign of the deformation")
-    error, judged = np.where(compared, known.lock_in_error, level_error), described & same_sign
-    yield Objection(judged & np.isnan(error), "the energy is not positive here, so there is nothing to compare")
-    tolerance = situation.settings.tolerance
-    yield Objection(judged & (error > tolerance), f"error {{}} above the tolerance {tolerance:g}", error, tolerance)
-    if situation.basis == "energy" and situation.td <= situation.latest_td:  # beyond, the flight tells nothing of it
-        yield from _above_the_reference(situation, energy)
+    yield Objection(moves & ~described, lambda i: [situations[place[i]].vibration.undescribed])
+    yield Objection(moves & ~same_sign, lambda _: ["opposite sign of the deformation"])
+    error, judged = np.where(compared, known.lock_in_error, level_error), moves & described & same_sign
+    nothing = "the energy is not positive here, so there is nothing to compare"
+    yield Objection(judged & np.isnan(error), lambda _: [nothing])
+    most = situations[0].settings.tolerance
+    too_much = judged & (error > most)
+    yield Objection(too_much, lambda i: [f"error {above(error[i], most)} above the tolerance {most:g}"])
+    means = [
+        means_of(one) if one.td <= one.latest_td else None for one in situations
+    ]  # beyond, the flight tells nothing
+    if any(means):
+        more = energy > np.array([one.most if one else np.inf for one in means])[place]
+        yield Objection(more, lambda i: _above_the_reference(means[place[i]], energy[i]))
 
 
-def _above_the_reference(situation: Situation, energy: Samples) -> Iterator[Objection]:
-    """Object where more energy would come back after td than the reference has."""
-    means = means_of(situation)
+def _in_load(situation: Situation) -> str:
+    if situation.earliest_tr is None:
+        return situation.flight.refusal or "unknown: nothing shows when the load is over"
+    return f"before {end_of_load(situation)}"
+
+
+def _above_the_reference(means: Means | None, energy: float) -> Iterator[str]:
+    """Say by how much more energy would come back after td than the reference has."""
     if means:
-        found = "the mean energy after td is expected to be {} times that of the reference, more than"
-        kept = means.ratio(energy)
-        yield Objection(energy > means.most, f"{found} {MOST_KEPT:g} times", kept, MOST_KEPT)
+        times = above(means.ratio(energy), MOST_KEPT)
+        found = f"the mean energy after td is expected to be {times} times that of the reference"
+        yield f"{found}, more than {MOST_KEPT:g} times"
 
 
 def against_td(situation: Situation) -> Iterator[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -13,9 +14,11 @@ from d2rpick.vibration.identify import MIN_PLASTIC, MIN_SAMPLES_PER_PERIOD
 from d2rpick.vibration.measures import TOLERATED_GROWTH, wrong_sign
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
-    from d2rpick.choice.candidates import Candidate, Candidates
+    from d2rpick.choice.candidates import Candidate, Candidates, Judged
     from d2rpick.choice.expectation import Expectation
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import Samples
@@ -36,12 +39,18 @@ def rank(candidates: Candidates) -> Candidates:
     of like quality, the earliest first, but where it is much the same those that leave the body out of place behind the
     others; then the rest by their error.
     """
-    acceptable = candidates.acceptable
-    group = np.where(acceptable, candidates.same_swing, np.int8(2))
-    rigid, room = candidates.situation.td - candidates.tr, like_quality(candidates.situation)
-    places = order(group, candidates.error, rigid, candidates.out_of_place, room)
-    kept = np.flatnonzero(candidates.kept[places]).tolist()
-    return replace(candidates, order=places, ranked=True, recommended=kept[0] if kept else None)
+    return next(one for one in ranked(candidates.judged) if one.situation is candidates.situation)
+
+
+def ranked(judged: Judged) -> Iterator[Candidates]:
+    """The same of all td that were judged together."""
+    group = np.where(judged.acceptable, judged.same_swing, 2) + 3 * judged.place
+    room = np.array([like_quality(one) for one in judged.situations])[judged.place]
+    places = order(group, judged.error, judged.td - judged.moments.tr, judged.out_of_place, room)
+    kept = judged.kept[places]
+    for one, (first, last) in zip(judged.each(), pairwise(judged.ends), strict=True):
+        best = np.flatnonzero(kept[first:last])
+        yield replace(one, order=places[first:last], ranked=True, recommended=int(best[0]) if best.size else None)
 
 
 def like_quality(situation: Situation) -> float:
@@ -50,7 +59,11 @@ def like_quality(situation: Situation) -> float:
 
 
 def order(
-    group: NDArray[np.int8], error: Samples, rigid: Samples, off: NDArray[np.bool_], room: float = EQUALLY_GOOD
+    group: NDArray[np.intp],
+    error: Samples,
+    rigid: Samples,
+    off: NDArray[np.bool_],
+    room: Samples | float = EQUALLY_GOOD,
 ) -> NDArray[np.intp]:
     """Give the places in the order of the groups, in each the errors within ``room`` of the smallest first.
 
@@ -62,7 +75,7 @@ def order(
     return np.lexsort((-rigid, np.where(good, -rigid, error), near & off, good & ~near, ~good, group))
 
 
-def _extreme(which: np.ufunc, group: NDArray[np.int8], values: Samples) -> Samples:
+def _extreme(which: np.ufunc, group: NDArray[np.intp], values: Samples) -> Samples:
     """Least or greatest of the values in each group."""
     found = np.full(int(group.max(initial=0)) + 1, np.inf if which is np.minimum else -np.inf)
     which.at(found, group, values)

@@ -24,8 +24,6 @@ from d2rpick.vibration.span import Fits, Span, described_span, span_of
 from d2rpick.vibration.uncertainty import resolved
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from d2rpick.choice.question import Settings
     from d2rpick.flight.bodies import Bodies
     from d2rpick.histories.history import History, Samples
@@ -172,12 +170,6 @@ class Situation:
     def peaks(self, start: float, end: float) -> tuple[float, ...]:
         """Times in (start, end], ascending, where the energy peaks: of an oscillator, of the samples without one."""
         return describing(self.history, self.td, self.evidence).peaks(start, end)
-
-    def turns_since(self, times: Samples) -> NDArray[np.intp]:
-        """How often the sampled energy turns between each of ``times`` and td, of the shape of ``times``."""
-        turns = self.history.turns
-        after = np.searchsorted(turns, self.td) - np.searchsorted(turns, times, side="right")
-        return np.asarray(np.maximum(after, 0))
 
     def sees_as(self, other: Situation) -> bool:
         """Whether the two, of one record, have one flight and one evidence: then only their td differ."""

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache, partial
+from itertools import chain
 from math import sqrt
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.choice.answers import ROUNDING, Pair, Suggestion, suggest_at
-from d2rpick.choice.candidates import Best, candidates_of
+from d2rpick.choice.candidates import Best, judged_of
 from d2rpick.choice.expectation import mean_in_flight, shortfall
 from d2rpick.choice.flights import longest_flight
-from d2rpick.choice.ranking import LIKE_LEVELS, like_quality, rank
+from d2rpick.choice.ranking import LIKE_LEVELS, like_quality, ranked
 from d2rpick.choice.situation import Situation, examine
 from d2rpick.flight.flight import SOURCES
 from d2rpick.flight.internal_energy import round_off
@@ -313,10 +314,8 @@ def _shortening(situation: Situation, times: Iterable[float]) -> Iterator[Choice
 
 def _acceptable(situations: Iterable[Situation]) -> list[Choice]:
     """What is recommended in each situation, where that saves something."""
-    asked = list(situations)
-    candidates = candidates_of(asked, in_flight=True)
-    found = ((there, rank(some).best) for there, some in zip(asked, candidates, strict=True))
-    return [(there, best) for there, best in found if best and not best.same_swing]
+    found = chain.from_iterable(map(ranked, judged_of([*situations], in_flight=True)))
+    return [(one.situation, one.best) for one in found if one.best and not one.best.same_swing]
 
 
 def _longest(pairs: Iterable[Choice]) -> Choice | None:

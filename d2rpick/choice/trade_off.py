@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import accumulate
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.answers import Suggestion, suggest_at
-from d2rpick.choice.candidates import candidates_of, find_candidates
+from d2rpick.choice.candidates import find_candidates, judged_of
 from d2rpick.choice.flights import longest_flight
 from d2rpick.choice.health import refuse_unsound
 from d2rpick.choice.of_run import suggest_of
 from d2rpick.choice.question import Reference, check_units
-from d2rpick.choice.ranking import EQUALLY_GOOD, rank
+from d2rpick.choice.ranking import EQUALLY_GOOD, rank, ranked
 from d2rpick.choice.suggest_td import STEPS, as_printed, error_of, looking, offered_times, within_flight
 from d2rpick.choice.warnings import Caution, cautions_of
 from d2rpick.histories.digits import as_read
@@ -133,8 +134,13 @@ class Offer:
 
 def offers_of(situations: Sequence[Situation], peaks: Container[float]) -> Iterator[Offer]:
     """Give what ``suggest`` says of each td; ``peaks`` are the times where the energy peaks."""
-    for found in map(rank, candidates_of(situations, in_flight=True)):
-        yield Offer(found.situation, found.without_rest(), found.situation.td in peaks)
+    for judged in judged_of(situations, in_flight=True):
+        found = [*ranked(judged)]
+        kept = [one.order[: 0 if one.recommended is None else one.recommended + 1] for one in found]
+        few, ends = judged.at(np.concatenate(kept)), accumulate(rows.size for rows in kept)  # noise makes many
+        for one, rows, end in zip(found, kept, ends, strict=True):
+            best = replace(one, judged=few, order=np.arange(end - rows.size, end))
+            yield Offer(one.situation, best, one.situation.td in peaks)
 
 
 # Another td is worth a step where it leaves at most this share of the error, and that is more than people pass over.

@@ -94,7 +94,7 @@ def measured(
 TOLERATED_GROWTH = 0.05
 
 
-def level_error(energy: Samples | float, level: float) -> Samples:
+def level_error(energy: Samples | float, level: Samples | float) -> Samples:
     """|sqrt(E(tr)/E(td)) - 1| [-]: how far the locked-in amplitude is off, of the shape of ``energy``.
 
     NaN where an energy, or the ``level`` at td, is not positive.

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from itertools import pairwise
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -126,7 +125,7 @@ class Vibration:
 
     def measured(self, times: Samples) -> Measured:
         """Measures of each time as tr, as far as its deformation can be compared with that at td."""
-        return measured_of([self], [times])[0]
+        return measured_of([self], times, [0, times.size])[1]
 
     def errors(self, times: Samples) -> Samples:
         """What a tolerance is held against, of the shape of ``times``; infinite where no tolerance would help [-].
@@ -199,17 +198,25 @@ def moments_of(vibrations: Sequence[Vibration], tolerance: float, since: Sequenc
     return [found[i] for i in range(len(vibrations))]
 
 
-def measured_of(vibrations: Sequence[Vibration], times: Sequence[Samples]) -> list[Measured]:
-    """Give the measures of the times of each vibration, as far as its deformation is comparable to that at td."""
-    known: dict[int, Measured] = {}
+def measured_of(vibrations: Sequence[Vibration], tr: Samples, ends: Sequence[int]) -> tuple[Samples, Measured]:
+    """Give the energy of each tr (n,), and its measures as far as its deformation is comparable to that at its td.
+
+    Those of the i-th vibration lie between the i-th of the ``ends`` and the next one.
+    """
+    energy, inside, found = np.empty(tr.shape), np.zeros(tr.shape, dtype=bool), []
     for places in _alike(vibrations):
-        first, tr = vibrations[places[0]], np.concatenate([times[i] for i in places])
-        inside, counts = first.comparable(tr), [times[i].size for i in places]
-        td = np.repeat([vibrations[i].td for i in places], counts)[inside] if len(places) > 1 else first.td
-        found = Measured.spread(inside, first.measures_of(tr[inside], td) if inside.any() else np.nan)
-        ends = pairwise([0, *np.cumsum(counts).tolist()])
-        known |= zip(places, (Measured(*(column[slice(*each)] for column in found)) for each in ends), strict=True)
-    return [known[i] for i in range(len(vibrations))]
+        first, each = vibrations[places[0]], [np.arange(ends[i], ends[i + 1]) for i in places]
+        rows = np.concatenate(each)
+        energy[rows] = first.whole.energies(tr[rows])
+        inside[rows] = here = first.comparable(tr[rows])
+        if here.any():
+            seen_from = np.repeat([vibrations[i].td for i in places], [one.size for one in each])[here]
+            rows = rows[here]
+            found.append((rows, first.measures_of(tr[rows], seen_from if len(places) > 1 else first.td)))
+    if not found:
+        return energy, Measured.spread(inside)
+    order = np.argsort(np.concatenate([rows for rows, _ in found]))
+    return energy, Measured.spread(inside, np.concatenate([columns for _, columns in found], axis=1)[:, order])
 
 
 def _alike(vibrations: Sequence[Vibration]) -> Iterable[list[int]]:

@@ -18,7 +18,7 @@ from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.uncertainty import fitted_reach, sampled_reach
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -207,8 +207,12 @@ class Moments:
     def of_level(cls, crossings: Samples, rising: NDArray[np.bool_], *others: Moments) -> Moments:
         """Give crossings of the level, shape (k,), and after them other moments."""
         kind, sides = np.zeros(crossings.size, np.int8), np.where(rising, 1, -1).astype(np.int8)
-        columns = zip((crossings, kind, sides), *((one.tr, one.kind, one.rising) for one in others), strict=True)
-        return cls(*map(np.concatenate, columns))
+        return cls.joined([cls(crossings, kind, sides), *others])
+
+    @classmethod
+    def joined(cls, some: Iterable[Moments]) -> Moments:
+        """Give some moments, and others after them."""
+        return cls(*map(np.concatenate, zip(*((one.tr, one.kind, one.rising) for one in some), strict=True)))
 
     def are(self, kind: str) -> NDArray[np.bool_]:
         """Which of them are of a kind."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.answers import suggest
-from d2rpick.choice.candidates import candidates_of, find_candidates
+from d2rpick.choice.candidates import find_candidates, judged_of
 from d2rpick.choice.question import Settings
 from d2rpick.choice.ranking import rank
 from d2rpick.choice.suggest_td import looking
@@ -73,9 +73,9 @@ def test_candidates_of_many_td_are_those_of_each_also_where_few_fit_together() -
     look = looking(paper.history(), PLAIN)
     situations = [look(td) for td in (0.02, 0.0335, 0.064, 0.0687, 0.11)]
     alone = [find_candidates(one)[:] for one in situations]
-    assert [one[:] for one in candidates_of(situations)] == alone
-    assert [one[:] for one in candidates_of(situations, most=15)] == alone
-    assert list(candidates_of([])) == []
+    for together in (judged_of(situations), judged_of(situations, most=15)):
+        assert [one[:] for judged in together for one in judged.each()] == alone
+    assert list(judged_of([])) == []
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.8])

@@ -54,7 +54,7 @@ def test_limits_that_cannot_be_judged_are_not_kept() -> None:
 @given(rows)
 def test_the_order_of_candidates(some: list[tuple[float, float, int, bool]]) -> None:
     rigid, error = np.array([row[0] for row in some]), np.array([row[1] for row in some])
-    group, off = np.array([row[2] for row in some], dtype=np.int8), np.array([row[3] for row in some], dtype=bool)
+    group, off = np.array([row[2] for row in some], dtype=np.intp), np.array([row[3] for row in some], dtype=bool)
     places = order(group, error, rigid, off).tolist()
     assert sorted(places) == list(range(len(some)))
     assert [some[i][2] for i in places] == sorted(group.tolist())
@@ -92,10 +92,11 @@ def test_of_times_alike_the_one_that_leaves_the_body_in_place_is_recommended() -
     situation = examine(car("1-17"), 0.12, Settings())
     ranked = rank(find_candidates(situation))
     assert situation.bodies is not None
-    off = replace(ranked, situation=situation, position_error=np.where(ranked.tr < 0.0395, 1.0, 0.0))
+    judged, tr = ranked.judged, ranked.judged.moments.tr
+    off = replace(ranked, judged=replace(judged, position_error=np.where(tr < 0.0395, 1.0, 0.0)))
     first, second = ranked[0], rank(off)[0]
     assert first.tr < 0.0395 < second.tr < first.tr + 0.1 * (0.12 - first.tr)
-    nothing_near = replace(ranked, position_error=np.where(ranked.tr < 0.09, 1.0, 0.0))
+    nothing_near = replace(ranked, judged=replace(judged, position_error=np.where(tr < 0.09, 1.0, 0.0)))
     assert rank(nothing_near)[0].tr == first.tr
 
 
@@ -111,14 +112,14 @@ def test_candidates_are_kept_together_as_one_by_one(history: History, td: float,
     situation = examine(history, td, Settings(**limits), fits(td))  # type: ignore[arg-type]
     ranked = rank(find_candidates(situation))
     assert len(ranked) > 3
-    kept = ranked.kept[ranked.order].tolist()
+    kept = ranked.kept.tolist()
     assert kept == [one.acceptable and not over_limits(situation, one) for one in ranked]
     assert ranked.recommended == (kept.index(True) if any(kept) else None)
     assert [one.rank for one in ranked] == list(range(1, len(ranked) + 1))
-    assert [one.error for one in ranked] == ranked.error[ranked.order].tolist()
-    assert [one.acceptable for one in ranked] == ranked.acceptable[ranked.order].tolist()
+    assert [one.error for one in ranked] == ranked.judged.error[ranked.order].tolist()
+    assert [one.acceptable for one in ranked] == ranked.judged.acceptable[ranked.order].tolist()
     assert ranked[1:3] == (ranked[1], ranked[2])
-    assert ranked[-1].tr == ranked.tr[ranked.order[-1]]
+    assert ranked[-1].tr == ranked.tr[-1]
 
 
 RECORD = History(TIME, ENERGY, ("paper",), "made", "E")
