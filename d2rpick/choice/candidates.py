@@ -114,7 +114,7 @@ class Judged:
     """
 
     situations: Sequence[Situation]
-    place: NDArray[np.intp]
+    place: NDArray[np.int32]
     moments: Moments
     known: Measured
     energy: Samples
@@ -126,18 +126,20 @@ class Judged:
     @classmethod
     def of(cls, situations: Sequence[Situation], each: Sequence[Moments]) -> Judged:
         """Measure the moments of each situation, and judge them; where nothing vibrates, no measure counts."""
-        moments, sizes = Moments.joined(each), [len(one) for one in each]
-        tr, place = moments.tr, np.repeat(np.arange(len(sizes)), sizes)
+        sizes = [len(one) for one in each]
         ends = [0, *accumulate(sizes)]
+        moments, place = Moments.joined(each), np.repeat(np.arange(len(sizes), dtype=np.int32), sizes)
+        if len(each) == 1:  # of a noisy record, which memory is to hold once
+            moments, place = each[0], np.broadcast_to(np.int32(0), sizes[0])
+        tr = moments.tr
         energy, known = measured_of([one.vibration for one in situations], tr, ends)
-        level = np.array([one.energy_td for one in situations])[place]
         still = np.array([one.at_rest for one in situations])[place]
-        level_error = measures.level_error(energy, level)
+        level_error = measures.level_error(energy, np.array([one.energy_td for one in situations])[place])
         if still.any():  # beside nothing that vibrates the ratio of two rests of round-off is no error
             level_error[still] = 0.0
             known = Measured(*(np.where(still, np.nan, column) for column in known))
         turns = situations[0].history.turns
-        turned = np.searchsorted(turns, [one.td for one in situations])[place] - np.searchsorted(turns, tr, "right")
+        few = np.searchsorted(turns, [one.td for one in situations])[place] - np.searchsorted(turns, tr, "right") < 2
         off = [one.position_errors(tr[slice(*rows)]) for one, rows in zip(situations, pairwise(ends), strict=True)]
         return cls(
             situations=situations,
@@ -146,7 +148,7 @@ class Judged:
             known=known,
             energy=energy,
             level_error=level_error,
-            same_swing=(turned < 2) & ~still,
+            same_swing=few & ~still,
             position_error=off[0] if len(off) == 1 else np.concatenate(off),
             objections=tuple(objections(situations, place, tr, known, energy, level_error)),
         )
@@ -178,7 +180,7 @@ class Judged:
             found = found & (self.known.residual <= settings.max_residual)  # not where unknown, NaN
         return found
 
-    @cached_property
+    @property
     def error(self) -> Samples:
         """What the order goes by, as ``Candidate.error`` [-]."""
         error = np.where(np.isnan(self.known.residual), self.level_error, self.known.residual)
@@ -245,10 +247,11 @@ class Candidates(Sequence[Candidate]):
         if self.recommended is None:
             return None
         i, found = self.order[self.recommended], self.judged
-        residual = found.known.residual[i].item()
-        error, same_swing = found.error[i].item(), found.same_swing[i].item()
-        tr, td = found.moments.tr[i].item(), self.situation.td
-        return Best(tr, td, None if np.isnan(residual) else residual, error, same_swing)
+        tr, residual, level_error, same_swing = (
+            column[i].item() for column in (found.moments.tr, found.known.residual, found.level_error, found.same_swing)
+        )
+        known = not np.isnan(residual)
+        return Best(tr, self.situation.td, residual if known else None, residual if known else level_error, same_swing)
 
     def __len__(self) -> int:
         return self.order.size

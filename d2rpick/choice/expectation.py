@@ -168,7 +168,7 @@ class Objection(NamedTuple):
 
 def objections(
     situations: Sequence[Situation],
-    place: NDArray[np.intp],
+    place: NDArray[np.int32],
     tr: Samples,
     known: Measured,
     energy: Samples,

@@ -44,8 +44,8 @@ def rank(candidates: Candidates) -> Candidates:
 
 def ranked(judged: Judged) -> Iterator[Candidates]:
     """The same of all td that were judged together."""
-    group = np.where(judged.acceptable, judged.same_swing, 2) + 3 * judged.place
-    room = np.array([like_quality(one) for one in judged.situations])[judged.place]
+    group = np.where(judged.acceptable, judged.same_swing, np.int8(2)) + 3 * judged.place
+    room = np.repeat([like_quality(one) for one in judged.situations], 3)
     places = order(group, judged.error, judged.td - judged.moments.tr, judged.out_of_place, room)
     kept = judged.kept[places]
     for one, (first, last) in zip(judged.each(), pairwise(judged.ends), strict=True):
@@ -59,25 +59,22 @@ def like_quality(situation: Situation) -> float:
 
 
 def order(
-    group: NDArray[np.intp],
-    error: Samples,
-    rigid: Samples,
-    off: NDArray[np.bool_],
-    room: Samples | float = EQUALLY_GOOD,
+    group: NDArray[np.int32], error: Samples, rigid: Samples, off: NDArray[np.bool_], room: Samples
 ) -> NDArray[np.intp]:
-    """Give the places in the order of the groups, in each the errors within ``room`` of the smallest first.
+    """Give the places in the order of the groups, in each the errors within its ``room`` (g,) of the smallest first.
 
     Of these come the longest rigid times first, but behind those within a tenth of the longest those that are ``off``.
     The others follow by error.
     """
-    good = error <= _extreme(np.minimum, group, error)[group] + room
-    near = good & (rigid >= (1 - _LIKE_TIMES) * _extreme(np.maximum, group, np.where(good, rigid, -np.inf))[group])
+    good = error <= (_extreme(np.minimum, group, error, room.size) + room)[group]
+    longest = _extreme(np.maximum, group, np.where(good, rigid, -np.inf), room.size)
+    near = good & (rigid >= (1 - _LIKE_TIMES) * longest[group])
     return np.lexsort((-rigid, np.where(good, -rigid, error), near & off, good & ~near, ~good, group))
 
 
-def _extreme(which: np.ufunc, group: NDArray[np.intp], values: Samples) -> Samples:
-    """Least or greatest of the values in each group."""
-    found = np.full(int(group.max(initial=0)) + 1, np.inf if which is np.minimum else -np.inf)
+def _extreme(which: np.ufunc, group: NDArray[np.int32], values: Samples, groups: int) -> Samples:
+    """Least or greatest of the values in each of so many groups."""
+    found = np.full(groups, np.inf if which is np.minimum else -np.inf)
     which.at(found, group, values)
     return found
 

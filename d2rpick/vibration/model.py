@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
@@ -205,14 +205,14 @@ def measured_of(vibrations: Sequence[Vibration], tr: Samples, ends: Sequence[int
     """
     energy, inside, found = np.empty(tr.shape), np.zeros(tr.shape, dtype=bool), []
     for places in _alike(vibrations):
-        first, each = vibrations[places[0]], [np.arange(ends[i], ends[i + 1]) for i in places]
-        rows = np.concatenate(each)
+        first, each = vibrations[places[0]], [slice(ends[i], ends[i + 1]) for i in places]
+        rows: Any = each[0] if len(each) == 1 else np.concatenate([np.arange(one.start, one.stop) for one in each])
         energy[rows] = first.whole.energies(tr[rows])
         inside[rows] = here = first.comparable(tr[rows])
         if here.any():
-            seen_from = np.repeat([vibrations[i].td for i in places], [one.size for one in each])[here]
-            rows = rows[here]
-            found.append((rows, first.measures_of(tr[rows], seen_from if len(places) > 1 else first.td)))
+            seen_from = np.repeat([vibrations[i].td for i in places], [one.stop - one.start for one in each])
+            td = seen_from[here] if len(each) > 1 else first.td
+            found.append((np.arange(tr.size)[rows][here], first.measures_of(tr[rows][here], td)))
     if not found:
         return energy, Measured.spread(inside)
     order = np.argsort(np.concatenate([rows for rows, _ in found]))

@@ -54,8 +54,8 @@ def test_limits_that_cannot_be_judged_are_not_kept() -> None:
 @given(rows)
 def test_the_order_of_candidates(some: list[tuple[float, float, int, bool]]) -> None:
     rigid, error = np.array([row[0] for row in some]), np.array([row[1] for row in some])
-    group, off = np.array([row[2] for row in some], dtype=np.intp), np.array([row[3] for row in some], dtype=bool)
-    places = order(group, error, rigid, off).tolist()
+    group, off = np.array([row[2] for row in some], dtype=np.int32), np.array([row[3] for row in some], dtype=bool)
+    places = order(group, error, rigid, off, np.full(3, EQUALLY_GOOD)).tolist()
     assert sorted(places) == list(range(len(some)))
     assert [some[i][2] for i in places] == sorted(group.tolist())
     for number in set(group.tolist()):
