@@ -296,21 +296,24 @@ def select_parts(wanted: Sequence[str], known: Sequence[Part], where: str) -> tu
     """
     if not known:
         raise FormatError(f"{where}: no parts with histories of their own; add the matsum, binout or T01 of the run")
-    found = dict.fromkeys(part for text in wanted for part in _meant(text, known, where))
+    titled: dict[str, list[Part]] = {}
+    for part in known:
+        titled.setdefault(part.title.strip().casefold(), []).append(part)
+    titled[""] = []  # is none
+    found = dict.fromkeys(part for text in wanted for part in _meant(text, known, titled, where))
     return tuple(part for part in known if part in found)
 
 
-def _meant(text: str, known: Sequence[Part], where: str) -> Iterator[Part]:
-    whole = _titled(text, known)
+def _meant(text: str, known: Sequence[Part], titled: Mapping[str, Sequence[Part]], where: str) -> Iterator[Part]:
+    whole = titled.get(text.strip().casefold())
     if whole and "," in text:  # a title may hold a comma
         yield _only(whole, text, where)
         return
     for piece in text.split(","):
-        yield from _piece(piece.strip(), known, where)
+        yield from _piece(piece.strip(), known, titled.get(piece.strip().casefold()), where)
 
 
-def _piece(piece: str, known: Sequence[Part], where: str) -> Sequence[Part]:
-    titled = _titled(piece, known)
+def _piece(piece: str, known: Sequence[Part], titled: Sequence[Part] | None, where: str) -> Sequence[Part]:
     numbers = re.fullmatch(_RANGE, piece)
     if not numbers:
         if not titled:
@@ -325,12 +328,6 @@ def _piece(piece: str, known: Sequence[Part], where: str) -> Sequence[Part]:
     if not inside:
         raise FormatError(f"{where}: no part {piece}; there are: {menu(known)}")
     return inside
-
-
-def _titled(text: str, known: Sequence[Part]) -> list[Part]:
-    """Parts with this title; none of them has no title."""
-    wanted = text.strip().casefold()
-    return [part for part in known if wanted and part.title.strip().casefold() == wanted]
 
 
 def _only(titled: Sequence[Part], text: str, where: str) -> Part:
