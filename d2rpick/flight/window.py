@@ -197,15 +197,15 @@ def moments(time: Samples) -> Iterator[float]:
     yield from np.linspace(time[0], time[-1], round(1 / SHORTEST) + 1).tolist()
 
 
-def marks(time: Samples, td: float) -> tuple[float, ...]:
+def marks(time: Samples, td: float) -> Iterator[float]:
     """Give the moments from which the flight around ``td`` is looked for, so that many td share what is found.
 
     First the nearest of those far apart, whose long flight may hold td; then the two about td, of which each flight
     that is long enough holds one.
     """
     times = tuple(moments(time))
-    near = sorted(times, key=lambda moment: abs(moment - td))[:2]
-    return min(times[::_FAR], key=lambda moment: abs(moment - td)), *near
+    yield min(times[::_FAR], key=lambda moment: abs(moment - td))
+    yield from sorted(times, key=lambda moment: abs(moment - td))[:2]
 
 
 def all_windows(time: Samples, around: Callable[[float], FreeFlight | None]) -> tuple[FreeFlight, ...]:
