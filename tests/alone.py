@@ -8,6 +8,7 @@ import os
 import sys
 import tempfile
 from collections.abc import Generator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +31,7 @@ class _Watch:
         self.free = True
 
     def __call__(self, event: str, args: tuple[Any, ...]) -> None:
-        if self.free or event not in _EVENTS:
+        if event not in _EVENTS or self.free:  # most events are none of these
             return
         names = args[:1] if event != "subprocess.Popen" else [args[1]] if isinstance(args[1], str) else args[1]
         for name in names:
@@ -45,7 +46,12 @@ sys.addaudithook(WATCH)
 
 def is_beside(name: str, root: Path = ROOT) -> bool:
     """Whether a file is one of others, or lies beside the clone and is neither hidden nor needed by Python."""
-    path, parent = Path(os.path.abspath(name)), root.parent  # noqa: PTH100  links stay
+    return _lies_beside(os.path.abspath(name), root)  # noqa: PTH100  links stay
+
+
+@cache
+def _lies_beside(name: str, root: Path) -> bool:
+    path, parent = Path(name), root.parent
     if path.is_relative_to(REAL):
         return True
     if not path.is_relative_to(parent) or path.is_relative_to(root) or parent in (path, parent.parent):

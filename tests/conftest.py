@@ -17,8 +17,8 @@ from hypothesis import settings
 
 from d2rpick.base.workers import cores
 
-# A busy machine is no finding.  Each run asks other examples: a third of the usual hundred are as good as all.
-settings.register_profile("d2rpick", deadline=None, max_examples=30)
+# A busy machine is no finding.  Each run asks other examples: a fifth of the usual hundred are as good as all.
+settings.register_profile("d2rpick", deadline=None, max_examples=20)
 settings.load_profile("d2rpick")
 
 # Nor is it that each process of the tests compiles them anew.
@@ -65,8 +65,8 @@ gc.set_threshold(20_000, 20, 50)
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """Run one process more than there are cores: in many tests it waits for the clock, a child or a browser."""
-    return cores() + 1
+    """Run a process on each core: each collects all tests, and what waits for a child leaves its core to that."""
+    return cores()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -55,13 +55,19 @@ def parsed(module: str) -> ast.Module:
 
 
 @cache
+def nodes(module: str) -> tuple[ast.AST, ...]:
+    """All that stands in the source of a module."""
+    return tuple(ast.walk(parsed(module)))
+
+
+@cache
 def imports(module: str) -> frozenset[str]:
     """Names of all modules that a module imports, also for type checking, those of the package without its name."""
     return frozenset(_imports(module))
 
 
 def _imports(module: str) -> Iterator[str]:
-    for node in ast.walk(parsed(module)):
+    for node in nodes(module):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -120,7 +126,7 @@ def test_only_the_command_line_prints_and_exits() -> None:
         (module, ast.unparse(node.func))
         for module in MODULES
         if folder(module) != "cli"
-        for node in ast.walk(parsed(module))
+        for node in nodes(module)
         if isinstance(node, ast.Call)
     }
     assert not {
@@ -154,7 +160,8 @@ def test_no_file_is_mapped_into_memory() -> None:
     assert not [module for module in MODULES if "mmap" in imports(module)]
 
 
-def loaded(*args: str) -> set[str]:
+@cache
+def loaded(*args: str) -> frozenset[str]:
     """Modules that a call of the program has loaded by its end."""
     code = (
         "import atexit, sys; atexit.register(lambda: print(*sys.modules, file=sys.stderr));"
@@ -164,7 +171,7 @@ def loaded(*args: str) -> set[str]:
         [sys.executable, "-c", code, *args], capture_output=True, text=True, check=True, cwd=ROOT, timeout=TIME_LIMIT
     )
     assert result.stdout
-    return set(result.stderr.split())
+    return frozenset(result.stderr.split())
 
 
 @cache
@@ -175,7 +182,7 @@ def beside(libraries: str) -> frozenset[str]:
     return frozenset(found.stdout.split())
 
 
-def share(modules: set[str]) -> float:
+def share(modules: frozenset[str]) -> float:
     """How much of the package these of its modules are, by the bytes of their sources."""
     size = {name: path.stat().st_size for name, path in MODULES.items()}
     loaded = {name.removeprefix("d2rpick.") for name in modules}
@@ -189,6 +196,7 @@ UNNEEDED = {
     *("importlib.metadata", "importlib.resources"),
     *("numpy.ma", "numpy.typing", "numpy.polynomial", "numpy.random", "numpy.testing", "numpy.f2py"),
 }
+SUGGEST = ("suggest", "--exit-zero", "--quiet", "--td")  # -q costs click difflib
 CARD = ("card", "--tr", "0.02", "--td", "0.09")
 
 
@@ -202,8 +210,7 @@ CARD = ("card", "--tr", "0.02", "--td", "0.09")
         (("rule", "D2R201"), "click", 0.21),
         ((*CARD, "--part", "1"), "click", 0.12),
         ((*CARD, "--solver", "radioss", "--node", "1", "--end", "1"), "click", 0.12),
-        (("suggest", "-q", "--td", "0.064", ENERGY), "click, numpy", 0.36),
-        (("suggest", "-q", "--td", "0.064", GLSTAT), "click, numpy", 0.36),
+        *(((*SUGGEST, "0.064", file), "click, numpy", 0.36) for file in (ENERGY, GLSTAT)),
     ],
 )
 def test_a_command_loads_only_what_its_answer_needs(args: tuple[str, ...], libraries: str, most: float) -> None:
@@ -211,12 +218,9 @@ def test_a_command_loads_only_what_its_answer_needs(args: tuple[str, ...], libra
     there = beside(libraries)
     assert "d2rpick" not in there
     mine = loaded(*args) - there
-    own = {name for name in mine if folder(name) == "d2rpick"}
+    own = frozenset(name for name in mine if folder(name) == "d2rpick")
     assert {folder(name) for name in mine - own} <= {*sys.stdlib_module_names, *re.findall(r"\w+", libraries)}
     assert share(own) <= most
-
-
-SUGGEST = ("suggest", "--exit-zero", "--quiet", "--td")  # -q costs click difflib
 
 
 @pytest.mark.parametrize(

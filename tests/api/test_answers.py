@@ -231,7 +231,7 @@ def test_an_open_file_is_read() -> None:
 
 
 def test_pictures_and_pages(tmp_path: Path) -> None:
-    found = d2.suggest(d2.read(ENERGY), float(TD), replay=False)
+    found = d2.suggest(d2.read(ENERGY), float(TD))
     assert found.plot().axes
     page = found.report(tmp_path / "choice.html").read_text("utf-8")
     assert '"command":["d2rpick suggest --td "' in page  # what can be explored

@@ -486,7 +486,7 @@ def test_runs_are_counted_with_the_time_that_is_left(monkeypatch: pytest.MonkeyP
         (*SUGGEST, ENERGY),
         ("suggest", "-v", "--td", "0.37", "--energy", "boxIE_J", "--no-verify", ROLLOVER),
         ("explore", "--td-window", "0.06", "0.07", "--steps", "5", "--no-verify", ENERGY),
-        ("plan", "--no-verify", "--energy", "boxIE_J", ROLLOVER),
+        ("plan", "--no-verify", ENERGY),
         (*VERIFY, "--no-verify", ENERGY),
         ("info", ENERGY),
         ("follow", "--once", "--part", "box", BOX),

@@ -17,9 +17,9 @@ SPEAKING = ("histories", "vibration", "flight", "choice", "models")
 def messages(folder: str) -> Iterator[str]:
     """Texts in the code of a folder that are no docstrings."""
     for path in sorted((ROOT / "d2rpick" / folder).rglob("*.py")):
-        tree = ast.parse(path.read_text())
-        stated = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-        for node in ast.walk(tree):
+        nodes = list(ast.walk(ast.parse(path.read_text())))
+        stated = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
+        for node in nodes:
             if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in stated:
                 yield node.value
 

@@ -344,6 +344,7 @@ def test_a_table_has_no_parts_that_could_fly() -> None:
         flying_parts(d2.from_frame(table).files)
 
 
+@pytest.mark.usefixtures("by_level")
 def test_every_command_takes_the_words() -> None:
     for command in (("info",), ("plan",), ("verify", "--tr", "0.1", "--td", "0.37")):
         assert run(*command, "-q", "--part", "flying", BOX).exit_code in (0, 1)

@@ -6,14 +6,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from math import isclose
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import pytest
 from selenium import webdriver
-from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.by import By
-from selenium.webdriver.remote.webelement import WebElement
-from selenium.webdriver.support.wait import WebDriverWait
+
+if TYPE_CHECKING:
+    from selenium.webdriver.remote.webelement import WebElement
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 DRIVER = shutil.which("chromedriver")
@@ -41,7 +41,7 @@ def in_browser(test: Test) -> Test:
 class Browser:
     """A browser, and what a reader of a page does in it."""
 
-    def __init__(self, driver: webdriver.Chrome) -> None:
+    def __init__(self, driver: "webdriver.Chrome") -> None:
         self.driver = driver
 
     def open(self, page: Path, *, width: int = 1280, **media: str) -> None:
@@ -56,7 +56,7 @@ class Browser:
         """Ask the browser itself, by its developer tools."""
         return self.driver.execute_cdp_cmd(command, arguments)
 
-    def find(self, selector: str) -> WebElement:
+    def find(self, selector: str) -> "WebElement":
         """Find an element."""
         return self.driver.find_element(By.CSS_SELECTOR, selector)
 
@@ -70,8 +70,9 @@ class Browser:
 
     def spoken(self, roles: set[str], value: float | None = None) -> list[dict[str, Any]]:
         """Elements with these roles, and this value, as a screen reader finds them, which is told a little later."""
+        from selenium.webdriver.support.wait import WebDriverWait  # slow
 
-        def found(_: webdriver.Chrome) -> list[dict[str, Any]]:
+        def found(_: object) -> list[dict[str, Any]]:
             nodes = self.ask("Accessibility.getFullAXTree")["nodes"]
             used = [node for node in nodes if node["role"]["value"] in roles and not node["ignored"]]
             used = [node for node in used if value is None or isclose(node["value"]["value"], value, rel_tol=1e-6)]
@@ -104,7 +105,7 @@ def browsing(folder: Path) -> Iterator[Browser]:
     for option in (*_OPTIONS, f"--user-data-dir={folder / 'profile'}"):
         options.add_argument(option)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(options=options, service=Service(str(DRIVER)))
+    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(str(DRIVER)))
     try:
         yield Browser(driver)
     finally:

@@ -19,9 +19,8 @@ from tests.command import ENERGY, ROLLOVER, run
 
 pytest.importorskip("selenium", reason="selenium is not installed")
 
-from selenium.webdriver import ActionChains
+from selenium import webdriver
 from selenium.webdriver.common.keys import Keys
-from selenium.webdriver.support.select import Select
 
 from tests.report.browser import Browser, browsing, in_browser
 
@@ -124,7 +123,7 @@ def test_td_typed_at_some_places_shows_the_digits_of_suggest(paper: Path, browse
 def test_td_dragged_to_some_places_shows_the_digits_of_suggest(paper: Path, browser: Browser) -> None:
     browser.open(paper)
     browser.driver.execute_script("document.querySelector('.energy').scrollIntoView({block: 'center'})")
-    mouse = ActionChains(browser.driver, duration=0)
+    mouse = webdriver.ActionChains(browser.driver, duration=0)
     mouse.click_and_hold(browser.find(".handle")).perform()
     over = browser.find(".energy .u-over")
     first, last = browser.driver.execute_script(ENDS)
@@ -191,7 +190,7 @@ def test_a_click_on_a_point_of_the_trade_off_selects_it(paper: Path, browser: Br
     browser.open(paper)
     over = browser.find(".trade .u-over")
     browser.driver.execute_script("document.querySelector('.trade').scrollIntoView({block: 'center'})")
-    ActionChains(browser.driver).move_to_element_with_offset(
+    webdriver.ActionChains(browser.driver).move_to_element_with_offset(
         over, over.size["width"] // 2 - 9, over.size["height"] // 2 - 9
     ).click().perform()
     td = check(browser)
@@ -265,6 +264,8 @@ def test_windows_of_acceptable_tr_follow_td(box: Path, browser: Browser) -> None
 
 @in_browser
 def test_each_flight_of_a_plan_can_be_explored(tmp_path: Path, browser: Browser) -> None:
+    from selenium.webdriver.support.select import Select  # slow
+
     motion = str(tmp_path / "tumbling.matsum")
     assert run("rollover", "--mesh", "4", "--dt", "1e-3", "--drop", "0.4", "--tilt", "40", "-o", motion).exit_code == 0
     page = written(tmp_path, "plan", "--no-verify", "--part", "box", motion)

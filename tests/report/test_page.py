@@ -149,7 +149,7 @@ def test_it_is_signed_where_the_times_stand(paper: Page) -> None:
 def test_it_is_the_same_every_time(tmp_path: Path) -> None:
     pages = []
     for _ in range(2):
-        page_of(tmp_path, "--td", "0.064", "--no-verify", "--overwrite", ENERGY)
+        page_of(tmp_path, "--td", "0.064", "--overwrite", ENERGY)
         pages.append((tmp_path / "report.html").read_bytes())
     assert pages[0] == pages[1]
 
@@ -198,7 +198,7 @@ def test_it_tells_what_is_known_and_nothing_else(
 def test_a_title_of_html_stays_text(tmp_path: Path) -> None:
     evil = tmp_path / "evil.glstat"
     evil.write_text(f" {NASTY}\n{Path(GLSTAT).read_text('ascii').partition(chr(10))[2]}", "ascii")
-    page = page_of(tmp_path, "--td", "0.064", "--no-verify", str(evil))
+    page = page_of(tmp_path, "--td", "0.064", str(evil))
     assert NASTY in page.text
     assert (len(page.scripts), len(page.data)) == (2, 1)
     assert "alert" not in "".join(page.scripts)
@@ -233,7 +233,7 @@ def test_a_long_or_strange_name_spoils_no_figure_and_says_nothing(tmp_path: Path
 def test_a_file_name_that_is_no_text_is_shown_as_far_as_it_is(tmp_path: Path) -> None:
     name = os.fsdecode(os.fsencode(tmp_path) + b"/energy\xff.csv")
     Path(name).write_bytes(Path(ENERGY).read_bytes())
-    assert "energy\ufffd.csv" in page_of(tmp_path, "--td", "0.064", "--no-verify", name).text
+    assert "energy\ufffd.csv" in page_of(tmp_path, "--td", "0.064", name).text
 
 
 @pytest.mark.slow
