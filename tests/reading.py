@@ -2,16 +2,18 @@
 
 import os
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 
 from d2rpick.base.errors import FormatError
 from d2rpick.base.files import at_rest
-from d2rpick.choice.question import read
+from d2rpick.choice.question import Reference
 from d2rpick.histories.content import OnDisk, Portions
 from d2rpick.histories.database import Legs
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Reader, Run, Selection, open_run, open_sources
 from d2rpick.histories.source import Source
+from tests.command import ROOT
 
 SMALL = Portions(block=256, gap=32, window=64)
 
@@ -32,9 +34,20 @@ def history_of(
     return run_of(reader, *contents, selection=selection, name=name).history(selection)
 
 
+def read(names: Sequence[str], selection: Selection | None = None, input_format: str = "auto") -> Reference:
+    """Read as `d2rpick.choice.question.read` does; what is found in files of the clone, which stay, is found once."""
+    selection = selection or Selection()
+    asked = tuple(names), selection._replace(parts=(), flying=(), springs=None), input_format
+    of_clone = all(Path(name).absolute().is_relative_to(ROOT) for name in names)
+    return Reference.of((_opened if of_clone else open_run)(*asked), selection)
+
+
+_opened = cache(open_run)
+
+
 def read_history(names: Sequence[str], selection: Selection | None = None, input_format: str = "auto") -> History:
     """Read the history that is selected of a run, by default the internal energy."""
-    return read(names, selection or Selection(), input_format).history
+    return read(names, selection, input_format).history
 
 
 def on_disk(file: Path, portions: Portions = SMALL, of: type[OnDisk] = OnDisk) -> OnDisk:

@@ -8,13 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from d2rpick.choice.answers import Pair, suggest, suggest_at, verify, verify_at
-from d2rpick.choice.question import Settings, read
+from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.histories.history import History
 from tests import paper
 from tests.computed import stored
 from tests.energies import codes, of, rollover, sure, vibration
+from tests.reading import read
 
 PLAIN = Settings()
 

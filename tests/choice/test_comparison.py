@@ -16,7 +16,7 @@ from d2rpick.choice.answers import Verdict
 from d2rpick.choice.comparison import MOST_MOMENTUM_ERROR, Comparison, compare_runs
 from d2rpick.choice.judged_parts import rigid_parts
 from d2rpick.choice.of_run import compare_with, verify_of
-from d2rpick.choice.question import Reference, Settings, read
+from d2rpick.choice.question import Reference, Settings
 from d2rpick.choice.switched_run import switched_history
 from d2rpick.histories.history import History, Samples, Track
 from d2rpick.histories.opening import Selection, open_run
@@ -25,6 +25,7 @@ from tests.command import replayed as motion
 from tests.computed import results, stored
 from tests.energies import sure
 from tests.json_schemas import check_by_schema
+from tests.reading import read
 
 TR, TD = 0.0135867, 0.0687534
 VERIFY = ("verify", "--no-verify", "--tr", "0.1", "--td", "0.37", "--part", "box")

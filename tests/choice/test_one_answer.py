@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from functools import cache
 from html import unescape
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import pytest
 
 from d2rpick.choice.answers import Verdict, suggest, verify, verify_at
 from d2rpick.choice.plan import plan_of
-from d2rpick.choice.question import Reference, Settings, read
+from d2rpick.choice.question import Reference, Settings
 from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.choice.windows import acceptable_windows
 from d2rpick.flight.flight import all_seen, seen_flight
@@ -25,9 +26,11 @@ from tests.command import BOX, run
 from tests.computed import stored
 from tests.drops import drop, written
 from tests.energies import codes, of, sure
+from tests.reading import read
 
 PLAIN = Settings()
 LEVEL = Settings(replay=False)  # no oscillator describes the box, and none is sought
+planned = cache(plan_of)
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +100,7 @@ def test_every_tr_of_the_windows_that_are_read_verifies() -> None:
 
 @pytest.mark.slow
 def test_a_plan_begins_a_flight_where_the_load_is_said_to_end(box: Reference) -> None:
-    second = plan_of(box, LEVEL).flights[1]
+    second = planned(box, LEVEL).flights[1]
     after = (second.start + second.end) / 2
     asked = replace(LEVEL, after=after)
     (row,) = (one for one in plan_of(box, asked).flights if one.number == second.number)
@@ -110,7 +113,7 @@ def test_a_plan_begins_a_flight_where_the_load_is_said_to_end(box: Reference) ->
 
 def test_verify_and_check_name_the_same_ends_of_a_flight(box: Reference) -> None:
     asked = replace(LEVEL, margin=0.01)
-    flight = plan_of(box, LEVEL).flights[1]
+    flight = planned(box, LEVEL).flights[1]
     verdict = verify(box.history, flight.start + 0.005, flight.end - 0.005, asked)
     reasons = [reason for reason in verdict.reasons if "with the margin" in reason]
     told = [fault.message for fault in faults_of(verdict) if fault.rule == "D2R204"]
@@ -121,7 +124,7 @@ def test_verify_and_check_name_the_same_ends_of_a_flight(box: Reference) -> None
 
 @pytest.mark.parametrize("margin", [None, 0.01])
 def test_the_last_td_that_is_named_lies_in_the_flight(box: Reference, margin: float | None) -> None:
-    asked, flights = replace(LEVEL, margin=margin), plan_of(box, LEVEL).flights
+    asked, flights = replace(LEVEL, margin=margin), planned(box, LEVEL).flights
     answer = suggest(box.history, (flights[1].end + flights[2].start) / 2, asked)
     (message,) = (one.message for one in answer.cautions if one.code == "no-free-flight")
     found = sure(re.search(r"its last td is (\S+)$" if margin else r"to (\S+); td must lie in it$", message))

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.of_run import suggest_of
 from d2rpick.choice.plan import Plan, plan_of
-from d2rpick.choice.question import Reference, Settings, read
+from d2rpick.choice.question import Reference, Settings
 from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.choice.trade_off import explored_flights
 from d2rpick.histories.digits import first_as_read
@@ -20,6 +20,7 @@ from d2rpick.histories.opening import Selection
 from tests.computed import stored
 from tests.drops import drop, written
 from tests.energies import sure
+from tests.reading import read
 
 PLAIN = Settings(replay=False)  # no oscillator describes these runs, and none is sought
 BOX = Selection(parts=("box",))

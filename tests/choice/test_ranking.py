@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from d2rpick.choice.answers import suggest, verify
 from d2rpick.choice.candidates import find_candidates
-from d2rpick.choice.question import Settings, read
+from d2rpick.choice.question import Settings
 from d2rpick.choice.ranking import (
     EQUALLY_GOOD,
     GRADES,
@@ -30,6 +30,7 @@ from d2rpick.vibration.span import Fits
 from tests import paper
 from tests.computed import stored
 from tests.energies import rollover, sure
+from tests.reading import read
 from tests.records import ENERGY, TIME, vibration
 
 rows = st.lists(

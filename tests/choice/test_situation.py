@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.answers import suggest, suggest_at
-from d2rpick.choice.question import Settings, read
+from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.flight.bodies import RigidBody
 from d2rpick.histories.history import History
@@ -16,6 +16,7 @@ from d2rpick.vibration.span import Fits
 from tests import chain, paper
 from tests.counted_fits import CountedFits
 from tests.energies import of, rollover, sure
+from tests.reading import read
 
 PLAIN = Settings()
 

@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 from d2rpick.choice.answers import suggest, suggest_at
 from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.expectation import expectation, shortfall
-from d2rpick.choice.question import Settings, read
+from d2rpick.choice.question import Settings
 from d2rpick.choice.ranking import rank
 from d2rpick.choice.situation import Situation, examine
 from d2rpick.choice.suggest_td import longest_rigid_times, suggest_in_window
 from d2rpick.histories.history import EXACT, Given, History, Momenta, Samples
 from d2rpick.histories.names import Part
-from d2rpick.histories.opening import Selection, open_run
+from d2rpick.histories.opening import Selection
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import history_of, simulate
 from d2rpick.report.suggestion import outlook
@@ -25,14 +25,14 @@ from tests.command import ENERGY, ROLLOVER, answer, run
 from tests.computed import results, stored
 from tests.counted_fits import CountedFits
 from tests.energies import of, sure
+from tests.reading import read
 
 PLAIN = Settings()
 T01 = str(ROLLOVER).replace(".csv", "T01.gz")
 
 
 def rollover() -> History:
-    selection = Selection(parts=("box",))
-    return open_run([T01], selection).history(selection)
+    return read([T01], Selection(parts=("box",))).history
 
 
 def test_both_times_of_the_published_oscillator() -> None:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from d2rpick.choice.answers import suggest, suggest_at
 from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.of_run import suggest_of
-from d2rpick.choice.question import Reference, Settings, read
+from d2rpick.choice.question import Reference, Settings
 from d2rpick.choice.ranking import rank
 from d2rpick.choice.situation import examine
 from d2rpick.choice.trade_off import Offer, TradeOff, explore_of
@@ -24,6 +24,7 @@ from d2rpick.histories.run import Run
 from d2rpick.vibration.span import Fits
 from tests.command import ROOT
 from tests.energies import sure
+from tests.reading import read
 
 SAMPLES = {
     "energy.csv": Selection(),

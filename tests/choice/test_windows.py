@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from d2rpick.choice.answers import Suggestion, suggest, verify, verify_at
 from d2rpick.choice.flights import find_flights
-from d2rpick.choice.question import Settings, read
+from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.windows import (
     acceptable_windows,
@@ -31,7 +31,7 @@ from tests.command import ROLLOVER
 from tests.computed import results, stored
 from tests.energies import sure
 from tests.paper import OMEGA_2
-from tests.reading import read_history
+from tests.reading import read, read_history
 from tests.records import ENERGY, MODE, TIME, noisy
 
 positive = st.floats(0.1, 10.0)

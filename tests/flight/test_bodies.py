@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.choice.question import read
 from d2rpick.flight.bodies import Bodies, RigidBody, bodies_in_flight
 from d2rpick.flight.flight import Flight, find_flight, seen_flight
 from d2rpick.flight.position_error import MOST_OF_PATH, Drift
@@ -16,6 +15,7 @@ from d2rpick.histories.history import History
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection
 from tests.computed import results, stored
+from tests.reading import read
 from tests.records import known
 
 TIME = np.linspace(0.0, 1.0, 11)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from d2rpick.choice.question import Reference, read
+from d2rpick.choice.question import Reference
 from d2rpick.flight.flight import find_flight, seen_flight
 from d2rpick.flight.position_error import Drift, drift_in_flight, drift_of
 from d2rpick.flight.turning import Flying
@@ -16,6 +16,7 @@ from d2rpick.histories.history import EXACT, Momenta, Samples
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection
 from tests.computed import results, stored
+from tests.reading import read
 from tests.records import known
 
 TIME = np.linspace(0.0, 0.1, 401)

@@ -12,7 +12,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from d2rpick.choice.question import read
 from d2rpick.deck import read_inventory
 from d2rpick.deck.geometry import Placed, Placement
 from d2rpick.flight.flight import find_flight, seen_flight
@@ -23,6 +22,7 @@ from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection
 from tests.command import put
 from tests.computed import results, starter, stored
+from tests.reading import read
 from tests.records import known
 
 TIME = np.linspace(0.0, 0.1, 401)

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.answers import suggest
-from d2rpick.choice.question import Settings, read
+from d2rpick.choice.question import Settings
 from d2rpick.histories.balance import spring_energy, springs_among
 from d2rpick.histories.history import Samples
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run
 from tests.computed import stored
+from tests.reading import read
 
 TIME = np.linspace(0.0, 1.0, 50)
 PARTS = tuple(Part(i + 1, f"part {i + 1}") for i in range(4))
