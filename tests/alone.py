@@ -35,7 +35,7 @@ class _Watch:
             return
         names = args[:1] if event != "subprocess.Popen" else [args[1]] if isinstance(args[1], str) else args[1]
         for name in names:
-            if isinstance(name, str | bytes | os.PathLike) and is_beside(os.fsdecode(name)):
+            if isinstance(name, str | bytes | os.PathLike) and is_beside(os.path.abspath(os.fsdecode(name))):  # noqa: PTH100
                 self.opened.append(os.fsdecode(name))
                 raise AssertionError(f"{self.opened[-1]!r} lies beside the clone; tests/data holds what tests read")
 
@@ -44,14 +44,10 @@ WATCH = _Watch()
 sys.addaudithook(WATCH)
 
 
-def is_beside(name: str, root: Path = ROOT) -> bool:
-    """Whether a file is one of others, or lies beside the clone and is neither hidden nor needed by Python."""
-    return _lies_beside(os.path.abspath(name), root)  # noqa: PTH100  links stay
-
-
 @cache
-def _lies_beside(name: str, root: Path) -> bool:
-    path, parent = Path(name), root.parent
+def is_beside(name: str, root: Path = ROOT) -> bool:
+    """Whether a file of this full name is one of others, or beside the clone, not hidden and not needed by Python."""
+    path, parent = Path(os.path.normpath(name)), root.parent  # links stay
     if path.is_relative_to(REAL):
         return True
     if not path.is_relative_to(parent) or path.is_relative_to(root) or parent in (path, parent.parent):

@@ -14,6 +14,7 @@ from d2rpick.histories.history import History
 from d2rpick.histories.opening import Reader, Run, Selection, open_run, open_sources
 from d2rpick.histories.source import Source
 from tests.command import ROOT
+from tests.computed import stored
 
 SMALL = Portions(block=256, gap=32, window=64)
 
@@ -43,6 +44,11 @@ def read(names: Sequence[str], selection: Selection | None = None, input_format:
 
 
 _opened = cache(open_run)
+
+
+def solved(name: str, *parts: str) -> Reference:
+    """Read a run of a solver in tests/data, and of its energy that of these parts."""
+    return read([stored(name)], Selection(parts=parts))
 
 
 def read_history(names: Sequence[str], selection: Selection | None = None, input_format: str = "auto") -> History:

@@ -48,7 +48,6 @@ def name_of(path: Path) -> str:
 MODULES = {name_of(path): path for path in PACKAGE.rglob("*.py")}
 
 
-@cache
 def parsed(module: str) -> ast.Module:
     """The source of a module."""
     return ast.parse(MODULES[module].read_text("utf-8"))

@@ -13,9 +13,8 @@ from d2rpick.choice.situation import examine
 from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.histories.history import History
 from tests import paper
-from tests.computed import stored
 from tests.energies import codes, of, rollover, sure, vibration
-from tests.reading import read
+from tests.reading import solved
 
 PLAIN = Settings()
 
@@ -171,7 +170,7 @@ def test_what_is_chosen_in_a_window_is_verified(history: History, low: float, as
 
 @pytest.mark.parametrize("td", [0.72, 0.8, 0.87])
 def test_a_better_td_that_does_not_verify_is_not_named(td: float) -> None:
-    history = read([stored("faults/better_td_unverified.csv")]).history
+    history = solved("faults/better_td_unverified.csv").history
     assert holds(history, suggest(history, td, Settings()).better_pair, Settings())
 
 

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Callable
 from csv import DictReader
-from functools import cache
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from d2rpick.choice.answers import Verdict
 from d2rpick.choice.comparison import MOST_MOMENTUM_ERROR, Comparison, compare_runs
 from d2rpick.choice.judged_parts import rigid_parts
 from d2rpick.choice.of_run import compare_with, verify_of
-from d2rpick.choice.question import Reference, Settings
+from d2rpick.choice.question import Settings
 from d2rpick.choice.switched_run import switched_history
 from d2rpick.histories.history import History, Samples, Track
 from d2rpick.histories.opening import Selection, open_run
@@ -25,7 +24,7 @@ from tests.command import replayed as motion
 from tests.computed import results, stored
 from tests.energies import sure
 from tests.json_schemas import check_by_schema
-from tests.reading import read
+from tests.reading import read, solved
 
 TR, TD = 0.0135867, 0.0687534
 VERIFY = ("verify", "--no-verify", "--tr", "0.1", "--td", "0.37", "--part", "box")
@@ -421,14 +420,9 @@ def legs(run: str) -> list[str]:
     return [stored(name) for name in ("car_all_T01.gz", f"{run}_T02.gz", f"{run}_T03.gz")]
 
 
-@cache
-def reference(*parts: str) -> Reference:
-    return read([stored("carT01.gz")], Selection(parts=parts))
-
-
 def compared(run: str, *parts: str) -> Verdict:
     """Verdict on the car whose engine, battery and four wheels were six rigid bodies, or that was one."""
-    asked = reference(*parts)
+    asked = solved("carT01.gz", *parts)
     verdict = verify_of(asked, CAR_TR, CAR_TD, Settings())
     return compare_with(verdict, asked, asked.like(open_run(legs(run), Selection()), Selection(parts=parts)))
 

@@ -20,7 +20,7 @@ from d2rpick.histories.opening import Selection
 from tests.computed import stored
 from tests.drops import drop, written
 from tests.energies import sure
-from tests.reading import read
+from tests.reading import read, solved
 
 PLAIN = Settings(replay=False)  # no oscillator describes these runs, and none is sought
 BOX = Selection(parts=("box",))
@@ -34,10 +34,6 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> Reference:
 @pytest.fixture(scope="module")
 def plan(reference: Reference) -> Plan:
     return plan_of(reference, PLAIN)
-
-
-def real(name: str) -> Reference:
-    return read([stored(name)])
 
 
 def statuses(plan: Plan) -> list[str]:
@@ -188,7 +184,7 @@ def test_a_run_that_was_not_switched_is_not_taken_for_one(reference: Reference, 
 @pytest.mark.slow
 def test_the_flights_and_windows_of_the_computed_box() -> None:
     """Contacts as the solver wrote them, openradioss/car_drop/drop2_runs.csv."""
-    found = plan_of(real("drop2T01.gz"), PLAIN)
+    found = plan_of(solved("drop2T01.gz"), PLAIN)
     flights = [(0, 0.2858), (0.3022, 0.3386), (0.3394, 0.4196), (0.4206, 0.4800), (0.5020, 0.5966), (0.619, 0.6614)]
     for row, (start, end) in zip(found.flights, flights, strict=False):
         assert (row.start, row.end) == pytest.approx((start, end), abs=1e-3)
@@ -199,7 +195,7 @@ def test_a_landing_while_rigid_is_told() -> None:
     """Three windows planned from one reference: the third landed 5.4 ms early, while it was rigid."""
     legs = [stored(f"drop2_w123_T0{leg}.gz") for leg in range(1, 7)]
     done = [(0.0, 0.2838), (0.3654, 0.4176), (0.5046, 0.5946)]
-    found = plan_of(read(legs), PLAIN, done=done, before=real("drop2T01.gz"))
+    found = plan_of(read(legs), PLAIN, done=done, before=solved("drop2T01.gz"))
     moved = [row.done.moved for row in found.flights if row.done]
     assert moved == pytest.approx([0.0, -1.6e-3, -5.4e-3], abs=3e-4)
     again = plan_of(read(legs), PLAIN, done=done, before=read(legs))  # rigid times of that run are no flights
@@ -214,7 +210,7 @@ def test_a_landing_while_rigid_is_told() -> None:
 
 def test_the_switched_car_landed_as_computed() -> None:
     legs = [stored(f"car_all_T0{leg}.gz") for leg in range(1, 4)]
-    found = plan_of(read(legs), PLAIN, done=[(0.0496, 0.1464)], before=real("carT01.gz"))
+    found = plan_of(read(legs), PLAIN, done=[(0.0496, 0.1464)], before=solved("carT01.gz"))
     (moved,) = (row.done.moved for row in found.flights if row.done)
     assert moved == pytest.approx(0.5e-3, abs=1.5e-4)
 
@@ -284,7 +280,7 @@ def test_no_other_td_of_a_flight_reaches_back_beyond_a_landing(seed: int, tmp_pa
 
 @pytest.fixture(scope="module")
 def car() -> Reference:
-    return read([stored("carT01.gz")], Selection(parts=("1-14",)))
+    return solved("carT01.gz", "1-14")
 
 
 @pytest.mark.slow
@@ -321,6 +317,6 @@ def test_a_minimal_rigid_time_that_is_given_plans_both_one_after_the_other(car: 
 @pytest.mark.slow
 def test_a_window_of_more_than_half_the_longest_comes_first() -> None:
     """One after the other both are had with one more run; DROP2: 0.071 and then 0.091."""
-    found = plan_of(real("drop2T01.gz"), PLAIN)
+    found = plan_of(solved("drop2T01.gz"), PLAIN)
     assert statuses(found) == ["supported", "left-out", "supported", "re-plan", "re-plan", "left-out", "re-plan"]
     assert found.flights[4].rigid_time == pytest.approx(0.0906, abs=4e-4)  # a state each 0.4 ms

@@ -23,14 +23,12 @@ from d2rpick.choice.ranking import (
 )
 from d2rpick.choice.situation import examine
 from d2rpick.histories.history import History
-from d2rpick.histories.opening import Selection
 from d2rpick.report.formats import Shown
 from d2rpick.report.suggestion import as_table
 from d2rpick.vibration.span import Fits
 from tests import paper
-from tests.computed import stored
 from tests.energies import rollover, sure
-from tests.reading import read
+from tests.reading import solved
 from tests.records import ENERGY, TIME, vibration
 
 rows = st.lists(
@@ -70,18 +68,13 @@ def test_the_order_of_candidates(some: list[tuple[float, float, int, bool]]) -> 
         assert ranked == early + sorted(late, key=lambda row: -row[0]) + rest
 
 
-@cache
-def car(parts: str) -> History:
-    return read([stored("carT01.gz")], Selection(parts=(parts,))).history
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("parts", ["1-17", "1-14"])
 def test_tr_does_not_jump_when_td_moves_a_little(parts: str) -> None:
     """From 49.6 to 82.4 ms it did, as td moved by 3 ms, and gained nothing: the mean energy after td hardly differs."""
-    known, found = Fits(), []
+    history, known, found = solved("carT01.gz", parts).history, Fits(), []
     for td in np.arange(0.141, 0.1502, 0.0015).tolist():
-        situation = examine(car(parts), td, Settings(), known)
+        situation = examine(history, td, Settings(), known)
         best = sure(rank(find_candidates(situation)).chosen)
         assert sure(best.level_error) < 0.06
         found.append(best.tr)
@@ -90,7 +83,7 @@ def test_tr_does_not_jump_when_td_moves_a_little(parts: str) -> None:
 
 
 def test_of_times_alike_the_one_that_leaves_the_body_in_place_is_recommended() -> None:
-    situation = examine(car("1-17"), 0.12, Settings())
+    situation = examine(solved("carT01.gz", "1-17").history, 0.12, Settings())
     ranked = rank(find_candidates(situation))
     assert situation.bodies is not None
     judged, tr = ranked.judged, ranked.judged.moments.tr
@@ -262,7 +255,7 @@ def test_what_a_wrong_sign_would_cost_is_told() -> None:
 
 def test_a_tr_that_is_not_known_to_its_tolerance_is_fair() -> None:
     """Late in a damped record the level is so low that the misfit of the oscillator moves the crossing by much."""
-    history = read([stored("oscillator_referenceT01.gz")]).history
+    history = solved("oscillator_referenceT01.gz").history
     early, late = (suggest(history, td, Settings()) for td in (0.068753, 0.144191))
     for answer, wanted in ((early, "good"), (late, "fair")):
         best, quality = answer.chosen, answer.quality

@@ -22,10 +22,10 @@ from d2rpick.models.box_run import history_of, simulate
 from d2rpick.report.suggestion import outlook
 from tests import paper
 from tests.command import ENERGY, ROLLOVER, answer, run
-from tests.computed import results, stored
+from tests.computed import results
 from tests.counted_fits import CountedFits
 from tests.energies import of, sure
-from tests.reading import read
+from tests.reading import read, solved
 
 PLAIN = Settings()
 T01 = str(ROLLOVER).replace(".csv", "T01.gz")
@@ -177,7 +177,7 @@ def test_the_means_of_the_computed_rollover_lie_between_the_expected_ones() -> N
 
 def test_the_means_of_the_computed_car_are_expected() -> None:
     """Shells and beams until the landing; 96 % were stated for all parts, springs among them, for 89 % computed."""
-    history = read([stored("carT01.gz")], Selection(parts=("1-17",))).history
+    history = solved("carT01.gz", "1-17").history
     situation = examine(history, 0.1464, PLAIN)
     with results("car_runs.csv").open() as table:
         rows = [row for row in csv.DictReader(table) if row["run"].startswith(("car_a", "car_b_all", "car_full"))]

@@ -28,10 +28,10 @@ from d2rpick.histories.opening import Selection
 from d2rpick.vibration.modes import Mode, Modes
 from tests import chain
 from tests.command import ROLLOVER
-from tests.computed import results, stored
+from tests.computed import results
 from tests.energies import sure
 from tests.paper import OMEGA_2
-from tests.reading import read, read_history
+from tests.reading import read_history, solved
 from tests.records import ENERGY, MODE, TIME, noisy
 
 positive = st.floats(0.1, 10.0)
@@ -86,7 +86,7 @@ def landings(name: str, column: str) -> Iterator[tuple[str, float]]:
 
 def test_the_landings_of_the_switched_car_lie_within_the_margin() -> None:
     """All that were switched in the flight and back before the contact."""
-    history = read([stored("carT01.gz")]).history
+    history = solved("carT01.gz").history
     flight = find_flights(history)[-1]
     margin = margin_before_contact(history, flight)
     starts, ends = dict(landings("car_runs.csv", "tr_s")), dict(landings("car_runs.csv", "td_s"))
@@ -104,7 +104,7 @@ def test_the_landings_of_the_switched_car_lie_within_the_margin() -> None:
     ("run", "column", "end"), [("drop2_w2", "dland4_ms", 0.4196), ("drop2_w3", "dland7_ms", 0.5966)]
 )
 def test_the_landings_of_the_switched_box_lie_within_the_margin(run: str, column: str, end: float) -> None:
-    history = read([stored("drop2T01.gz")]).history
+    history = solved("drop2T01.gz").history
     (flight,) = (one for one in find_flights(history) if one.end == pytest.approx(end, abs=1e-3))
     moved = abs(dict(landings("drop2_runs.csv", column))[run]) / 1e3
     assert 1e-3 < moved < margin_before_contact(history, flight).time

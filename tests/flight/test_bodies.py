@@ -13,9 +13,8 @@ from d2rpick.flight.flight import Flight, find_flight, seen_flight
 from d2rpick.flight.position_error import MOST_OF_PATH, Drift
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Part
-from d2rpick.histories.opening import Selection
-from tests.computed import results, stored
-from tests.reading import read
+from tests.computed import results
+from tests.reading import solved
 from tests.records import known
 
 TIME = np.linspace(0.0, 1.0, 11)
@@ -72,7 +71,7 @@ def test_the_limit_is_that_of_the_bodies_whose_parts_move() -> None:
 
 @cache
 def car(parts: str) -> tuple[History, Flight]:
-    history = read([stored("carT01.gz")], Selection(parts=(parts,))).history
+    history = solved("carT01.gz", parts).history
     return history, find_flight(history, 0.14, None, seen_flight(history, 0.14), None)
 
 

@@ -25,9 +25,10 @@ from d2rpick.flight.momentum import (
 from d2rpick.flight.window import FreeFlight
 from d2rpick.histories.history import EXACT, Momenta, Precision, Samples
 from d2rpick.histories.names import Part
-from d2rpick.histories.opening import Run, Selection, open_run
+from d2rpick.histories.opening import Run, Selection
 from tests.command import BOX, ENERGY, GLSTAT, answer, refused, run
 from tests.computed import stored
+from tests.reading import read, solved
 from tests.records import known, printed
 
 PARTS = (Part(1, "box"), Part(2, "step"), Part(3, "sled"))
@@ -284,7 +285,7 @@ def test_digits_that_do_not_resolve_a_thousandth_of_the_change_tell_nothing() ->
 
 
 def test_on_the_rollover_the_box_alone_does_not_fly() -> None:
-    run = open_run([BOX])
+    run = read([BOX]).run
     (momenta,) = (one for one in run.momenta(run.parts[:1], None) if one.parts)
     assert [flight_of(momenta, (0,), td) for td in np.linspace(0.1, 0.38, 15)] == [None] * 15
 
@@ -304,23 +305,19 @@ def test_a_flight_after_a_computed_load_begins_when_the_load_is_over(run: str, s
     assert not found.end_seen
 
 
-def opened(name: str) -> Run:
-    return open_run([name], Selection())
-
-
 def titles(found: Run, *, flying: bool) -> set[str]:
     return {part.title for part in (flying_parts(found) if flying else deformable_parts(found))}
 
 
 def test_the_box_and_the_step_on_it_fly_and_the_sled_does_not() -> None:
-    assert titles(opened(BOX), flying=True) == {"box", "step"}
+    assert titles(read([BOX]).run, flying=True) == {"box", "step"}
     found = answer("suggest", "--part", "flying", "--td", "0.37", BOX)
     assert found["history"]["parts"] == answer("suggest", "--part", "1,2", "--td", "0.37", BOX)["history"]["parts"]
     assert found["recommended"] == answer("suggest", "--part", "1,2", "--td", "0.37", BOX)["recommended"]
 
 
 def test_all_parts_of_the_car_fly_but_the_ground() -> None:
-    car = opened(stored("carT01.gz"))
+    car = solved("carT01.gz").run
     everything = titles(car, flying=False)
     assert "ground" not in everything
     assert len(everything) == 17
@@ -328,7 +325,7 @@ def test_all_parts_of_the_car_fly_but_the_ground() -> None:
 
 
 def test_words_may_stand_beside_numbers_and_are_read_once() -> None:
-    selection = with_parts_by_number(opened(BOX), Selection(parts=("box", "FLYING")))
+    selection = with_parts_by_number(read([BOX]).run, Selection(parts=("box", "FLYING")))
     assert selection.parts == ("box", "1", "2")
 
 

@@ -1,22 +1,19 @@
 """How far a body is out of place at td: of bodies that turn, of those that tell nothing, and of a solver's runs."""
 
 import csv
-from functools import cache
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from d2rpick.choice.question import Reference
 from d2rpick.flight.flight import find_flight, seen_flight
 from d2rpick.flight.position_error import Drift, drift_in_flight, drift_of
 from d2rpick.flight.turning import Flying
 from d2rpick.histories.history import EXACT, Momenta, Samples
 from d2rpick.histories.names import Part
-from d2rpick.histories.opening import Selection
-from tests.computed import results, stored
-from tests.reading import read
+from tests.computed import results
+from tests.reading import solved
 from tests.records import known
 
 TIME = np.linspace(0.0, 0.1, 401)
@@ -141,11 +138,6 @@ def test_without_rotation_a_slow_swing_passes_for_nothing() -> None:
     slides = np.zeros((TIME.size, *PLACES.shape))
     slides[:, ENGINE, 0] = 0.02 * np.sin(np.pi * TIME / TIME[-1])
     assert not drift(momenta(np.zeros(3), slides)).at_least
-
-
-@cache
-def solved(name: str, parts: str) -> Reference:
-    return read([stored(name)], Selection(parts=(parts,)))
 
 
 def computed_drift(name: str, parts: str, flight: tuple[float, float]) -> Drift:

@@ -19,10 +19,9 @@ from d2rpick.flight.position_error import Drift, drift_in_flight, drift_of
 from d2rpick.flight.turning import Flying
 from d2rpick.histories.history import EXACT, Momenta, Samples
 from d2rpick.histories.names import Part
-from d2rpick.histories.opening import Selection
 from tests.command import put
-from tests.computed import results, starter, stored
-from tests.reading import read
+from tests.computed import results, starter
+from tests.reading import solved
 from tests.records import known
 
 TIME = np.linspace(0.0, 0.1, 401)
@@ -188,7 +187,7 @@ def test_every_switched_run_of_the_car_is_as_far_off_and_turned_as_computed(tmp_
 
 @cache
 def of_the_car(parts: tuple[str, ...], where: Placement) -> Drift:
-    history = read([stored("carT01.gz")], Selection(parts=parts)).history
+    history = solved("carT01.gz", *parts).history
     found = drift_in_flight(history, find_flight(history, 0.14, None, seen_flight(history, 0.14), None), None, where)
     assert found is not None
     return found

@@ -1,34 +1,27 @@
 """What is said of parts that still swing as a body becomes rigid: by the flight so far, without td."""
 
-from functools import cache
-
 import numpy as np
 import pytest
 
 from d2rpick.deck import read_inventory
 from d2rpick.flight.flight import Flight
 from d2rpick.flight.position_error import drift_in_flight
-from d2rpick.histories.history import EXACT, History, Momenta
-from d2rpick.histories.names import Part, Selection
-from d2rpick.histories.opening import open_run
+from d2rpick.histories.history import EXACT, Momenta
+from d2rpick.histories.names import Part
 from d2rpick.running.drive import Looks
 from d2rpick.running.sequence import Window
 from d2rpick.running.swing import swing_in
-from tests.command import ROOT, run
+from tests.command import ENERGY, ROOT, run
+from tests.reading import read_history, solved
 from tests.records import known, table
 
 CAR = ROOT / "tests" / "data" / "carT01.gz"
 FREE, TD = 0.0385, 0.1464
 
 
-@cache
-def car() -> History:
-    return open_run([str(CAR)]).history(Selection())
-
-
 @pytest.mark.parametrize("tr", [0.0605, 0.0676, 0.075, 0.09])
 def test_what_a_flight_shows_up_to_tr_is_about_the_error_at_td(tr: float) -> None:
-    history = car()
+    history = solved("carT01.gz").history
     (momenta,) = (one for one in history.momenta if one.parts is not None)
     moving = tuple(known(momenta.parts)[i] for i in momenta.moving)
     whole = known(drift_in_flight(history, Flight(FREE, TD, "momentum", moving)))
@@ -57,12 +50,12 @@ def test_of_two_parts_the_most_that_the_heavy_one_may_be_off_is_told(swings: flo
 
 
 def test_nothing_is_said_where_no_momenta_of_parts_tell() -> None:
-    history = open_run([str(ROOT / "sample_data" / "energy.csv")]).history(Selection())
+    history = read_history([ENERGY])
     assert swing_in(history, 0.01, 0.03) is None
 
 
 def test_it_is_said_before_the_switch_where_the_flight_is_too_short_for_it() -> None:
-    parts = [part.id for part in open_run([str(CAR)]).parts]
+    parts = [part.id for part in solved("carT01.gz").run.parts]
     looks = Looks(parts, read_inventory(str(ROOT / "sample_data" / "flying_box" / "BOX_0000.rad")))
     short, long = (looks.swing([CAR], Window(FREE, 0.0676, td, None, 0.024)) for td in (0.12, 0.25))
     assert short.startswith("tr = 0.0676: engine still swings against the others")

@@ -20,7 +20,7 @@ from d2rpick.vibration.part_signs import MOST_UNSIGNED, PartMotion, SignedParts,
 from d2rpick.vibration.waves import Waves
 from tests import chain
 from tests.command import BOX
-from tests.computed import stored
+from tests.reading import solved
 from tests.records import known, printed
 
 PLAIN = Settings()
@@ -176,8 +176,7 @@ def test_the_signs_of_both_springs_are_right_in_every_switched_run() -> None:
 
 
 def read_t01() -> History:
-    selection = Selection(parts=("spring1,spring2",))
-    return open_run([stored("chain_referenceT01.gz")], selection).history(selection)
+    return solved("chain_referenceT01.gz", "spring1,spring2").history
 
 
 @pytest.mark.slow
