@@ -111,7 +111,7 @@ class Offer:
         ranked = rank(find_candidates(self.situation, in_flight=True)) if again else self.candidates
         return suggest_at(self.situation, with_better=False, ranked=ranked)
 
-    @property
+    @cached_property
     def quality(self) -> Quality | None:
         """How good the recommended pair is."""
         return self.answer.quality
