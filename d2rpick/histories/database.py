@@ -128,7 +128,7 @@ class Branched(Database):
 # An interval so many times the median one is no output interval.
 _LONG = 30.0
 # States of which the steps are looked at together: so many stay in the cache, and need no fresh memory.
-_PIECE: Final = 1 << 13
+_PIECE: Final = 1 << 15
 
 
 class Legs:

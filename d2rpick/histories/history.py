@@ -264,9 +264,10 @@ class History:
             found = f"{where}: time has shape {time.shape}, energy {energy.shape}"
             raise HistoryError(f"{found}; one of each per state expected")
         for name, values in (("time", time), ("energy", energy)):
-            bad = np.flatnonzero(~np.isfinite(values))
-            if bad.size:
-                found = f"{where}: {name} of state {bad[0] + 1} is {values[bad[0]]}"
+            known = np.isfinite(values)
+            if not known.all():
+                bad = int(known.argmin())
+                found = f"{where}: {name} of state {bad + 1} is {values[bad]}"
                 raise HistoryError(f"{found}, a finite number was expected")
         if np.any(time[1:] <= time[:-1]):
             state = int(np.argmax(np.diff(time) <= 0)) + 1

@@ -185,6 +185,7 @@ ROWS = (
     Row("loop over lines / glstat, 1e5 states", reading("glstat_to_loop"), least=8.0),
     Row("glstat, 1e5 states / bare read", reading("glstat_to_bare_read"), most=4.0),
     Row("glstat, 1e5 states / version 0.6.0, CPU", reading("glstat_to_first"), most=1.3),
+    Row("suggest of a glstat, 1e5 states / version 0.6.0, CPU", reading("suggest_to_first"), most=1.1),
     Row("loop over lines / matsum, 2000 states, 500 parts", reading("matsum_to_loop", None), least=5.0),
     Row("loop over lines / matsum, 2000 states, 1 part", reading("matsum_to_loop", 2501), least=25.0),
     Row("lasso-python / binout, 1e5 states", reading("lasso_to_binout"), least=12.0),
@@ -198,6 +199,7 @@ ROWS = (
     Row("suggest of that csv: peak memory [MB]", reading("suggest_memory"), most=150.0),
     Row("csv, 1e6 rows, 20 columns / pandas.read_csv", reading("csv_to_pandas", 20), most=2.0),
     Row("hdf5, 1e6 rows / h5py alone: processes", reading("hdf5_to_h5py"), most=2.0),
+    Row("hdf5, 1e6 rows / h5py alone, in process", reading("hdf5_to_h5py_here"), most=5.0),
     Row("writing csv, 1e6 rows / pandas to_csv", reading("write_to_pandas"), most=1.0),
     Row("extract of 1e6 rows (process) / pandas to_csv alone", reading("extract_to_pandas"), most=1.0),
 )

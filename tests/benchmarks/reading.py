@@ -22,7 +22,7 @@ import numpy as np
 
 from d2rpick.histories.formats import csv_table, hdf5_file
 from d2rpick.histories.opening import Selection, open_run
-from tests.benchmarks.timing import ROOT, output, ratio, seconds
+from tests.benchmarks.timing import ROOT, environment, output, processor_seconds, ratio, seconds
 from tests.made_binout import GLSTAT, LsdaWriter, values
 from tests.text_files import glstat_text, matsum_text
 
@@ -56,14 +56,39 @@ def glstat_to_bare_read() -> float:
     return ratio(lambda: _read(file), lambda: _bare_read(file), _ROUNDS)
 
 
-def glstat_to_first() -> float | None:
-    """CPU of reading the same glstat over that of version 0.6.0, as the git history has it; None without that."""
+@cache
+def _first() -> Path | None:
+    """Folder of version 0.6.0, compiled, as the git history has it; None without that."""
     packed = subprocess.run(["git", "archive", _FIRST, "d2rpick"], cwd=ROOT, capture_output=True, check=False)
     if packed.returncode:
         return None
     then = Path(_folder.name, "then")
     with tarfile.open(fileobj=io.BytesIO(packed.stdout)) as archive:
         archive.extractall(then, filter="data")
+    subprocess.run([sys.executable, "-m", "compileall", "-q", then], check=True)
+    return then
+
+
+def suggest_to_first() -> float | None:
+    """CPU of `suggest` of a glstat of 1e5 states of one free oscillator over that of version 0.6.0: processes."""
+    then, time = _first(), np.linspace(0, 9, _STATES)
+    if then is None:
+        return None
+    file = _made("oscillator", glstat_text(time, (np.exp(-0.1 * time) * np.cos(20 * time)) ** 2))
+
+    def suggesting(root: Path) -> Callable[[], object]:
+        command = [sys.executable, "-m", "d2rpick", "suggest", "--td", "8", str(file)]
+        clean = {**environment(), "PYTHONPATH": str(root)}
+        return lambda: subprocess.run(command, check=True, capture_output=True, cwd=root, env=clean)
+
+    return ratio(suggesting(ROOT), suggesting(then), _ROUNDS, cost=processor_seconds)
+
+
+def glstat_to_first() -> float | None:
+    """CPU of reading a glstat of 1e5 states over that of version 0.6.0; None without the git history."""
+    then = _first()
+    if then is None:
+        return None
 
     def reading(root: Path, module: str) -> Callable[[], float]:
         code = (
@@ -193,13 +218,24 @@ def suggest_memory() -> float:
 
 def hdf5_to_h5py() -> float:
     """Reading an hdf5 of 1e6 rows over h5py alone: processes."""
-    file = _folder_file("rows.h5")
-    if not file.exists():
-        time, energy = _rows(_ROWS, 2).T
-        file.write_bytes(hdf5_file.write({"time": time, "internal_energy": energy}))
-    ours = "import sys; from d2rpick.choice.of_run import read; read(sys.argv[1:])"
+    file = _hdf5()
+    ours = "import sys; from d2rpick.choice.question import read; read(sys.argv[1:])"
     alone = "import sys, h5py; file = h5py.File(sys.argv[1]); file['time'][()], file['internal_energy'][()]"
     return ratio(lambda: output("-c", ours, str(file)), lambda: output("-c", alone, str(file)), _ROUNDS)
+
+
+def hdf5_to_h5py_here() -> float:
+    """The same in this process, with the child process that looks whether the library crashes on the file."""
+    import h5py
+
+    file = _hdf5()
+
+    def alone() -> tuple[Samples, Samples]:
+        with h5py.File(file) as opened:
+            return opened["time"][()], opened["internal_energy"][()]
+
+    np.testing.assert_array_equal(_read(file).energy, alone()[1])
+    return ratio(lambda: _read(file), alone, _ROUNDS)
 
 
 def extract_to_pandas() -> float:
@@ -310,6 +346,12 @@ def _matsum() -> Path:
     ids: Sequence[int] = [10 * part + 1 for part in range(_PARTS)]
     energies = np.random.default_rng(2).normal(size=(_PART_STATES, _PARTS))
     return _made("matsum", matsum_text(np.linspace(0, 1, _PART_STATES), ids, energies))
+
+
+@cache
+def _hdf5() -> Path:
+    time, energy = _rows(_ROWS, 2).T
+    return _made("rows.h5", hdf5_file.write({"time": time, "internal_energy": energy}))
 
 
 @cache
