@@ -12,7 +12,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 
 from d2rpick.base.graph import reached
-from d2rpick.deck.expression import ExpressionError, Number, evaluate, names_in, number
+from d2rpick.deck.expression import REFERENCE, ExpressionError, Number, evaluate, names_in, number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -62,7 +62,7 @@ class Value(NamedTuple, Generic[T]):
     parameters: tuple[str, ...] = ()
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Row:
     """One data line of a card."""
 
@@ -105,8 +105,7 @@ def _between_commas(text: str) -> Iterator[tuple[int, str]]:
     yield start, text[start:]
 
 
-_LISTED = re.compile(r"\s*[RIC]\s*&?\s*\w+\s*", re.ASCII | re.IGNORECASE)
-_REFERENCE = re.compile(r"&\s*([a-z_]\w*)", re.ASCII | re.IGNORECASE)
+_LISTED = r"(?ai)\s*[RIC]\s*&?\s*\w+\s*"  # compiled where it is needed
 _PAIRS = 4  # name and value, repeated in a line of *PARAMETER
 
 
@@ -125,7 +124,7 @@ class Definition(NamedTuple):
 _Table = dict[str, list[Definition]]
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class _Whole:
     """What all files of a deck share."""
 
@@ -187,7 +186,7 @@ class Scope:
             found = self.definition(reference[1].lower())
             return found.value if found and isinstance(found.value, str) else reference[0]
 
-        return _REFERENCE.sub(value, text) if "&" in text else text
+        return re.sub(REFERENCE, value, text) if "&" in text else text
 
     def define(self, keyword: str, rows: Sequence[Row]) -> None:
         """Take over the definitions of a ``*PARAMETER`` card."""
@@ -264,7 +263,7 @@ def _expressions(rows: Sequence[Row]) -> Iterator[tuple[Row, str, str]]:
     pending: tuple[Row, str, str] | None = None
     for row in rows:
         before, comma, after = row.text.partition(",")
-        if comma and _LISTED.fullmatch(before):
+        if comma and re.fullmatch(_LISTED, before):
             name, text = before.strip(), after
         else:
             name, text = row.text[: row.width].strip(), row.text[row.width :]
@@ -300,7 +299,7 @@ class Transform(NamedTuple):
         return Transform(node, part, material, set_, rest, self.time * outer.time, scaled, moved)
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Card:
     """A keyword block that matters: ``name`` in upper case without ``*`` and format suffix."""
 

@@ -21,7 +21,7 @@ _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d+))?
 _TOKEN: Final = (  # compiled where it is needed
     r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?)|(?P<name>&?\s*[a-z_]\w*)|(?P<sign>\*\*|[-+*/(),]))"
 )
-_NAME = re.compile(r"&\s*([a-z_]\w*)", re.ASCII | re.IGNORECASE)
+REFERENCE: Final = r"(?ai)&\s*([a-z_]\w*)"  # this too
 _DEEPEST = 50  # nested parentheses; no deck needs more, and Python's stack is not to be tried
 _LONGEST = 40  # characters of a number: more are no number of a deck
 _LONGEST_EXPRESSION = 2000
@@ -67,7 +67,7 @@ def names_in(text: str) -> tuple[str, ...]:
     >>> names_in("-&tEnd/6.0+&dt")
     ('tend', 'dt')
     """
-    return tuple(name.lower() for name in _NAME.findall(text)) if "&" in text else ()
+    return tuple(name.lower() for name in re.findall(REFERENCE, text)) if "&" in text else ()
 
 
 def evaluate(text: str, lookup: Callable[[str], Number]) -> Number:

@@ -64,7 +64,7 @@ class PartSet(NamedTuple):
         )
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Parts:
     """Parts by id with material, title and section; part sets by id (None: of a kind that is not read).
 

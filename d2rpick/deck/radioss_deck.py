@@ -92,7 +92,7 @@ class Start(NamedTuple):
     group: int
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Leg:
     """One engine run: its name and number as /RUN gives them, its end, the main nodes it switches, its step limit."""
 
@@ -213,7 +213,7 @@ class PartLine(NamedTuple):
     subset: int
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Starter:
     """What a starter deck says about its rigid bodies; by its ``blocks`` from the files ``sources``."""
 

@@ -47,13 +47,14 @@ class Flaw(NamedTuple):
 
 HEAD: Final = 256 * 1024  # bytes in which a file shows what it is
 _KEYWORD: Final = re.compile(rb"^[*/]", re.MULTILINE)
-_STARTER: Final = re.compile(rb"^/BEGIN", re.MULTILINE | re.IGNORECASE)
-_ENGINE: Final = re.compile(rb"^/RUN/", re.MULTILINE | re.IGNORECASE)
-_NUMBERED: Final = re.compile(r"(.+)_(\d{4})\.rad", re.IGNORECASE | re.DOTALL)
-_NAME: Final = re.compile(rb"^/BEGIN[^\n]*\n(?:[#$][^\n]*\n)*([^\n]*)|^/RUN/([^/\n]+)", re.MULTILINE | re.IGNORECASE)
+# Those of files of Radioss are compiled where they are needed.
+_STARTER: Final = rb"(?mi)^/BEGIN"
+_ENGINE: Final = rb"(?mi)^/RUN/"
+_NUMBERED: Final = r"(?is)(.+)_(\d{4})\.rad"
+_NAME: Final = rb"(?mi)^/BEGIN[^\n]*\n(?:[#$][^\n]*\n)*([^\n]*)|^/RUN/([^/\n]+)"
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Run:
     """The starter deck, where it was found, and the legs in the order of their numbers; ``deck`` has the files."""
 
@@ -76,7 +77,7 @@ class Run:
 def recognises(head: bytes) -> bool:
     """Whether a file that begins like this is a starter deck or an engine file."""
     first = _KEYWORD.search(head)
-    return first is not None and first[0] == b"/" and bool(_STARTER.search(head) or _ENGINE.search(head))
+    return first is not None and first[0] == b"/" and bool(re.search(_STARTER, head) or re.search(_ENGINE, head))
 
 
 def run_files(path: str) -> list[str]:
@@ -100,17 +101,18 @@ def run_files(path: str) -> list[str]:
     except (OSError, ValueError):
         return []  # said by who reads it
     name = _run_name(path, head)
-    alike = (one for one in beside if one.startswith(name) and (match := _NUMBERED.fullmatch(one)) and match[1] == name)
-    files = [str(folder / one) for one in alike if (folder / one).is_file()]
+    numbered = (re.fullmatch(_NUMBERED, one) for one in beside if one.startswith(name))
+    alike = (folder / match[0] for match in numbered if match and match[1] == name)
+    files = [str(one) for one in alike if one.is_file()]
     return files if any(Path(path).samefile(one) for one in files) else [path, *files]
 
 
 def _run_name(path: str, head: bytes) -> str:
     """Name of a run by that of its file, else by what stands in it."""
-    numbered = _NUMBERED.fullmatch(os.path.basename(path))  # noqa: PTH119  start-up
+    numbered = re.fullmatch(_NUMBERED, os.path.basename(path))  # noqa: PTH119  start-up
     if numbered:
         return numbered[1]
-    found = _NAME.search(head)
+    found = re.search(_NAME, head)
     return (found[1] or found[2] or b"").decode("latin-1").strip() if found else ""
 
 
@@ -130,9 +132,9 @@ def read_run(path: str, content: bytes | None = None) -> Run:
         if not recognises(head):
             raise DeckError(f"{name}: no /BEGIN or /RUN was found, a file of a Radioss run was expected")
         run.deck.sources.append(source)
-        if _ENGINE.search(head):
+        if re.search(_ENGINE, head):
             run.legs += read_legs(source)
-        if _STARTER.search(head):
+        if re.search(_STARTER, head):
             run.starter = run.starter or Starter()
             _read_starter(source, run, ())
         else:
@@ -176,7 +178,7 @@ def _include(card: Card, source: SourceFile, run: Run, chain: tuple[str, ...]) -
         _read_starter(run.included[path], run, chain)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class LegSwitch(SwitchSet):
     """Bodies switched at the beginning of a leg, at ``at``; ``stop_field`` is where that time is written."""
 
@@ -194,7 +196,7 @@ class LegSwitch(SwitchSet):
         return self.stop_field or self.card.here
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class RunWindows:
     """Windows of a run, the cards that make them, and the parts of the bodies by main node, where they are known."""
 

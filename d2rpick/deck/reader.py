@@ -98,7 +98,7 @@ _DEEPEST = 60  # includes in includes
 _MOST_FILES = 10_000
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Deck:
     """A deck as read: ``cards`` that matter, ``disabled`` ones (*COMMENT), encrypted blocks, includes.
 

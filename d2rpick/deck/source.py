@@ -344,7 +344,7 @@ class SourceFile:
         return line
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Block:
     """A keyword with all lines up to the next one, or an encrypted block: a place in a file."""
 

@@ -72,7 +72,7 @@ class Header(NamedTuple):
     offset: Value[float]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SwitchSet:
     """One switching card as read: its header where it has one, and its parts.
 

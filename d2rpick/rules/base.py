@@ -82,7 +82,7 @@ class Unreadable(NamedTuple):
         return f"{self.deck}: {one_line(self.error)}" if self.code == INTERNAL_ERROR else one_line(self.error)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Case:
     """A deck as the rules see it; ``judge`` is given when there is an energy history to judge windows by."""
 
@@ -167,7 +167,7 @@ class Case:
         return tuple((card, card.real(card.rows[0], 0)) for card in cards)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class RunCase(Case):
     """The starter deck and the legs, with the windows that they make."""
 
