@@ -50,7 +50,6 @@ def test_no_peak_of_noise_that_is_nearer_than_the_better_pair_saves_anything(see
 
 
 @pytest.mark.slow
-@settings(max_examples=25, deadline=None)
 @given(st.floats(-50, 50), st.sampled_from([1e-3, 1.0, 1e3]), st.sampled_from([1e-6, 1.0, 1e6]))
 def test_units_do_not_matter(shift: float, unit: float, joule: float) -> None:
     plain = vibration(decay=0.3)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 import d2rpick as d2
@@ -127,7 +127,6 @@ def smooth(seed: int, waves: int, digits: int) -> Momenta:
 
 
 @pytest.mark.slow
-@settings(max_examples=20, deadline=None)
 @given(
     start=st.floats(0.04, 0.16),
     end=st.floats(0.26, 0.36),
@@ -164,7 +163,6 @@ def test_the_flight_of_two_bodies_is_found_to_a_few_states_whatever_they_exchang
     assert found.end_seen
 
 
-@settings(max_examples=20, deadline=None)
 @given(
     td=st.floats(0.1, 0.32),
     frequency=st.floats(20.0, 300.0),

@@ -4,7 +4,7 @@ import csv
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from d2rpick.flight.flight import find_flight, seen_flight
@@ -57,7 +57,6 @@ def drift(found: Momenta, masses: Samples = MASSES) -> Drift:
 
 
 @pytest.mark.slow
-@settings(max_examples=25, deadline=None)
 @given(vectors, vectors, st.floats(0.0, 0.09))
 def test_a_body_that_turns_is_off_by_the_mass_share_of_what_slides_in_it(
     turn: Samples, way: Samples, start: float
@@ -121,7 +120,6 @@ def test_parts_that_are_no_body_at_all_tell_nothing() -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=20, deadline=None)
 @given(st.floats(0.25, 4.0).filter(lambda periods: abs(periods - 1) > 0.2), vectors, st.floats(0.0, 6.0))
 def test_a_swing_of_less_than_a_period_makes_the_error_a_lower_bound(
     periods: float, turn: Samples, phase: float

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from d2rpick.histories.samples import find_crossings, find_turns, first_above, narrow, outline
@@ -101,7 +101,6 @@ def test_extrema_are_where_the_slope_changes_sign(energy: list[int]) -> None:
     assert (not at.size) == bool(monotone)
 
 
-@settings(max_examples=30)
 @given(st.floats(1e-3, 1e3), st.floats(-1e3, 1e3))
 def test_a_straight_line_is_crossed_where_it_is(slope: float, offset: float) -> None:
     time = np.linspace(0, 1, 11)

@@ -128,7 +128,6 @@ def test_momentum_and_angular_momentum_change_by_the_impulses_alone(
         motion.move()
 
 
-@settings(max_examples=20, deadline=None)
 @given(TIMES)
 def test_the_switch_to_rigid_keeps_both_momenta_and_loses_kinetic_energy(tr: float) -> None:
     motion = at(tr)
@@ -192,7 +191,6 @@ def test_while_it_is_rigid_the_box_keeps_its_energy_and_computes_no_bars() -> No
     assert switched.bar_updates == pytest.approx(steps * of_step + steps / 3 * of_box, rel=0.01)
 
 
-@settings(max_examples=25, deadline=None)
 @given(ANGLES, st.integers(0, 2**32 - 1))
 def test_bars_turn_with_their_points_and_push_nothing_as_a_whole(angle: float, seed: int) -> None:
     structure = build(COARSE)

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
@@ -110,7 +110,6 @@ def test_two_modes_are_taken_for_one_in_at_most_5_percent() -> None:
     st.floats(-6, 6).map(lambda power: 10**power),
     st.floats(-6, 6).map(lambda power: 10**power),
 )
-@settings(max_examples=40)
 def test_shifting_and_scaling_the_record_shifts_and_scales_the_mode(shift: float, slower: float, larger: float) -> None:
     time = (TIME[:600] + shift / 1e3) * slower
     found, mode = accepted(time, larger * ENERGY[:600])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from d2rpick.vibration import measures
@@ -12,7 +12,6 @@ from tests import paper
 from tests.records import MODES, replayed_residual
 
 
-@settings(max_examples=80, deadline=None)
 @given(MODES, st.floats(0, 3), st.floats(0, 3))
 def test_measures_by_formula_are_those_of_the_motion(mode: Mode, tr: float, window: float) -> None:
     td = tr + window
@@ -40,7 +39,6 @@ def test_the_published_pair_loses_nearly_all_vibration() -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None)
 @given(MODES, st.floats(0, 3), st.floats(0, 3))
 def test_the_timing_tolerance_is_where_the_error_has_grown(mode: Mode, tr: float, window: float) -> None:
     td = tr + window

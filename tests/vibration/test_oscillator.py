@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
@@ -54,7 +54,6 @@ def test_free_motion_is_the_published_formula() -> None:
     np.testing.assert_allclose(state.y, v0 / (1 + beta) * (s - swing), atol=1e-15)
 
 
-@settings(max_examples=40, deadline=None)
 @given(oscillators, states, st.floats(0.1, 3.0))
 def test_free_motion_agrees_with_an_integrator(oscillator: Oscillator, start: State, periods: float) -> None:
     m, mass, k, alpha = oscillator.frame_mass, oscillator.mass, oscillator.stiffness, oscillator.alpha
@@ -70,7 +69,6 @@ def test_free_motion_agrees_with_an_integrator(oscillator: Oscillator, start: St
     np.testing.assert_allclose(np.stack(oscillator.free(start, end)), found.y[:, -1], atol=room, rtol=1e-9)
 
 
-@settings(max_examples=60, deadline=None)
 @given(oscillators, states, st.floats(0, 5), st.floats(0, 5))
 def test_two_steps_are_one(oscillator: Oscillator, start: State, first: float, second: float) -> None:
     whole = oscillator.free(start, first + second)
@@ -78,7 +76,6 @@ def test_two_steps_are_one(oscillator: Oscillator, start: State, first: float, s
     np.testing.assert_allclose(np.stack(parts), np.stack(whole), atol=1e-9 * scale(oscillator, start))
 
 
-@settings(max_examples=60, deadline=None)
 @given(oscillators, states, st.floats(0, 5))
 def test_the_centre_of_mass_ignores_the_switch(oscillator: Oscillator, start: State, elapsed: float) -> None:
     def momentum(state: State) -> float:
@@ -91,7 +88,6 @@ def test_the_centre_of_mass_ignores_the_switch(oscillator: Oscillator, start: St
     assert float(rigid.vy) == float(rigid.vz)
 
 
-@settings(max_examples=60, deadline=None)
 @given(states)
 def test_without_damping_energy_is_kept(start: State) -> None:
     oscillator = Oscillator(stiffness=3.0, mass=2.0, frame_mass=0.7)
@@ -100,7 +96,6 @@ def test_without_damping_energy_is_kept(start: State) -> None:
     np.testing.assert_allclose(total, oscillator.internal_energy(start) + oscillator.kinetic_energy(start), rtol=1e-10)
 
 
-@settings(max_examples=40, deadline=None)
 @given(states, st.floats(0.2, 3))
 def test_damping_shrinks_to_none(start: State, elapsed: float) -> None:
     undamped = Oscillator(2.0, 1.0, 0.5).free(start, elapsed)
@@ -108,7 +103,6 @@ def test_damping_shrinks_to_none(start: State, elapsed: float) -> None:
     np.testing.assert_allclose(np.stack(nearly), np.stack(undamped), atol=1e-11)
 
 
-@settings(max_examples=40, deadline=None)
 @given(oscillators, states, st.integers(1, 400))
 def test_the_grid_gives_what_single_times_give(oscillator: Oscillator, start: State, count: int) -> None:
     step = 0.01 / oscillator.omega_0
@@ -167,7 +161,6 @@ def test_the_spring_back_is_the_published_formula() -> None:
     np.testing.assert_allclose(later.y, at.y + drift - frozen / (1 + beta) * g, atol=1e-15)
 
 
-@settings(max_examples=40, deadline=None)
 @given(MODES, st.floats(0, 3), st.floats(0.01, 2))
 def test_the_residual_stays_what_it_is_at_td_while_nothing_damps(mode: Mode, tr: float, window: float) -> None:
     still = Mode(mode.omega, 0.0, mode.cosine, mode.sine, mode.origin)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from d2rpick.vibration.waves import Waves, fit_waves
@@ -12,7 +12,6 @@ MADE = Waves(np.array([-0.1 + 5j, -0.1 + 8j, -0.1 + 13j]), np.array([1 + 0.3j, -
 TIME = np.linspace(0, 9, 700)
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.floats(3, 6), st.floats(1.2, 2.5), st.floats(0, 0.4), st.floats(0, 6.3), st.booleans())
 def test_waves_are_found_again(rate: float, ratio: float, damping: float, phase: float, even: bool) -> None:
     rates = -damping + 1j * rate * np.array([1.0, ratio, 1.6 * ratio])

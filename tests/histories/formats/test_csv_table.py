@@ -4,7 +4,7 @@ import contextlib
 from pathlib import Path
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from d2rpick.base.errors import FormatError
@@ -402,7 +402,6 @@ def test_what_is_written_is_read_back_bit_for_bit(
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=20)
 @given(
     st.lists(st.floats(-1e20, 1e20), min_size=1, max_size=4),
     st.sampled_from(["%r", "%.17g", "%.5e", "%.3f", "%g", "%d"]),
