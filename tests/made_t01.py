@@ -4,7 +4,10 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
+
+def packed(kind: str, numbers: Sequence[float]) -> bytes:
+    """Numbers of four bytes; without numpy, which the solver for tests would load in each leg."""
+    return struct.pack(f">{len(numbers)}{kind}", *numbers)
 
 
 @dataclass
@@ -19,18 +22,18 @@ class T01Writer:
         self.data += struct.pack(">i", len(body)) + body + struct.pack(">i", len(body))
 
     def titled(self, first: Sequence[int], title: str, last: Sequence[int] = ()) -> None:
-        self.record(np.array(first, ">i4").tobytes() + title.encode() + np.array(last, ">i4").tobytes())
+        self.record(packed("i", first) + title.encode() + packed("i", last))
 
     def integers(self, *numbers: int) -> None:
         if numbers:
-            self.record(np.array(numbers, ">i4").tobytes())
+            self.record(packed("i", numbers))
 
     def setting(self, number: int) -> None:
         self.integers(number)
 
     def reals(self, numbers: Sequence[float]) -> None:
         if numbers:
-            self.record(np.array(numbers, ">f4").tobytes())
+            self.record(packed("f", numbers))
 
     def state(self, time: float, whole: Sequence[float], parts: Sequence[float], subset_variables: int = 2) -> None:
         self.reals([time])
