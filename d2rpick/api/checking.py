@@ -13,7 +13,7 @@ from d2rpick.api.answer import Answer, frame_of
 from d2rpick.api.cards import SETTINGS
 from d2rpick.base.errors import ConfigurationError, D2RPickError, DeckError
 from d2rpick.deck import main_decks
-from d2rpick.deck.radioss_run import run_files
+from d2rpick.deck.radioss_files import run_files
 from d2rpick.deck.source import STDIN
 from d2rpick.report.findings import FINDING, Checks
 from d2rpick.report.tables import positional

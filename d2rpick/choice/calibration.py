@@ -23,7 +23,8 @@ from d2rpick.choice.cost import ELEMENT_SHARE, MEASURED, POINT, RIGID_NODE, Weig
 from d2rpick.choice.warnings import Caution
 from d2rpick.deck import ls_dyna, main_decks, radioss
 from d2rpick.deck.parts import read_parts
-from d2rpick.deck.radioss_run import find_run_windows, read_run, run_files
+from d2rpick.deck.radioss_files import run_files
+from d2rpick.deck.radioss_run import find_run_windows, read_run
 from d2rpick.deck.reader import Deck, read_deck
 from d2rpick.deck.switching import find_windows, read_switching
 from d2rpick.histories.listings import Timing, ZoneTimes, is_glstat, read_timing, read_zone_times

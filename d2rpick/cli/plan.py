@@ -122,7 +122,8 @@ def _by_deck(cards: Cards, deck: str | None) -> Cards:
     if deck is None:
         return cards
 
-    from d2rpick.deck.radioss_run import read_run, run_files
+    from d2rpick.deck.radioss_files import run_files
+    from d2rpick.deck.radioss_run import read_run
 
     if not run_files(deck):
         return replace(cards, solver=cards.solver or "ls-dyna")

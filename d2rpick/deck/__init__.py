@@ -29,9 +29,9 @@ def read_inventory(path: str) -> Inventory:
     DeckError
         If the deck cannot be read, or has no parts.
     """
-    from d2rpick.deck import ls_dyna, radioss, radioss_run, reader  # not above: they load numpy
+    from d2rpick.deck import ls_dyna, radioss, radioss_files, radioss_run, reader  # not above: they load numpy
 
-    is_run = radioss_run.run_files(path)
+    is_run = radioss_files.run_files(path)
     found = radioss.read(radioss_run.read_run(path)) if is_run else ls_dyna.read(reader.read_deck(path))
     if not found.parts:
         why = f" ({found.notes[0]})" if found.notes else ""
@@ -53,12 +53,12 @@ def main_decks(folder: str) -> list[str]:
     DeckError
         If there is none, with what to do.
     """
-    from d2rpick.deck import radioss_run, reader  # not above: start-up
+    from d2rpick.deck import radioss_files, reader  # not above: start-up
 
     decks = [path for path in _files(folder) if _begins(path)]
     included: set[str] = set()
     for path in decks:
-        if radioss_run.run_files(path):
+        if radioss_files.run_files(path):
             continue  # its includes have no /BEGIN
         try:
             included.update(map(os.path.realpath, reader.read_deck(path).files[1:]))

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from d2rpick.deck.radioss_run import Flaw, LeftRigid
+    from d2rpick.deck.radioss_files import Flaw
+    from d2rpick.deck.radioss_run import LeftRigid
     from d2rpick.deck.source import SourceFile
 
     Places = NDArray[np.int64]

@@ -1,4 +1,4 @@
-"""A Radioss run: the files that belong together, when which part is rigid over its legs, and what stays rigid.
+"""A Radioss run: when which part is rigid over its legs, and what stays rigid.
 
 Source: Altair's public help for /RBODY in engine files: bodies are on by default in the first run, and stay as they
 were in each later one unless it says otherwise.
@@ -12,46 +12,18 @@ import re
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.base.errors import DeckError, are, in_rows, name_units
 from d2rpick.deck.card import Card, Field, Value
 from d2rpick.deck.radioss_deck import Body, Leg, Starter, blocks, card_of, kept_off, keyword, read_legs
+from d2rpick.deck.radioss_files import ENGINE, HEAD, STARTER, recognises, run_files
 from d2rpick.deck.reader import Deck, Unread, why_unread
 from d2rpick.deck.source import SourceFile
 from d2rpick.deck.switching import Event, Switched, SwitchSet, Unit, Window, Windows, follow
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
-
-
-THROUGH_WALL: Final = "body-through-wall"
-AT_REST: Final = "body-without-velocity"
-NOT_FOLLOWED: Final = "deck-not-followed"
-LEFT_RIGID: Final = "body-left-rigid"
-# What ruins a run, in a few words, and the rule that says more.
-RUINS: Final = {
-    THROUGH_WALL: "the deck lets rigid bodies go through a wall (D2R406)",
-    AT_REST: "the deck lets rigid bodies begin at rest (D2R407)",
-    LEFT_RIGID: "the deck keeps parts rigid that deform (D2R409)",
-}
-
-
-class Flaw(NamedTuple):
-    """What is wrong, with a stable ``code``, and where; `NOT_FOLLOWED` tells what was not judged, and why."""
-
-    code: str
-    place: Field
-    message: str
-
-
-HEAD: Final = 256 * 1024  # bytes in which a file shows what it is
-_KEYWORD: Final = re.compile(rb"^[*/]", re.MULTILINE)
-# Those of files of Radioss are compiled where they are needed.
-_STARTER: Final = rb"(?mi)^/BEGIN"
-_ENGINE: Final = rb"(?mi)^/RUN/"
-_NUMBERED: Final = r"(?is)(.+)_(\d{4})\.rad"
-_NAME: Final = rb"(?mi)^/BEGIN[^\n]*\n(?:[#$][^\n]*\n)*([^\n]*)|^/RUN/([^/\n]+)"
 
 
 @dataclass(eq=False, repr=False)
@@ -74,48 +46,6 @@ class Run:
         return bool(self.starter and self.starter.named("RWALL", "INIVEL")) or any(leg.starts for leg in self.legs)
 
 
-def recognises(head: bytes) -> bool:
-    """Whether a file that begins like this is a starter deck or an engine file."""
-    first = _KEYWORD.search(head)
-    return first is not None and first[0] == b"/" and bool(re.search(_STARTER, head) or re.search(_ENGINE, head))
-
-
-def run_files(path: str) -> list[str]:
-    """Files of the run that ``path`` belongs to; none where it is not a file of a Radioss run.
-
-    The starter deck ``NAME_0000.rad`` and the engine files ``NAME_0001.rad`` and so on in its folder belong
-    together; a file of another name goes by the name of the run that it holds.
-    """
-    try:
-        if not os.path.isfile(path):  # noqa: PTH113  start-up
-            return []  # a pipe gives its bytes once
-        with open(path, "rb", buffering=0) as stream:  # noqa: PTH123
-            # room for more than there is costs ten times the reading
-            head = stream.read(min(HEAD, os.fstat(stream.fileno()).st_size))
-        if not recognises(head):
-            return []
-        from pathlib import Path  # not above: start-up
-
-        folder = Path(path).parent
-        beside = sorted(os.listdir(folder))  # noqa: PTH208  nothing is asked of each file: there may be many runs
-    except (OSError, ValueError):
-        return []  # said by who reads it
-    name = _run_name(path, head)
-    numbered = (re.fullmatch(_NUMBERED, one) for one in beside if one.startswith(name))
-    alike = (folder / match[0] for match in numbered if match and match[1] == name)
-    files = [str(one) for one in alike if one.is_file()]
-    return files if any(Path(path).samefile(one) for one in files) else [path, *files]
-
-
-def _run_name(path: str, head: bytes) -> str:
-    """Name of a run by that of its file, else by what stands in it."""
-    numbered = re.fullmatch(_NUMBERED, os.path.basename(path))  # noqa: PTH119  start-up
-    if numbered:
-        return numbered[1]
-    found = re.search(_NAME, head)
-    return (found[1] or found[2] or b"").decode("latin-1").strip() if found else ""
-
-
 def read_run(path: str, content: bytes | None = None) -> Run:
     """Read a run: of its files, or from ``content``.
 
@@ -132,9 +62,9 @@ def read_run(path: str, content: bytes | None = None) -> Run:
         if not recognises(head):
             raise DeckError(f"{name}: no /BEGIN or /RUN was found, a file of a Radioss run was expected")
         run.deck.sources.append(source)
-        if re.search(_ENGINE, head):
+        if re.search(ENGINE, head):
             run.legs += read_legs(source)
-        if re.search(_STARTER, head):
+        if re.search(STARTER, head):
             run.starter = run.starter or Starter()
             _read_starter(source, run, ())
         else:

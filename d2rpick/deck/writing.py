@@ -14,7 +14,8 @@ from d2rpick.base.files import write_whole
 from d2rpick.deck.parts import read_parts
 from d2rpick.deck.printing import EngineFile, engine_lines, listed, off
 from d2rpick.deck.radioss_deck import Leg, Starter, blocks, card_of, kept_off, keyword, numbers, read_legs
-from d2rpick.deck.radioss_run import Run, parts_off, read_run, run_files
+from d2rpick.deck.radioss_files import run_files
+from d2rpick.deck.radioss_run import Run, parts_off, read_run
 from d2rpick.deck.radioss_sensors import with_sensors
 from d2rpick.deck.reader import Deck, cure, cuts, read_deck
 from d2rpick.deck.source import Block, SourceFile

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
 
 from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, one_line
 from d2rpick.deck.parts import Constraint, Parts, read_constraints, read_parts, read_sections
-from d2rpick.deck.radioss_run import Flaw, Run, RunWindows, find_run_windows
 from d2rpick.deck.switching import Event, Header, SwitchSet, Window, Windows, find_windows, read_switching
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from d2rpick.deck.card import Card, Field, Value
+    from d2rpick.deck.radioss_files import Flaw
+    from d2rpick.deck.radioss_run import Run, RunWindows
     from d2rpick.deck.reader import Deck, Unread
     from d2rpick.rules.judgement import HistoryJudge
 
@@ -181,6 +182,8 @@ class RunCase(Case):
     @cached_property
     def found(self) -> RunWindows:
         """Windows, and the parts of the bodies."""
+        from d2rpick.deck.radioss_run import find_run_windows  # not above: start-up
+
         return find_run_windows(self.run)
 
     @cached_property

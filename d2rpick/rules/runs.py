@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import name_units
-from d2rpick.deck.radioss_run import AT_REST, NOT_FOLLOWED, THROUGH_WALL, LeftRigid, left_rigid
+from d2rpick.deck.radioss_files import AT_REST, NOT_FOLLOWED, THROUGH_WALL
 from d2rpick.rules.base import ERROR, INFO, RADIOSS, WARNING, Example, Objection, RunCase, rule
 from d2rpick.rules.examples import GOOD_RUN, WINDOW, engine_files, run_of, starter_deck
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from d2rpick.deck.radioss_deck import Leg
+    from d2rpick.deck.radioss_run import LeftRigid
 
 _MOST_CAP = 0.01  # of the rigid window: the release comes up to a step late
 _MOST_LISTED = 8
@@ -279,6 +280,8 @@ def _left_rigid_deforming(case: RunCase) -> Iterator[Objection]:
 
 def _left_rigid_parts(case: RunCase) -> tuple[LeftRigid | None, tuple[int, ...] | None]:
     """What no leg switches, and which of its parts deform; None where no history tells."""
+    from d2rpick.deck.radioss_run import left_rigid  # not above: start-up
+
     left = left_rigid(case.run, case.windows.windows)
     return left, case.judge.deforming(left.parts) if left and case.judge else None
 

@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 from d2rpick.deck import read_inventory
+from d2rpick.deck.radioss_files import AT_REST, NOT_FOLLOWED, THROUGH_WALL, Flaw
 from d2rpick.deck.radioss_flaws import flaws_of
-from d2rpick.deck.radioss_run import AT_REST, NOT_FOLLOWED, THROUGH_WALL, Flaw, read_run
+from d2rpick.deck.radioss_run import read_run
 from tests.deck.test_openradioss import MAIN, starter
 from tests.decks import wide
 

@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from d2rpick.base.errors import DeckError
-from d2rpick.deck.radioss_run import find_run_windows, read_run, recognises, run_files
+from d2rpick.deck.radioss_files import recognises, run_files
+from d2rpick.deck.radioss_run import find_run_windows, read_run
 from d2rpick.deck.radioss_sensors import sensor_cards
 from d2rpick.rules import RULES, check_deck
 from tests.command import put
