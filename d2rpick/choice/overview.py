@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from d2rpick.histories.database import Legs
+    from d2rpick.histories.history import Samples
     from d2rpick.histories.run import Run
 
 
@@ -57,7 +58,7 @@ class Overview(NamedTuple):
     ``flights`` are the windows in which the parts asked for, or all, fly freely, each with its source: those that
     ``plan`` and ``suggest`` choose from, by the energy alone where nothing better is written; ``health`` is
     that of the run, with the longest of them as its window; None without energies.
-    ``should_write`` names the output that would show the flights for sure; None where it is there.
+    ``should_write`` names the output that would show the flights for sure; None where it is there, or no state is.
     """
 
     source: tuple[str, ...]
@@ -120,7 +121,7 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
         channels=tuple(dict.fromkeys(name for database in run.databases for name in database.channels)),
         parts=tuple(_overviews(run)),
         flights=flights,
-        should_write=None if any(one.parts for one in run.momenta(None, None)) else _missing(run),
+        should_write=None if states == 0 or any(one.parts for one in run.momenta(None, None)) else _missing(run),
         health=_health(run, [flight for _, flight in flights], rigid),
         notes=tuple(dict.fromkeys(notes)),
         alarms=(*(unsound(history) if history else ()), *_of_rigid_legs(rigid), *told),
@@ -163,11 +164,15 @@ def _overviews(run: Run) -> Iterator[PartOverview]:
     energies = if_written(lambda: run.part_energies(run.parts)) if run.parts else np.empty((0, 0))
     if energies is None:  # some parts come and go, so that their columns have holes
         return (PartOverview(part, _highest(run, part)) for part in run.parts)
-    return (PartOverview(part, float(column.max())) for part, column in zip(run.parts, energies.T, strict=True))
+    return (PartOverview(part, _most(column)) for part, column in zip(run.parts, energies.T, strict=True))
 
 
 def _highest(run: Run, part: Part) -> float | None:
-    return if_written(lambda: float(run.part_energies([part]).max()))
+    return if_written(lambda: _most(run.part_energies([part])))
+
+
+def _most(energies: Samples) -> float | None:
+    return float(energies.max()) if energies.size else None
 
 
 def _of_rigid_legs(rigid: Sequence[Times]) -> Iterator[Caution]:
@@ -179,7 +184,7 @@ def _of_rigid_legs(rigid: Sequence[Times]) -> Iterator[Caution]:
 
 def _health(run: Run, flights: Sequence[FreeFlight], rigid: Sequence[Times]) -> Health | None:
     balance = balance_of(run.databases, run.parts)
-    if balance is None:
+    if balance is None or not balance.time.size:
         return None
     if rigid:
         states = ~np.any([(balance.time >= start) & (balance.time <= end) for start, end in rigid], axis=0)

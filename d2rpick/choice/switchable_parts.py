@@ -15,6 +15,7 @@ from d2rpick.deck.model import DISCRETE, Inventory, PartData
 from d2rpick.deck.pieces import pieces_of
 from d2rpick.flight.momentum import deformable_parts, flying_together
 from d2rpick.histories.opening import Selection
+from d2rpick.histories.run import NO_STATES
 from d2rpick.histories.samples import window
 
 if TYPE_CHECKING:
@@ -98,6 +99,8 @@ def facts_of(run: Run, settings: Settings) -> RunFacts:
         energies = run.part_energies(run.parts)
     except FormatError as error:
         return RunFacts({}, reason=str(error))
+    if not energies.size:
+        return RunFacts({}, reason=f"{run.name}: {NO_STATES}")
     masses = _masses(run)
     try:
         history, members = _history(run)

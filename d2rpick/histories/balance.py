@@ -131,7 +131,7 @@ class _Columns:
     def mass(self, momenta: Samples) -> float:
         """Give the mass of the model: as written, or the least that has these momenta, (n, 1, 3)."""
         written, kinetic = self.first("mass", "totalmass"), self.first(*_NAMES["kinetic"])
-        if written is not None:
+        if written is not None and written.size:
             return float(median(written))
         if kinetic is None or not (kinetic > 0).any():
             return float("nan")

@@ -6,7 +6,7 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
 from itertools import compress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 _AXES = ("x_momentum", "y_momentum", "z_momentum")
 _VELOCITIES = ("x_rbvelocity", "y_rbvelocity", "z_rbvelocity")
 _CENTRES = ("x_center", "y_center", "z_center")
+
+NO_STATES: Final = "no states; did the run reach its first output?"
 
 
 class Run:
@@ -97,7 +99,7 @@ class Run:
         if holder is None:
             return None
         values = if_written(lambda: np.stack([self._of_holder(axis, holder.parts) for axis in _AXES], axis=2))
-        if values is None:
+        if values is None or not values.size:
             return None  # it cannot say what flies together
         precision = holder.precisions(())[1]
         masses = self._least_masses(values, holder)
@@ -194,7 +196,7 @@ class Run:
 
     def _energy(self, selection: Selection) -> History:
         if all(database.span is None for database in self.databases):
-            raise FormatError(f"{self.name}: no states; did the run reach its first output?")
+            raise FormatError(f"{self.name}: {NO_STATES}")
         if selection.parts:
             chosen = select_parts(selection.parts, self._holder().parts, self.name)
             named = selection.springs

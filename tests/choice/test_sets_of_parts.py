@@ -14,6 +14,7 @@ from d2rpick.choice.question import Settings
 from d2rpick.choice.sets_of_parts import Parts, parts_of, recommended_parts
 from d2rpick.choice.switchable_parts import InFlight, PartFacts, PartRow, facts_of, landing_alone, rows_of, step_growth
 from d2rpick.deck import read_inventory
+from d2rpick.histories.formats import radioss_th
 from d2rpick.histories.opening import open_run
 from d2rpick.report.formats import Shown
 from d2rpick.vibration.measures import run_time_share
@@ -22,6 +23,8 @@ from tests.command import ENERGY, ROOT, answer, put, run
 from tests.computed import starter, stored
 from tests.energies import sure
 from tests.json_schemas import check_by_schema
+from tests.made_t01 import t01
+from tests.reading import run_of
 from tests.sample_deck import DECK
 from tests.text_files import matsum_text
 
@@ -409,3 +412,8 @@ def test_parts_of_one_title_are_told_apart_by_number(folder: Path) -> None:
     assert f"momentum of {names} and 1 more" in table
     listed = run("info", str(folder / "MADET01")).stdout
     assert "panel (1), panel (2)" in listed
+
+
+def test_of_a_run_without_states_nothing_is_said_of_its_parts() -> None:
+    facts = facts_of(run_of(radioss_th, bytes(t01(0).data)), Settings())
+    assert (facts.parts, facts.reason) == ({}, "run: no states; did the run reach its first output?")

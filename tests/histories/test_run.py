@@ -249,6 +249,8 @@ def test_what_is_in_the_files_is_told_where_no_energy_can_be_chosen() -> None:
     """No states, and curves of which none is the one that is meant."""
     empty = survey(run_of(glstat, HEAD), Selection())
     assert (empty.states, empty.time_start, empty.sampling, empty.notes) == (0, None, None, ())
+    begun = survey(run_of(radioss_th, bytes(t01(0).data)), Selection())
+    assert (begun.states, begun.time_start, begun.flights, begun.health) == (0, None, (), None)
     curves = survey(run_of(csv_table, "2\n1 'a IE'\n0,1\n1,2\n2 'b IE'\n0,1\n2,3\n3,4\n"), Selection())
     assert (curves.states, curves.channels) == (None, ("a IE", "b IE"))
     assert "2 curves are named like an internal energy; choose with `energy`: 1 'a IE', 2 'b IE'" in curves.notes[0]
