@@ -345,4 +345,4 @@ def reproduce(output_dir: str, section: Sequence[str], solver: Sequence[str], ou
         if not str(error.name).startswith("validation"):
             raise
         raise D2RPickError(_ABSENT) from error
-    command.reproduce(output_dir, section, solver, output)
+    command.reproduce(output_dir, section, solver, SOLVER, output)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from d2rpick.base.errors import D2RPickError, FormatError
 from d2rpick.cli import options
-from d2rpick.cli.models import SECTIONS, SOLVER
 from d2rpick.histories.formats import csv_table
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.models.box_model import Parameters
@@ -25,14 +24,19 @@ if TYPE_CHECKING:
     from validation.published.exhibits import Exhibit
     from validation.published.reproduction import Reproduction
 
+    Tables = Mapping[str, Sequence[str]]
+
 PICTURES = ("svg", "png")
 
 
-def reproduce(output_dir: str, section: Sequence[str], solver: Sequence[str], output: Output) -> None:
-    """Write the figures and tables of these sections, of all without any, and the answer."""
+def reproduce(output_dir: str, section: Sequence[str], solver: Sequence[str], tables: Tables, output: Output) -> None:
+    """Write the figures and tables of these sections, of all without any, and the answer.
+
+    ``tables``: the columns of a solver's table beside its times, by what it is.
+    """
     place = _made(output_dir)  # the page may go there
     output = output.beside(*solver)
-    curves = _solver(solver)  # before the half minute that the box takes
+    curves = _solver(solver, tables)  # before the half minute that the box takes
     answer = reproduction.Reproduction(table(), list(_exhibits(section, curves)))
     files = _write(output, place, answer)
     if output.report:
@@ -47,19 +51,19 @@ def _exhibits(sections: Sequence[str], solver: Mapping[str, Mapping[str, Samples
     """Give the figures of these sections, of all without any, in the order of the paper."""
     makers = [*box.exhibits_of(Parameters()), *exhibits.exhibits_of(solver), (5, saving.exhibit)]
     makers.sort(key=lambda one: one[0])
-    return (make() for section, make in makers if str(section) in (sections or SECTIONS))
+    return (make() for section, make in makers if not sections or str(section) in sections)
 
 
-def _solver(names: Sequence[str]) -> dict[str, dict[str, Samples]]:
+def _solver(names: Sequence[str], tables: Tables) -> dict[str, dict[str, Samples]]:
     """Read each table by the columns that it has."""
     found = {}
     for name in names:
         (database,) = open_run([name], Selection(energy=("2",))).databases
-        kinds = [kind for kind, columns in SOLVER.items() if {*columns} <= {*database.channels}]
+        kinds = [kind for kind, columns in tables.items() if {*columns} <= {*database.channels}]
         if not kinds:
-            known = " or ".join(", ".join(columns) for columns in SOLVER.values())
+            known = " or ".join(", ".join(columns) for columns in tables.values())
             raise FormatError(f"{name}: the columns are {', '.join(database.channels)}; {known} were expected")
-        columns = {column: database.channel(database.find(column)) for column in SOLVER[kinds[0]]}
+        columns = {column: database.channel(database.find(column)) for column in tables[kinds[0]]}
         found[kinds[0]] = {"time_s": database.time, **columns}
     return found
 
