@@ -23,44 +23,12 @@ if TYPE_CHECKING:
 
     from d2rpick.api.arguments import Choosing, Parts
     from d2rpick.api.runs import Run
-    from d2rpick.choice.answers import Pair
+    from d2rpick.choice.candidates import Pair
     from d2rpick.choice.cost import Weights
-    from d2rpick.choice.situation import Situation
-    from d2rpick.flight.flight import Flight
-
-
-class Judged(RunAnswer):
-    """What a choice and a verdict have in common.
-
-    ``situation`` is what the record tells about td; ``health`` how far the run can be trusted, None where its files
-    hold nothing to judge it by.
-    """
-
-    situation: Situation
-
-    @property
-    def td(self) -> float:
-        """When the parts are switched back to deformable [time]."""
-        return self.situation.td
-
-    @property
-    def flight(self) -> Flight:
-        """Window of free flight around td: ``start``, ``end``, ``source``."""
-        return self.situation.flight
-
-    @property
-    def basis(self) -> str:
-        """What the answer rests on: ``"parts"``, ``"oscillator"`` or ``"energy"``."""
-        return self.situation.basis
-
-    @property
-    def kinetic_share(self) -> float | None:
-        """K, the share of the vibration energy that no tr can save; None on basis ``"energy"`` [-]."""
-        return self.situation.kinetic_share
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Suggestion(Judged, answers.Suggestion):
+class Suggestion(RunAnswer, answers.Suggestion):
     """Answer of `suggest`; nothing of it changes.
 
     ``candidates`` are ranked, best first; ``recommended`` and ``better_pair`` have ``tr``, ``td`` and ``residual``, or
@@ -113,7 +81,7 @@ class Suggestion(Judged, answers.Suggestion):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Verdict(Judged, answers.Verdict):
+class Verdict(RunAnswer, answers.Verdict):
     """Answer of `verify`; nothing of it changes.
 
     ``verified``: the pair is good; ``reasons``: why not, or what to know; ``tr_ok`` and ``td_ok`` are None where

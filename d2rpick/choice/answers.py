@@ -7,10 +7,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.candidates import Candidate, Candidates, find_candidates, judge
+from d2rpick.choice.candidates import Candidate, Candidates, Pair, find_candidates, judge
 from d2rpick.choice.expectation import Expectation, against_td, expectation, most_energy
 from d2rpick.choice.ranking import EQUALLY_GOOD, Quality, over_limits, quality_of, rank
-from d2rpick.choice.situation import Situation, examine
+from d2rpick.choice.situation import OfTd, Situation, examine
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, Caution, cautions_of, out_of_place
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.digits import as_read
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Verdict(OfTd):
     """Answer of ``verify``: the measures of one pair, and what is right or wrong with it.
 
     ``tr_ok`` and ``td_ok`` are None where the record does not tell.
@@ -94,19 +94,6 @@ ROUNDING: Final = 1e-3
 _MOST_REFUSED = 3
 
 
-class Pair(NamedTuple):
-    """A recommended (tr, td) [time] with its residual, None on basis "energy"."""
-
-    tr: float
-    td: float
-    residual: float | None
-
-    @property
-    def rigid_time(self) -> float:
-        """Length of the rigid window [time]."""
-        return self.td - self.tr
-
-
 class AcceptableWindow(NamedTuple):
     """From ``start`` to ``end`` [time] every tr is acceptable; ``share`` is its share of the flight up to td [-]."""
 
@@ -116,7 +103,7 @@ class AcceptableWindow(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Suggestion:
+class Suggestion(OfTd):
     """Answer of ``suggest``: ranked candidates, the recommended pair, a better one at another td, warnings.
 
     ``td_window`` is where td was chosen, if it was; ``longer`` is the longest acceptable pair in it, where much saving
@@ -144,8 +131,7 @@ class Suggestion:
     @property
     def recommended(self) -> Pair | None:
         """The recommended pair."""
-        best = self.chosen
-        return Pair(best.tr, self.situation.td, best.residual) if best else None
+        return self.candidates.pair
 
     @cached_property
     def expected(self) -> Expectation | None:
@@ -205,7 +191,7 @@ def suggest_at(situation: Situation, *, with_better: bool = True, ranked: Candid
 
     ``ranked`` are the candidates in order where they are known, up to the recommended one at least.
     """
-    candidates = ranked or rank(find_candidates(situation))
+    candidates = rank(find_candidates(situation)) if ranked is None else ranked
     best = candidates.chosen
     better = find_better_pair(situation) if with_better else None
     cautions = list(cautions_of(situation))
@@ -236,7 +222,7 @@ def find_better_pair(situation: Situation) -> Pair | None:
         anew = _anew(situation, td)
         best = best if anew.sees_as(there) else _saving(anew)
         if best and _holds_as_printed(situation, best.tr, td):
-            return Pair(best.tr, td, best.residual)
+            return best
         refused += 1
         if refused == _MOST_REFUSED:
             return None
@@ -251,10 +237,9 @@ def _level_refuses(situation: Situation) -> bool:
     return level < -round_off(situation.history) or level * least**2 > most_energy(situation)
 
 
-def _saving(situation: Situation) -> Candidate | None:
+def _saving(situation: Situation) -> Pair | None:
     """Give what is recommended at a td, where that saves something."""
-    best = rank(find_candidates(situation, in_flight=True)).chosen
-    return best if best and not best.same_swing else None
+    return rank(find_candidates(situation, in_flight=True)).saving
 
 
 def _anew(situation: Situation, td: float) -> Situation:

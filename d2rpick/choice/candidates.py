@@ -89,8 +89,11 @@ class Candidate(NamedTuple):
         return np.inf if error is None else error
 
 
-class Best(NamedTuple):
-    """A recommended pair [time], and what it is compared with those of other td by; as of a `Candidate`."""
+class Pair(NamedTuple):
+    """A recommended (tr, td) [time] with what it is compared with those of other td by, as of a `Candidate`.
+
+    ``residual`` is None on basis "energy".
+    """
 
     tr: float
     td: float
@@ -242,8 +245,8 @@ class Candidates(Sequence[Candidate]):
         return None if self.recommended is None else self[self.recommended]
 
     @cached_property
-    def best(self) -> Best | None:
-        """What the one that is recommended is compared by."""
+    def pair(self) -> Pair | None:
+        """The same as a pair, which takes less."""
         if self.recommended is None:
             return None
         i, found = self.order[self.recommended], self.judged
@@ -251,7 +254,12 @@ class Candidates(Sequence[Candidate]):
             column[i].item() for column in (found.moments.tr, found.known.residual, found.level_error, found.same_swing)
         )
         known = not np.isnan(residual)
-        return Best(tr, self.situation.td, residual if known else None, residual if known else level_error, same_swing)
+        return Pair(tr, self.situation.td, residual if known else None, residual if known else level_error, same_swing)
+
+    @property
+    def saving(self) -> Pair | None:
+        """The recommended pair, where it saves something."""
+        return None if self.pair is None or self.pair.same_swing else self.pair
 
     def __len__(self) -> int:
         return self.order.size

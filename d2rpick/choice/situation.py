@@ -74,6 +74,37 @@ def _faint(history: History, start: float) -> float:
     return max(_SOLVER_ERROR * highest, _QUANTA * quantum, _FAINT * fall)
 
 
+class OfTd:
+    """An answer about one td, by what the record tells about it: its ``situation``."""
+
+    situation: Situation
+
+    @property
+    def td(self) -> float:
+        """When the parts are switched back to deformable [time]."""
+        return self.situation.td
+
+    @property
+    def flight(self) -> Flight:
+        """Window of free flight around td: ``start``, ``end``, ``source``."""
+        return self.situation.flight
+
+    @property
+    def basis(self) -> str:
+        """What the answer rests on: ``"parts"``, ``"oscillator"``, ``"swings"`` or ``"energy"``."""
+        return self.situation.basis
+
+    @property
+    def energy_td(self) -> float:
+        """Energy level at td [energy]."""
+        return self.situation.energy_td
+
+    @property
+    def kinetic_share(self) -> float | None:
+        """K, the share of the vibration energy that no tr can save; None on basis ``"energy"`` and at rest [-]."""
+        return self.situation.kinetic_share
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Situation:
     """A history seen from one td [time].

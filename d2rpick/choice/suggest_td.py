@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.choice.answers import ROUNDING, Pair, Suggestion, suggest_at
-from d2rpick.choice.candidates import Best, judged_of
+from d2rpick.choice.answers import ROUNDING, Suggestion, suggest_at
+from d2rpick.choice.candidates import Pair, judged_of
 from d2rpick.choice.expectation import mean_in_flight, shortfall
 from d2rpick.choice.flights import longest_flight
 from d2rpick.choice.ranking import LIKE_LEVELS, like_quality, ranked
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
 
     Look = Callable[[float], Situation]
-    Choice = tuple[Situation, Best]
+    Choice = tuple[Situation, Pair]
 
 
 def longest_rigid_times(situation: Situation, times: Samples) -> Samples:
@@ -137,7 +137,7 @@ def offered_times(situation: Situation, window: tuple[float, float], steps: int)
     return times[times < situation.history.time[-1]], set(peaks.tolist())  # a run that ends at td is no use
 
 
-def error_of(situation: Situation, best: Best | None) -> float | None:
+def error_of(situation: Situation, best: Pair | None) -> float | None:
     """What pairs at different td are compared by [-]; None without one, or for a level above all vibration energy."""
     if best is None:
         return None
@@ -267,7 +267,7 @@ def _given_up(longest: float | None, chosen: Pair | None, window: tuple[float, f
     pair = _longest(_acceptable([look(longest)])) if longest is not None else None
     if pair is None or chosen is None or pair[1].rigid_time - chosen.rigid_time <= _MUCH * (window[1] - window[0]):
         return None
-    return Pair(pair[1].tr, pair[0].td, pair[1].residual)
+    return pair[1]
 
 
 def _by_residual(situation: Situation, window: tuple[float, float], look: Look) -> tuple[float | None, float | None]:
@@ -315,7 +315,7 @@ def _shortening(situation: Situation, times: Iterable[float]) -> Iterator[Choice
 def _acceptable(situations: Iterable[Situation]) -> list[Choice]:
     """What is recommended in each situation, where that saves something."""
     found = chain.from_iterable(map(ranked, judged_of([*situations], in_flight=True)))
-    return [(one.situation, one.best) for one in found if one.best and not one.best.same_swing]
+    return [(one.situation, one.saving) for one in found if one.saving]
 
 
 def _longest(pairs: Iterable[Choice]) -> Choice | None:

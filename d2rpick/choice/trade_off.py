@@ -17,6 +17,7 @@ from d2rpick.choice.health import refuse_unsound
 from d2rpick.choice.of_run import suggest_of
 from d2rpick.choice.question import Reference, check_units
 from d2rpick.choice.ranking import EQUALLY_GOOD, rank, ranked
+from d2rpick.choice.situation import OfTd, Situation
 from d2rpick.choice.suggest_td import STEPS, as_printed, error_of, looking, offered_times, within_flight
 from d2rpick.choice.warnings import Caution, cautions_of
 from d2rpick.histories.digits import as_read
@@ -25,17 +26,14 @@ from d2rpick.vibration.span import Fits
 if TYPE_CHECKING:
     from collections.abc import Container, Iterator, Sequence
 
-    from d2rpick.choice.answers import AcceptableWindow
-    from d2rpick.choice.candidates import Best, Candidate, Candidates
-    from d2rpick.choice.expectation import Expectation
+    from d2rpick.choice.candidates import Candidate, Candidates, Pair
     from d2rpick.choice.plan import Plan
     from d2rpick.choice.question import Settings
     from d2rpick.choice.ranking import Quality
-    from d2rpick.choice.situation import Situation
 
 
 @dataclass(frozen=True, eq=False)
-class Offer:
+class Offer(OfTd):
     """What ``suggest`` says of a td, looked up where it is asked for: of most td only what they are compared by.
 
     ``candidates`` up to the recommended one, if any.  ``peak``: the energy peaks at td.  ``unbeaten``: no other offer
@@ -50,29 +48,9 @@ class Offer:
     recommended: bool = False
 
     @property
-    def td(self) -> float:
-        """When the parts are switched back [time]."""
-        return self.situation.td
-
-    @property
-    def basis(self) -> str:
-        """What the choice rests on."""
-        return self.situation.basis
-
-    @property
-    def energy_td(self) -> float:
-        """Energy level at td [energy]."""
-        return self.situation.energy_td
-
-    @property
-    def kinetic_share(self) -> float | None:
-        """K at td [-]."""
-        return self.situation.kinetic_share
-
-    @cached_property
-    def pair(self) -> Best | None:
+    def pair(self) -> Pair | None:
         """What offers are compared by; None where no tr is recommended."""
-        return self.candidates.best
+        return self.candidates.pair
 
     @cached_property
     def error(self) -> float | None:
@@ -115,21 +93,6 @@ class Offer:
     def quality(self) -> Quality | None:
         """How good the recommended pair is."""
         return self.answer.quality
-
-    @property
-    def windows(self) -> tuple[AcceptableWindow, ...] | None:
-        """Windows of acceptable tr, known on basis "energy" only."""
-        return self.answer.windows
-
-    @property
-    def expected(self) -> Expectation | None:
-        """What the energy lets expect after td, known on basis "energy" only."""
-        return self.answer.expected
-
-    @property
-    def reason(self) -> str | None:
-        """Why no tr is recommended."""
-        return self.answer.why_none or None
 
 
 def offers_of(situations: Sequence[Situation], peaks: Container[float]) -> Iterator[Offer]:
@@ -237,7 +200,7 @@ def explore_of(
 
 def _found(offer: Offer) -> bool:
     """Whether there is something to compare: a pair that saves something."""
-    return offer.pair is not None and offer.error is not None and not offer.pair.same_swing
+    return offer.candidates.saving is not None and offer.error is not None
 
 
 def _marked(offers: Sequence[Offer]) -> Iterator[Offer]:

@@ -258,7 +258,7 @@ def row_of(offer: Offer, start: Offer, view: View, unit: str, deformation: float
         "deformation": None if deformation is None else _short(deformation),
         "saved": None if best is None else _short(100 * (best.rigid_fraction if saving is None else saving)),
         "error": None if offer.error is None else _short(offer.error),
-        "windows": _marked_columns(offer.windows or (), view),
+        "windows": _marked_columns(offer.answer.windows or (), view),
         "peak": int(offer.peak),
         "unbeaten": int(offer.unbeaten),
     }
@@ -305,7 +305,7 @@ def _texts(offer: Offer, start: Offer, unit: str) -> dict[str, str]:
         "level": short(offer.energy_td),
         "kinetic": "" if offer.kinetic_share is None else measure(offer.kinetic_share),
         "quality": quality.told if quality else "",
-        "reason": offer.reason or "",
+        "reason": offer.answer.why_none,
         **(_of_best(offer, best, unit) if best else {}),
         "compared": _compared(offer, start, unit),
         "said": _said(offer),
@@ -314,7 +314,7 @@ def _texts(offer: Offer, start: Offer, unit: str) -> dict[str, str]:
 
 def _of_best(offer: Offer, best: Candidate, unit: str) -> dict[str, str]:
     """What is said of the recommended tr."""
-    expected = offer.expected
+    expected, windows = offer.answer.expected, offer.answer.windows
     ratio = expected.ratio if expected else None
     return {
         "residual": "" if best.residual is None else measure(best.residual),
@@ -323,7 +323,7 @@ def _of_best(offer: Offer, best: Candidate, unit: str) -> dict[str, str]:
         "rigid": f"for {short(best.rigid_time)}{unit}, {best.rigid_fraction:.1%} of the record",
         "run_time": "" if best.run_time_share is None else f"about {best.run_time_share:.0%} of the reference's",
         "tolerance": "" if best.timing_tolerance is None else f"{best.timing_tolerance:.1e}{unit}",
-        "windows": acceptable(offer.windows, best.tr) if offer.windows else "",
+        "windows": acceptable(windows, best.tr) if windows else "",
     }
 
 

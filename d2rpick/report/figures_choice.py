@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from d2rpick.choice.answers import Pair, Suggestion, Verdict
-    from d2rpick.choice.candidates import Candidate
+    from d2rpick.choice.answers import Suggestion, Verdict
+    from d2rpick.choice.candidates import Candidate, Pair
     from d2rpick.choice.plan import Plan
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.switched_run import Times

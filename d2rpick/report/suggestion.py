@@ -14,7 +14,8 @@ from d2rpick.report.situation import heading
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from d2rpick.choice.answers import AcceptableWindow, Pair, Suggestion
+    from d2rpick.choice.answers import AcceptableWindow, Suggestion
+    from d2rpick.choice.candidates import Pair
     from d2rpick.choice.ranking import Quality
     from d2rpick.report.formats import Shown
 
@@ -33,7 +34,7 @@ def _windows(answer: Suggestion) -> list[dict[str, Any]] | None:
 
 DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; times in the unit of the history.", row(
     *keys.FRAME,
-    Field("td", "number", get=lambda answer: answer.situation.td),
+    Field("td", "number"),
     Field("td_window", "span?",
           "where td was chosen: --td-window, or the longest flight; null where it was given"),
     Field("longer_pair", maybe(keys.PAIR),

@@ -32,10 +32,10 @@ OFFER: Final = row(
     Field("kinetic_share", maybe(keys.SHARE)),
     *(field._replace(kind=maybe(field.kind)) for field in keys.CANDIDATE.of_part(
         lambda offer: offer.best, ("kind", *keys.MEASURES, "tr_low", "tr_high", "same_swing"))),
-    Field("reason", "text?", "why no tr is recommended"),
+    Field("reason", "text?", "why no tr is recommended", lambda offer: offer.answer.why_none or None),
     Field("acceptable_windows", maybe(many(keys.WINDOW)), "on basis energy: windows in which every tr is acceptable",
-          lambda offer: offer.windows),
-    keys.EXPECTED,
+          lambda offer: offer.answer.windows),
+    keys.EXPECTED._replace(get=lambda offer: offer.answer.expected),
     later=("position_error_is_lower_bound",),
 )  # fmt: skip
 # Columns of the csv and of a frame.
@@ -194,5 +194,5 @@ _COLUMNS: Final[dict[str, Callable[[Offer], tables.Cell]]] = {
     "of record": _of_best("rigid_fraction", ".1%"),
     "run time": _of_best("run_time_share", ".0%"),
     "tolerance": _of_best("timing_tolerance", ".1e"),
-    "quality": lambda one: one.quality.grade if one.quality else one.reason,
+    "quality": lambda one: one.quality.grade if one.quality else one.answer.why_none,
 }

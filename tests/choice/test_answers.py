@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from d2rpick.choice.answers import Pair, suggest, suggest_at, verify, verify_at
+from d2rpick.choice.answers import suggest, suggest_at, verify, verify_at
+from d2rpick.choice.candidates import Pair
 from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.suggest_td import suggest_in_window

@@ -47,10 +47,10 @@ def check(found: TradeOff, history: History, asked: Settings, offers: list[Offer
         assert (one.basis, one.energy_td, one.kinetic_share) == (
             alone.situation.basis, alone.situation.energy_td, alone.situation.kinetic_share,
         )  # fmt: skip
-        assert one.windows == alone.windows
-        assert one.expected == alone.expected
+        assert one.answer.windows == alone.windows
+        assert one.answer.expected == alone.expected
         assert one.quality == alone.quality
-        assert (one.reason or "") == "; ".join(it.message for it in alone.cautions if it.code == "no-candidate")
+        assert one.answer.why_none == "; ".join(it.message for it in alone.cautions if it.code == "no-candidate")
     assert all(low.td < high.td for low, high in pairwise(found.offers))
     unbeaten(found)
 
