@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.judged_parts import FEWEST, SAME
+from d2rpick.choice.switched_run import FEWEST, SAME
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.samples import stretches
 from d2rpick.vibration import measures

@@ -93,13 +93,13 @@ def compare_with(verdict: Verdict, reference: Reference, switched: Reference, mi
         If one of the two runs does not go on after td.
     """
     from d2rpick.choice.comparison import compare_runs
-    from d2rpick.choice.judged_parts import judged_parts
+    from d2rpick.choice.switched_run import judged_parts
 
     situation, run = verdict.situation, reference.run
     flight, parts = situation.flight, situation.history.parts
     together = flight.parts if flight.source == "momentum" else flight.parts or parts
     pair = verdict.candidate.tr, situation.td
-    judged = judged_parts((run, switched.run), (situation.history, switched.history), pair)
+    judged = judged_parts(reference, switched, pair)
     found = compare_runs(
         judged.reference,
         judged.switched,

@@ -1,4 +1,9 @@
-"""A switched run as the reference for the windows after: when its parts were rigid, and how its landings moved."""
+"""A switched run: when its parts were rigid, by which of them it is judged, and how its landings moved.
+
+Some solvers report a sum of densities for solids while these are rigid, and some go on with it.  When a part is
+deformable again its energy is what it was at tr, since a frozen deformation does not change: one that is further off
+than the part's largest energy without switching is reported wrongly, and the part is left out.
+"""
 
 from __future__ import annotations
 
@@ -7,26 +12,33 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.base.errors import RangeError, if_written, listing
-from d2rpick.choice.judged_parts import FEWEST, rigid_parts, with_energy
+from d2rpick.base.errors import FormatError, RangeError, if_written, listing
 from d2rpick.choice.warnings import Caution
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.momentum import believed
 from d2rpick.histories.history import Given, History
-from d2rpick.histories.samples import stretches
+from d2rpick.histories.names import Part, Selection
+from d2rpick.histories.samples import stretches, window
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from numpy.typing import NDArray
 
     from d2rpick.choice.question import Reference
     from d2rpick.flight.flight import Flight
-    from d2rpick.histories.names import Part
+    from d2rpick.histories.history import Samples
+    from d2rpick.histories.run import Run
 
 Times = tuple[float, float]
 # Evidence that tells the start of a flight to some states; the energy alone gives time away there.
 _SHARP: Final = ("momentum", "contact-energy", "energy-balance")
 # Parts that have no more of the momentum of a model than this share are not what moves in it.
 _HARDLY: Final = 0.1
+# Of a part that is deformable fewer states follow each other without kinetic energy, or with one internal energy.
+FEWEST: Final = 12
+# An internal energy that changes by less is one value: solvers write single precision.
+SAME: Final = 1e-6
 # A flight that begins so many output intervals after tr has begun with the window: its start is known no better.
 _SAME_STATES: Final = 3
 
@@ -229,7 +241,114 @@ def _absent_times(reference: Reference) -> tuple[_Absent, ...]:
     return tuple(found)
 
 
-def _deformable(reference: Reference) -> tuple[Part, ...]:
-    """Give the chosen parts, or all, that have internal energy at the times of the history."""
-    run, history = reference.run, reference.history
-    return with_energy(run, history.parts or run.parts, history)
+def _deformable(reference: Reference, among: Sequence[Part] | None = None) -> tuple[Part, ...]:
+    """Give the chosen parts, or all, that have internal energy at the times of the history, also ``among`` others."""
+    run, history = reference
+    there = {part.id for part in run.parts if among is None} | {part.id for part in among or ()}
+    parts = [part for part in history.parts or run.parts if part.id in there]
+    if not parts:
+        return ()
+    energies = run.part_energies(parts)
+    if len(energies) != history.time.size:
+        return ()
+    return tuple(part for part, energy in zip(parts, energies.T, strict=True) if energy.any())
+
+
+def rigid_parts(run: Run, parts: Sequence[Part], time: Samples, tr: float, td: float) -> NDArray[np.bool_] | None:
+    """Tell which of the parts were rigid from tr to td, shape (parts,); None where their states do not tell.
+
+    ``time`` are the times of the parts' states (n,).
+    """
+    inside = window(time, np.nextafter(tr, td), np.nextafter(td, tr))
+    inside = slice(inside.start + 1, max(inside.start + 1, inside.stop - 1))  # switched at the first step after tr
+    if not parts or len(time[inside]) < FEWEST:
+        return None
+    energies, kinetic = run.part_energies(parts)[inside], if_written(lambda: run.part_kinetic_energies(parts))
+    still = np.ptp(energies, axis=0) <= SAME * np.abs(energies).max(axis=0)
+    absent = (kinetic[inside] == 0).all(axis=0) if kinetic is not None else np.zeros(len(parts), dtype=bool)
+    return np.asarray(still | absent)
+
+
+class Judged(NamedTuple):
+    """Energies of the same parts in both runs, and what to say of other parts.
+
+    ``known`` is False where the energies of all parts are reported wrongly.
+    """
+
+    reference: History
+    switched: History
+    objections: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    known: bool = True
+
+
+def judged_parts(without: Reference, switched: Reference, pair: Times) -> Judged:
+    """Choose the parts by which a finished switched run is judged.
+
+    Parameters
+    ----------
+    without, switched : Reference
+        Runs without switching, and switched, with what was read of them: of the parts to be switched, or of the whole
+        model.
+    pair : (float, float)
+        tr and td [time].
+
+    Returns
+    -------
+    Judged
+        Of a model of which only some parts were rigid these; in any case without parts that are reported wrongly.
+    """
+    as_read = Judged(without.history, switched.history)
+    try:
+        parts = _deformable(without, switched.run.parts)
+        return _judged(without, switched, pair, parts) if parts else as_read
+    except FormatError:  # a quantity of the parts is not in every state
+        return as_read
+
+
+def _judged(without: Reference, switched: Reference, pair: Times, parts: tuple[Part, ...]) -> Judged:
+    history = without.history
+    rigid = rigid_parts(switched.run, parts, switched.run.part_time, *pair)
+    some = rigid is not None and bool(rigid.any()) and not rigid.all()
+    objections, notes = list[str](), list[str]()
+    chosen = parts
+    if some and rigid is not None:
+        still = tuple(part for part, one in zip(parts, rigid.tolist(), strict=True) if one)
+        if history.parts is None:
+            chosen = still
+            notes.append(f"judged by the parts that were rigid: {_names(still)}")
+        else:
+            others = (part for part in parts if part not in still)
+            objections.append(f"not rigid from tr {pair[0]:g} to td {pair[1]:g} in the switched run: {_names(others)}")
+    wrong = _reported_wrong(without, switched.run, chosen, pair)
+    if not wrong and chosen is parts:
+        return Judged(history, switched.history, tuple(objections))
+    left = tuple(part for part in chosen if part not in wrong)
+    if not left:
+        who = f"the energies of {_names(wrong)}"
+        objections.append(f"{who} are reported wrongly after td: nothing is left to compare but the motion")
+    elif wrong:
+        found = f"left out of the comparison: {_names(wrong)}, whose energy is reported wrongly after td"
+        notes.append(f"{found}; some solvers do so with solids that were rigid")
+    selection = Selection(
+        parts=tuple(str(part.id) for part in left or chosen),
+        springs=tuple(str(part.id) for part in history.springs),
+    )
+    energies = without.run.history(selection), switched.run.history(selection)
+    return Judged(*energies, tuple(objections), tuple(notes), known=bool(left))
+
+
+def _reported_wrong(without: Reference, switched: Run, parts: tuple[Part, ...], pair: Times) -> tuple[Part, ...]:
+    """Give the parts whose energy after td is further off that at tr than it can be, beyond round-off."""
+    time, energies = switched.part_time, switched.part_energies(parts)
+    first = int(np.searchsorted(time, pair[1])) + 1  # the first state from td on may still be rigid
+    last = int(np.searchsorted(time, pair[0], side="right")) - 1
+    if last < 0 or first >= time.size:
+        return ()
+    largest = np.abs(without.run.part_energies(parts)).max(axis=0)
+    off = np.abs(energies[first] - energies[last]) > np.maximum(largest, round_off(without.history))
+    return tuple(part for part, one in zip(parts, off.tolist(), strict=True) if one)
+
+
+def _names(parts: Iterable[Part]) -> str:
+    return listing([part.name for part in parts])

@@ -13,10 +13,9 @@ import pytest
 from d2rpick.base.errors import RangeError
 from d2rpick.choice.answers import Verdict
 from d2rpick.choice.comparison import MOST_MOMENTUM_ERROR, Comparison, compare_runs
-from d2rpick.choice.judged_parts import rigid_parts
 from d2rpick.choice.of_run import compare_with, verify_of
 from d2rpick.choice.question import Settings
-from d2rpick.choice.switched_run import switched_history
+from d2rpick.choice.switched_run import rigid_parts, switched_history
 from d2rpick.histories.history import History, Samples, Track
 from d2rpick.histories.opening import Selection, open_run
 from tests.command import BOX, ENERGY, ROLLOVER, answer, put, refused, run
