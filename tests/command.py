@@ -38,7 +38,9 @@ _ENVIRONMENT = {"NO_COLOR": None, "FORCE_COLOR": None, "COLUMNS": None, "D2RPICK
 _APART: dict[str, Any] = {"mix_stderr": False} if "mix_stderr" in signature(CliRunner).parameters else {}
 
 
-def run(*args: str, stdin: bytes | None = None, color: bool = False, env: Mapping[str, str] | None = None) -> Result:
+def run(
+    *args: str, stdin: bytes | None = None, color: bool = False, env: Mapping[str, str | None] | None = None
+) -> Result:
     """Call ``d2rpick`` with these arguments; whatever it raises but the exit itself is raised here.
 
     What was asked before is not computed again, where it wrote no file and none has changed since.

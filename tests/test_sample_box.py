@@ -9,7 +9,7 @@ import pytest
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import READERS, Selection, open_run
 from d2rpick.models.box_model import Parameters
-from d2rpick.models.box_run import simulate
+from d2rpick.models.box_run import Record, simulate
 from tests import sample_box
 from tests.command import ROOT, answer
 
@@ -19,15 +19,29 @@ LARGEST = 320_000  # bytes of one sample
 
 
 @pytest.fixture(scope="module")
-def fresh() -> Mapping[str, bytes]:
-    """The files of a run that is computed now."""
-    return sample_box.files(simulate(Parameters(), sample_box.T_END, interval=sample_box.INTERVAL))
+def computed() -> Record:
+    """A run that is computed now."""
+    return simulate(Parameters(), sample_box.T_END, interval=sample_box.INTERVAL)
+
+
+@pytest.fixture(scope="module")
+def fresh(computed: Record) -> Mapping[str, bytes]:
+    """Its files."""
+    return sample_box.files(computed)
 
 
 def history(path: Path) -> History:
     """Energy of the box, or of box and step where a file does not tell them apart."""
     run = open_run([str(path)])
     return run.history(Selection(parts=("box",) if run.parts else ()))
+
+
+def test_by_default_the_trip_is_over_and_the_ground_comes_when_they_do_in_the_study(computed: Record) -> None:
+    assert computed.released is not None
+    assert computed.landed is not None
+    assert 0.070 <= computed.released <= 0.090
+    assert computed.landed == pytest.approx(0.380, abs=0.005)
+    assert np.abs(computed.imbalance).max() < 0.01
 
 
 @pytest.mark.slow

@@ -237,7 +237,7 @@ def test_pictures_and_pages(tmp_path: Path) -> None:
     assert '"command":["d2rpick suggest --td "' in page  # what can be explored
     assert "d2rpick suggest --td 0.0687534" in page
     assert found.recommended is not None
-    verdict = d2.verify(d2.read(ENERGY), tr=found.recommended.tr, td=float(TD), replay=False)
+    verdict = d2.verify(d2.read(ENERGY), tr=found.recommended.tr, td=float(TD))
     assert verdict.plot().axes
     assert "Verified" in verdict.report(str(tmp_path / "verdict.html")).read_text("utf-8")
 
