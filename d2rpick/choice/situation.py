@@ -329,12 +329,12 @@ def _swings(history: History, within: Span, fits: Fits) -> Swings | None:
 
 def _with_parts(evidence: Evidence, history: History, within: Span, fits: Fits) -> Evidence:
     """Add what the energies of single parts tell of the flight."""
-    from d2rpick.vibration.part_signs import read_parts
+    from d2rpick.vibration.part_signs import SignedParts
 
     assert history.part_energies is not None
     time, _ = history.between(*within)
     if time.size < 3:
         return evidence
     energies = history.part_energies[window(history.time, *within)]
-    parts = fits.once(("parts", *within), lambda: read_parts(time, energies, history.part_names))
+    parts = fits.once(("parts", *within), lambda: SignedParts(time, energies, history.part_names))
     return evidence._replace(parts=parts)

@@ -40,13 +40,13 @@ def energy_name(history: History) -> str:
 
 def heading(situation: Situation, *, verbose: bool = False) -> list[str]:
     """Lines above the table of a result: what was read, and what the choice rests on, ``verbose``: why."""
-    flight, share, why = situation.flight, situation.kinetic_share, situation.vibration.unknown
+    flight, share, why = situation.flight, situation.kinetic_share, situation.vibration.reasons if verbose else None
     known = "" if share is None else f", kinetic share {measure(share)}"
     estimate = " (estimate)" if situation.vibration.estimated else ""
     lines = [
         read_line(situation.history),
         f"td       {situation.td:.6g}: energy {situation.energy_td:.6g}{known}{estimate}",
-        f"basis    {_basis(situation)}{f': {why}' if verbose and why else ''}",
+        f"basis    {_basis(situation)}{f': {why}' if why else ''}",
     ]
     if flight.start is None:
         lines.append("flight   unknown")
@@ -66,7 +66,8 @@ def spoken(source: str | None) -> str:
 def _basis(situation: Situation) -> str:
     """What the choice rests on, and the oscillator behind it."""
     fit, vibration = situation.evidence.fit, situation.vibration
-    mode, parts = vibration.whole.mode, f"parts, signs of {', '.join(vibration.signed)}" if vibration.signed else ""
+    mode, signed = vibration.whole.mode, vibration.signed
+    parts = f"parts, signs of {', '.join(signed.names)}" if signed else ""
     parts = "swings of the energy, counted" if vibration.basis == "swings" else parts
     if not (mode and fit):
         return f"{parts}; kinetic energy from the modes of each part" if parts else _level_alone(situation)

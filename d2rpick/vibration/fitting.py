@@ -151,14 +151,18 @@ class Pencil(NamedTuple):
 
         ``orders`` are the numbers of exponentials that are tried.
         """
-        found = []
-        for order in orders:
-            v = self.vectors[:, :order]
-            found.append(np.linalg.eigvals(np.linalg.lstsq(v[:-1], v[1:], rcond=None)[0]))
-        z = np.concatenate(found).astype(np.complex128)
-        z = z[(z.imag > 0) & (np.abs(z) > 0)]
-        poles: NDArray[np.complex128] = np.log(z) * self.cells
+        z = np.concatenate([factors_of(self.vectors[:, :order]) for order in orders])
+        poles: NDArray[np.complex128] = np.log(z[(z.imag > 0) & (np.abs(z) > 0)]) * self.cells
         return poles
+
+
+def factors_of(vectors: Samples) -> NDArray[np.complex128]:
+    """Factors z of the exponentials z**k whose windows over k these ``vectors``, shape (n, order), span.
+
+    A shift by one turns the space of the windows into itself, with the factors for its eigenvalues.
+    """
+    shift = np.linalg.lstsq(vectors[:-1], vectors[1:], rcond=None)[0]
+    return np.linalg.eigvals(shift).astype(np.complex128)
 
 
 def cell_means(s: Samples, running: Samples, count: int) -> Samples:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.measures import Bound, Deformation
-    from d2rpick.vibration.part_signs import PartMatch, SignedParts, Unsigned
+    from d2rpick.vibration.part_signs import PartMatch, SignedParts
     from d2rpick.vibration.span import Span
     from d2rpick.vibration.swings import Swings
 
@@ -77,8 +77,8 @@ class Vibration:
         Why the kinetic share is an estimate; None where it is none.
     doubts : tuple of str
         Why the level at td means nothing, so that no tr can be trusted.
-    unsigned, signed : tuple
-        Parts that were left out, since their deformation has no sign; names of those whose signs are known.
+    parts : SignedParts or None
+        What single parts tell, also where it is not relied on.
     """
 
     basis: str
@@ -88,13 +88,28 @@ class Vibration:
     undescribed: str = ""
     estimated: str | None = None
     doubts: tuple[str, ...] = ()
-    unsigned: tuple[Unsigned, ...] = ()
-    signed: tuple[str, ...] = ()
+    parts: SignedParts | None = None
 
     @property
     def td(self) -> float:
         """The td from which it is seen [time]."""
         return self.whole.td
+
+    @property
+    def signed(self) -> SignedParts | None:
+        """The parts whose signs are relied on; None where they are not."""
+        return self.parts if self.basis == "parts" else None
+
+    @property
+    def reasons(self) -> str | None:
+        """Say why no deformation with its sign is known, of single parts too; None where one is."""
+        if self.compared or not self.parts:
+            return self.unknown
+        names: dict[str, list[str]] = {}  # of each reason, since all parts of a structure often share one
+        for part in self.parts.unsigned:
+            names.setdefault(part.reason, []).append(part.name)
+        of_parts = (f"{listing(alike, most=_NAMED)}: {reason}" for reason, alike in names.items())
+        return "; ".join((self.unknown or "", *of_parts))
 
     @property
     def kinetic_share(self) -> float | None:
@@ -150,12 +165,11 @@ class Vibration:
 
     def part_matches(self, tr: float) -> tuple[PartMatch, ...]:
         """What each part has of the mismatch; nothing where single parts are not known."""
-        if self.basis != "parts" or self.compared is None:
+        if self.signed is None:
             return ()
-        from d2rpick.vibration.part_signs import SignedParts, contributions  # not above: a table has no parts
+        from d2rpick.vibration.part_signs import contributions  # not above: a table has no parts
 
-        assert isinstance(self.compared.deformation, SignedParts)
-        return contributions(self.compared.deformation, tr, self.td)
+        return contributions(self.signed, tr, self.td)
 
     def comparable(self, times: Samples) -> NDArray[np.bool_]:
         """Which times have a deformation that can be compared with that at td."""
@@ -266,8 +280,7 @@ def model_at(whole: Vibration, evidence: Evidence) -> Vibration:
             _with_signs(whole, signed),
             basis="parts",
             undescribed="the signs of the parts' deformations cannot be followed from here to td",
-            unsigned=signed.unsigned,
-            signed=signed.names,
+            parts=signed,
         )
     if swings and not whole.doubts and doubtful(whole) and swings.known_at(td):
         modes = whole.whole
@@ -275,7 +288,7 @@ def model_at(whole: Vibration, evidence: Evidence) -> Vibration:
             return _of_swings(whole, swings)
         if swings.unseen(modes.span.start, td)[0] < modes.fit.hidden_share:
             return _of_swings(Vibration("energy", SampledEnergy(history, td), unknown=_LEFT_OVER), swings)
-    return whole if whole.compared else _without_parts(whole, evidence.parts, sunk=sunk)
+    return replace(_sunk(whole) if sunk else whole, parts=evidence.parts)
 
 
 def _of_swings(whole: Vibration, swings: Swings) -> Vibration:
@@ -292,16 +305,10 @@ def _with_signs(whole: Vibration, parts: SignedParts | Swings) -> Vibration:
     return replace(whole, compared=compared, unknown=None, estimated=whole.unknown)
 
 
-def _without_parts(whole: Vibration, parts: SignedParts | None, *, sunk: bool) -> Vibration:
-    """Say too why single parts do not tell the deformation: without a sign, or ``sunk`` at td."""
-    reasons = [whole.unknown or ""]
-    reasons += ["at td the vibration of the parts is below the error of a solver"] * sunk
-    names: dict[str, list[str]] = {}  # of each reason, since all parts of a structure often share one
-    for part in parts.unsigned if parts else ():
-        names.setdefault(part.reason, []).append(part.name)
-    reasons += [f"{listing(alike, most=_NAMED)}: {reason}" for reason, alike in names.items()]
-    doubts = (SUNK, *(doubt for doubt in whole.doubts if doubt != SUNK)) if sunk else whole.doubts
-    return replace(whole, unknown="; ".join(reasons), doubts=doubts)
+def _sunk(whole: Vibration) -> Vibration:
+    """Say too that the parts vibrate less at td than a solver errs."""
+    unknown = f"{whole.unknown}; at td the vibration of the parts is below the error of a solver"
+    return replace(whole, unknown=unknown, doubts=(SUNK, *(doubt for doubt in whole.doubts if doubt != SUNK)))
 
 
 def doubtful(whole: Vibration) -> bool:

@@ -10,7 +10,6 @@ the root of it with signs from its minima jumps or bends as no sum of a few wave
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
@@ -227,34 +226,94 @@ class Unsigned(NamedTuple):
     reason: str
 
 
-@dataclass(frozen=True, eq=False)
 class SignedParts:
     """Signed deformations of parts, and what else of their vibration is known.
 
+    Those that hold most are read first.  As soon as too much is known to have no sign, nothing rests on the others, and
+    they are read when somebody asks for their names.
+
     Parameters
     ----------
-    names : tuple of str
-        Of the k parts that have a sign.
-    motions : tuple of PartMotion
-        How each of them vibrates; the sign of a deformation as a whole is arbitrary.
     time : array of shape (n,)
-        Of the states that they were read from [time].
-    unsigned : tuple of Unsigned
-        Parts that were left out.
-    unsigned_share : float
-        What they hold of the energy, on average [-].
+        Of free flight [time].
+    energies : array of shape (n, k)
+        Internal energies of the parts [energy].
+    names : sequence of str
+        Of the k parts.
+
+    Examples
+    --------
+    >>> t = np.linspace(0.0, 2.0, 201)
+    >>> one, other = np.sin(5 * t) + np.sin(8 * t), np.cos(5 * t) - 0.5 * np.cos(8 * t)
+    >>> found = SignedParts(t, np.stack([one**2, other**2, other**2 + 1], axis=1), ["one", "other", "third"])
+    >>> found.names, [part.name for part in found.unsigned]
+    (('one', 'other'), ['third'])
+    >>> bool(np.abs(np.abs(found.motions[0].model.deformation(t) @ one) - one @ one) < 1e-6)
+    True
     """
 
-    names: tuple[str, ...]
-    motions: tuple[PartMotion, ...]
-    time: Samples
-    unsigned: tuple[Unsigned, ...]
-    unsigned_share: float
+    def __init__(self, time: Samples, energies: Samples, names: Sequence[str]) -> None:
+        self.time, self._names = time, names
+        self._roots = np.sqrt(np.maximum(energies.T, 0.0), order="C")
+        self._held = np.sum(self._roots**2, axis=1)
+        self._order = np.argsort(-self._held, kind="stable")
+
+    @cached_property
+    def _main(self) -> dict[int, PartMotion | Unsigned]:
+        """The parts that hold most, by their places, up to where too much has no sign."""
+        found: dict[int, PartMotion | Unsigned] = {}
+        lost, most = 0.0, MOST_UNSIGNED * self._held.sum()
+        for i, known in self._by_zeros(self._order):
+            motion = known if isinstance(known, PartMotion) else None
+            if motion is None or motion.hidden > SMALLEST:
+                motion = by_own_modes(self.time, self._roots[i] ** 2, motion)
+            found[i] = motion or known
+            lost += 0.0 if motion else self._held[i]
+            if lost > most:
+                break
+        return found
+
+    @cached_property
+    def _all(self) -> list[PartMotion | Unsigned]:
+        """All parts: where too much has no sign, no modes of their own are looked for in those that hold less."""
+        found = {**self._main, **dict(self._by_zeros(self._order[len(self._main) :]))}
+        return [found[i] for i in sorted(found)]
+
+    def _by_zeros(self, places: Places) -> Iterator[tuple[int, PartMotion | Unsigned]]:
+        """Read the signs of parts from the zeros of their energy."""
+        lasting = np.gradient(self.time)
+        for i, own in zip(places.tolist(), all_zeros(self.time, self._roots[places]), strict=True):
+            root = self._roots[i]
+            tracked = np.where(np.searchsorted(own.sure, self.time) % 2, -root, root)
+            reason = _no_sign(lasting, tracked, own.sure)
+            motion = None if reason else followed(self.time, tracked, own)
+            yield i, motion or Unsigned(self._names[i], reason or _NOT_FOLLOWED)
+
+    @cached_property
+    def unsigned_share(self) -> float:
+        """What parts that were left out hold of the energy, on average: all, or those by which it is too much [-]."""
+        lost = sum(self._held[i] for i, known in self._main.items() if isinstance(known, Unsigned))
+        return float(lost / self._held.sum()) if lost else float(not self._held.any())
 
     @property
     def signed(self) -> bool:
         """Whether enough of the energy lies in parts that have a sign."""
-        return bool(self.names) and self.unsigned_share <= MOST_UNSIGNED
+        return self.unsigned_share <= MOST_UNSIGNED
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Of the k parts that have a sign."""
+        return tuple(name for name, known in zip(self._names, self._all, strict=True) if isinstance(known, PartMotion))
+
+    @cached_property
+    def motions(self) -> tuple[PartMotion, ...]:
+        """How each of them vibrates; the sign of a deformation as a whole is arbitrary."""
+        return tuple(known for known in self._all if isinstance(known, PartMotion))
+
+    @property
+    def unsigned(self) -> tuple[Unsigned, ...]:
+        """Parts that were left out."""
+        return tuple(known for known in self._all if isinstance(known, Unsigned))
 
     @cached_property
     def owner(self) -> Places:
@@ -297,55 +356,6 @@ class SignedParts:
         """Earliest time whose signs can be compared with those at ``td`` [time]."""
         before = self.unclear[self.unclear < td]
         return float(before[-1] if before.size else self.time[0])
-
-
-def read_parts(time: Samples, energies: Samples, names: Sequence[str]) -> SignedParts:
-    """Read the signed deformation of each part.
-
-    Parameters
-    ----------
-    time : array of shape (n,)
-        Of free flight [time].
-    energies : array of shape (n, k)
-        Internal energies of the parts [energy].
-    names : sequence of str
-        Of the k parts.
-
-    Examples
-    --------
-    >>> t = np.linspace(0.0, 2.0, 201)
-    >>> one, other = np.sin(5 * t) + np.sin(8 * t), np.cos(5 * t) - 0.5 * np.cos(8 * t)
-    >>> found = read_parts(t, np.stack([one**2, other**2, other**2 + 1], axis=1), ["one", "other", "third"])
-    >>> found.names, [part.name for part in found.unsigned]
-    (('one', 'other'), ['third'])
-    >>> bool(np.abs(np.abs(found.motions[0].model.deformation(t) @ one) - one @ one) < 1e-6)
-    True
-    """
-    roots = np.sqrt(np.maximum(energies.T, 0.0), order="C")
-    lasting, held = np.gradient(time), np.sum(roots**2, axis=1)
-    found: dict[int, PartMotion] = {}
-    reasons: dict[int, str] = {}
-    lost = 0.0
-    zeros = list(all_zeros(time, roots))
-    for i in np.argsort(-held, kind="stable").tolist():
-        root, own = roots[i], zeros[i]
-        tracked = np.where(np.searchsorted(own.sure, time) % 2, -root, root)
-        reason = _no_sign(lasting, tracked, own.sure)
-        motion = None if reason else followed(time, tracked, own)
-        if (motion is None or motion.hidden > SMALLEST) and lost <= MOST_UNSIGNED * held.sum():  # else it is no use
-            motion = by_own_modes(time, root**2, motion)
-        if motion:
-            found[i] = motion
-        else:
-            reasons[i] = reason or _NOT_FOLLOWED
-            lost += held[i]
-    return SignedParts(
-        names=tuple(names[i] for i in sorted(found)),
-        motions=tuple(found[i] for i in sorted(found)),
-        time=time,
-        unsigned=tuple(Unsigned(names[i], reasons[i]) for i in sorted(reasons)),
-        unsigned_share=float(lost / held.sum()) if lost else float(not held.any()),
-    )
 
 
 def _no_sign(lasting: Samples, deformation: Samples, zeros: Samples) -> str | None:

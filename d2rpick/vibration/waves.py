@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.vibration.fitting import factors_of
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -80,8 +82,8 @@ def fit_waves(time: Samples, deformation: Samples) -> Waves | None:
 
     Notes
     -----
-    Windows of equidistant samples lie in the space that the windows of the waves span, and a shift by one sample turns
-    it into itself: its eigenvalues are exp(lambda h) (Barkhuijsen et al., Journal of Magnetic Resonance 73, 1987).
+    Windows of equidistant samples lie in the space that the windows of the waves span (Barkhuijsen et al., Journal of
+    Magnetic Resonance 73, 1987).
 
     Examples
     --------
@@ -106,8 +108,7 @@ def fit_waves(time: Samples, deformation: Samples) -> Waves | None:
 
 def _fit(space: Samples, step: float, time: Samples, deformation: Samples) -> tuple[float, Waves] | None:
     """Sum of squares that is left, and the waves whose windows span ``space``, an orthonormal basis in columns."""
-    shift = np.linalg.lstsq(space[:-1], space[1:], rcond=None)[0]
-    rates = np.log(np.linalg.eigvals(shift).astype(np.complex128)) / step
+    rates = np.log(factors_of(space)) / step
     rates = rates[rates.imag > np.abs(rates.real)]  # what decays faster is no vibration
     if not rates.size:
         return None

@@ -8,7 +8,7 @@ from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.histories.history import History
 from d2rpick.vibration.measures import kinetic_share, lock_in_error
-from d2rpick.vibration.part_signs import all_zeros, by_own_modes, followed, read_parts
+from d2rpick.vibration.part_signs import SignedParts, all_zeros, by_own_modes, followed
 from d2rpick.vibration.waves import Waves
 from tests.benchmarks.promise_parts import Motion, history
 from tests.records import known, noisy
@@ -62,7 +62,7 @@ def test_minima_that_stay_above_zero_prove_no_sign() -> None:
 
 
 def test_what_a_second_plane_may_hold_unseen_widens_the_residual() -> None:
-    small = read_parts(TIME, planes(5e-4).energies(TIME), NAMES)
+    small = SignedParts(TIME, planes(5e-4).energies(TIME), NAMES)
     assert small.names == NAMES
     assert all(isinstance(motion.model, Waves) for motion in small.motions)  # taken for one plane
     tr, td = np.array([0.05, 0.1]), 0.2072
@@ -76,7 +76,7 @@ def test_what_a_second_plane_may_hold_unseen_widens_the_residual() -> None:
 
 
 def test_parts_of_several_springs_in_which_modes_mix_have_no_sign() -> None:
-    parts = read_parts(TIME, grouped().energies(TIME), NAMES)
+    parts = SignedParts(TIME, grouped().energies(TIME), NAMES)
     assert parts.names == ("B",)
     assert [one.name for one in parts.unsigned] == ["A"]
     assert examine(written(grouped()), 0.3, Settings(after=0.0)).basis != "parts"
@@ -87,7 +87,7 @@ def test_what_crosses_between_modes_in_the_parts_is_no_part_of_the_error() -> No
     rows = np.array([[0.9, 0.6], [0.8, -0.3]])
     forms = np.einsum("pi,pj->pij", rows, rows)
     truth = Motion(3.0, 2 * np.pi * np.array([24.0, 37.0]), np.array([0.4, 2.1]), forms)
-    parts = read_parts(TIME, truth.energies(TIME), NAMES)
+    parts = SignedParts(TIME, truth.energies(TIME), NAMES)
     assert parts.names == NAMES
     td = 0.31
     for tr in (0.05, 0.1, 0.2):

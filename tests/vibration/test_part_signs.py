@@ -1,5 +1,6 @@
 """Deformations of single parts: their signs, what they say of a pair, and where they say nothing."""
 
+from copy import copy
 from dataclasses import replace
 from functools import cache
 
@@ -16,7 +17,7 @@ from d2rpick.cli import d2rpick  # noqa: F401  imported first, it sets the threa
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.vibration.model import SUNK
-from d2rpick.vibration.part_signs import MOST_UNSIGNED, PartMotion, SignedParts, read_parts
+from d2rpick.vibration.part_signs import MOST_UNSIGNED, PartMotion, SignedParts
 from d2rpick.vibration.waves import Waves
 from tests import chain
 from tests.command import BOX
@@ -60,7 +61,7 @@ def seen(td: float) -> Situation:
 def test_signs_are_followed_through_every_zero(samples_per_period: int) -> None:
     time = np.arange(0, 12, 2 * np.pi / 8.3 / samples_per_period)
     true = two_springs(time)
-    found = read_parts(time, printed(true.ravel() ** 2).reshape(true.shape), NAMES)
+    found = SignedParts(time, printed(true.ravel() ** 2).reshape(true.shape), NAMES)
     assert found.names == NAMES
     known = (time > found.comparable_since(10.8)) & (time < 10.8)
     for own, expected in zip(deformations(found, time[known]), true.T[:, known], strict=True):
@@ -78,7 +79,7 @@ def test_one_spring_is_compared_as_its_oscillator_tells(
     td = 0.9 * time[-1]
     tr = tr / 6 * td
     deformation = np.exp(-damping * rate * time) * np.sin(rate * time + phase)
-    found = read_parts(time, deformation[:, np.newaxis] ** 2, ["one"])
+    found = SignedParts(time, deformation[:, np.newaxis] ** 2, ["one"])
     assert found.signed
     assume(found.comparable_since(td) <= tr)
     true = np.interp([tr, td], time, deformation)
@@ -99,7 +100,7 @@ def test_one_spring_is_compared_as_its_oscillator_tells(
 )
 def test_a_part_that_does_not_swing_about_zero_has_no_sign(make: object, reason: str) -> None:
     time = np.arange(0, 12, 0.02)
-    found = read_parts(time, np.stack([two_springs(time)[:, 0] ** 2, make(time)], axis=1), ["good", "bad"])  # type: ignore[operator]
+    found = SignedParts(time, np.stack([two_springs(time)[:, 0] ** 2, make(time)], axis=1), ["good", "bad"])  # type: ignore[operator]
     assert found.names == ("good",)
     assert [(part.name, reason in part.reason) for part in found.unsigned] == [("bad", True)]
     assert not found.signed
@@ -158,13 +159,14 @@ def test_parts_that_vibrate_no_more_than_a_solver_errs_have_no_residual() -> Non
     started = Waves(
         np.array([-300 + 900j]), np.array([101 * np.sqrt(parts.vibration_energy(chain.TD_LATE))]), parts.time[0]
     )
-    sunk = replace(parts, motions=(*parts.motions, PartMotion(started, np.zeros(0), 0.0)))
+    sunk = copy(parts)
+    sunk.motions = (*parts.motions, PartMotion(started, np.zeros(0), 0.0))
     situation = replace(situation, evidence=situation.evidence._replace(fit=None, span=None, parts=sunk))
     assert (situation.basis, situation.kinetic_share, situation.vibration.doubts) == ("energy", None, (SUNK,))
     (candidate,) = judge(situation, [0.18])
     assert (candidate.acceptable, candidate.residual, candidate.sign_match) == (False, None, None)
     assert "the level at td is below the noise of the record" in candidate.notes
-    assert "is below the error of a solver" in (situation.vibration.unknown or "")
+    assert "is below the error of a solver" in (situation.vibration.reasons or "")
     assert situation.at(chain.TD_PEAK).basis == "parts"
 
 
@@ -223,7 +225,7 @@ def test_the_rollover_has_no_signs_and_says_why() -> None:
     assert answer.situation.basis == "energy"
     best = answer.candidates[0]
     assert (best.sign_match, best.residual, best.part_mismatch, best.parts) == (None, None, None, ())
-    reason = answer.situation.vibration.unknown or ""
+    reason = answer.situation.vibration.reasons or ""
     assert reason.count("box, step: the energy does not return to zero") == 1  # said once for both
 
 
@@ -239,7 +241,7 @@ def test_several_energies_are_carried_but_for_those_that_are_always_zero() -> No
 
 def test_between_the_states_the_model_tells_the_deformation_and_what_is_kinetic() -> None:
     time = np.linspace(0, 6, 201)
-    found = read_parts(time, two_springs(time) ** 2, NAMES)
+    found = SignedParts(time, two_springs(time) ** 2, NAMES)
     at = np.array([0.123, 1.0, 1.9876, 4.321])
     assert np.abs(deformations(found, at)) == pytest.approx(np.abs(two_springs(at).T), abs=1e-4)
     slow, fast = np.exp(-0.2 * at) * np.cos(5 * at) ** 2, np.exp(-0.2 * at) * np.sin(8.3 * at) ** 2
