@@ -207,19 +207,33 @@ class Column(NamedTuple):
         bare = re.sub(r"\s*[\[(][^\d\])]+[\])]$", "", leaf)
         return re.sub(r"[\s\-]+", "_", bare.strip().lower())
 
-    def load(self, file: h5py.File, source: str) -> Samples:
-        """Its values, shape (size,); FormatError unless all are finite."""
+    def load(self, file: h5py.File, content: bytes, source: str) -> Samples:
+        """Its values, shape (size,), of a file with that ``content``; FormatError unless all are finite."""
         dataset = file[self.dataset]
         check_data(dataset, source)
+        if self.field is None and self.place is None:
+            return finite(_values(dataset, content), self.path, source).reshape(self.size)
         whole = dataset if self.field is None else dataset.fields(self.field)
-        if self.place is None or self.field is not None:
+        if self.place is None:
             values = whole[()]
+        elif self.field is not None:
+            values = whole[()][:, self.place[1]]
         else:
             axis, index = self.place
             values = whole[index, :] if axis == 0 else whole[:, index]
-        if self.field is not None and self.place is not None:
-            values = values[:, self.place[1]]
         return finite(values, self.path, source).reshape(self.size)
+
+
+# Of a file: smaller data are copied out of it, or what a column keeps in memory would be far more than itself.
+_LARGE: Final = 1 / 4
+
+
+def _values(dataset: h5py.Dataset, content: bytes) -> Any:
+    """Numbers of a dataset; where it makes much of the file with that ``content``, in one piece, they stay there."""
+    start = dataset.id.get_offset()  # None of data in chunks, and in other files
+    if start is None or not _LARGE * len(content) < dataset.nbytes <= len(content) - start:
+        return dataset[()]
+    return np.frombuffer(content, dataset.dtype, dataset.size, start).reshape(dataset.shape)
 
 
 def finite(values: Any, path: str, source: str) -> Samples:

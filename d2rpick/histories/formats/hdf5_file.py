@@ -10,7 +10,7 @@ import io
 from contextlib import contextmanager
 from functools import cached_property
 from importlib import import_module
-from typing import TYPE_CHECKING, BinaryIO, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -56,7 +56,7 @@ def _opened_leg(source: Source, selection: Selection) -> Database:
     return SavedBinout(source.name, branches) if branches else Columns(file, source.name, selection)
 
 
-def _branches(file: BinaryIO, source: str) -> dict[str, PartGroup]:
+def _branches(file: io.BytesIO, source: str) -> dict[str, PartGroup]:
     """Open the glstat and matsum branches that lasso-python saved; none in files of other layouts."""
     with _opened(file, source) as opened:
         return {
@@ -73,7 +73,7 @@ class Columns(Database):
 
     format = "hdf5"
 
-    def __init__(self, file: BinaryIO, source: str, selection: Selection) -> None:
+    def __init__(self, file: io.BytesIO, source: str, selection: Selection) -> None:
         self._file, self.source = file, source
         with _opened(file, source) as opened:
             self._columns = columns_of(opened)
@@ -121,7 +121,7 @@ class Columns(Database):
 
     def _load(self, column: Column) -> Samples:
         with _opened(self._file, self.source) as opened:
-            return column.load(opened, self.source)
+            return column.load(opened, self._file.getvalue(), self.source)
 
 
 class SavedBinout(Branched):
@@ -146,7 +146,7 @@ class SavedBinout(Branched):
 class PartGroup(Database):
     """The glstat or matsum branch of a file that lasso-python saved."""
 
-    def __init__(self, file: BinaryIO, source: str, opened: h5py.File, name: str) -> None:
+    def __init__(self, file: io.BytesIO, source: str, opened: h5py.File, name: str) -> None:
         self._file, self.source, self.name = file, source, name
         group = opened[name]
         self.title = _line(group, "title")
@@ -264,7 +264,7 @@ def _import_library(source: str) -> None:
 
 
 @contextmanager
-def _opened(file: BinaryIO, source: str) -> Iterator[h5py.File]:
+def _opened(file: io.BytesIO, source: str) -> Iterator[h5py.File]:
     """Open the file; whatever h5py makes of a damaged one becomes a FormatError."""
     import h5py
 

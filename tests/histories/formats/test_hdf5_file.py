@@ -55,6 +55,20 @@ def test_every_layout_gives_the_numbers_put_in(layout: str) -> None:
     assert history.energy.tolist() == expected.tolist()
 
 
+@pytest.mark.parametrize("user_block", [0, 512])
+@pytest.mark.parametrize("chunks", [None, True])
+def test_columns_that_make_most_of_a_file_are_read_where_they_lie(user_block: int, chunks: bool | None) -> None:
+    content, rng = io.BytesIO(), np.random.default_rng(1)
+    time, energy = np.arange(5000, dtype=">f8"), rng.random((5000, 1)).astype("f4")
+    with h5py.File(content, "w", userblock_size=user_block) as file:
+        file.create_dataset("time", data=time, chunks=chunks)
+        file.create_dataset("internal_energy", data=energy, chunks=chunks)
+    history = read(content)
+    assert history.time.tolist() == time.tolist()
+    assert history.energy.tolist() == energy.ravel().tolist()
+    assert (history.time.flags.writeable, history.energy.flags.writeable) == (False, False)
+
+
 def test_lasso_branches_have_each_their_own_time_and_parts_by_number() -> None:
     run = saved(written(lasso))
     assert (run.title, run.version) == ("Sphere", "smp s 365")
