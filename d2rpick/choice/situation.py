@@ -289,10 +289,12 @@ def _oscillator(
     around = [one for one in known if one[1].start <= td <= one[1].end]
     if quick and around:
         return around[0]
-    one = fits.remembered("one", identify)
+    one = fits.remembered("one", partial(identify, memory=fits))
     span, fit = described_span(history, td, bounds, partial(one, quick=True) if quick else one, whole=whole)
     if span is None:
-        fitter = partial(fits.remembered("several", identify_several), quick=True)  # nobody asks why it is refused
+        fitter = partial(
+            fits.remembered("several", partial(identify_several, memory=fits)), quick=True
+        )  # nobody asks why it is refused
         span, several = described_span(history, td, bounds, fitter, whole=whole)
         fit = several if span else fit
     fit = _resolved(history, fit, fits)

@@ -152,8 +152,7 @@ class Pencil(NamedTuple):
         ``orders`` are the numbers of exponentials that are tried.
         """
         z = np.concatenate([factors_of(self.vectors[:, :order]) for order in orders])
-        poles: NDArray[np.complex128] = np.log(z[(z.imag > 0) & (np.abs(z) > 0)]) * self.cells
-        return poles
+        return np.asarray(np.log(z[z.imag > 0]) * self.cells)
 
 
 def factors_of(vectors: Samples) -> NDArray[np.complex128]:
@@ -257,6 +256,19 @@ def evaluated(parameters: Samples, model: Model, s: Samples) -> tuple[Samples, S
         energy[block], jacobian = model(parameters, s[block])
         normal = normal + jacobian @ jacobian.T
     return energy, normal
+
+
+# A parameter with no larger derivatives, of energies of the size of 1, changes nothing; squares below it underflow.
+_NO_EFFECT: Final = 1e-100
+
+
+def covariance(normal: Samples, rest: Samples) -> Samples:
+    """s**2 (J J^T)^-1, by the pseudo-inverse of the matrix scaled to a unit diagonal."""
+    norm = np.sqrt(normal.diagonal())
+    norm[norm < _NO_EFFECT] = 1.0
+    scale = norm * norm[:, None]
+    variance = float(rest @ rest) / (rest.size - norm.size)
+    return np.asarray(variance * np.linalg.pinv(normal / scale, hermitian=True) / scale)
 
 
 # Least difference of two rates over the record to start from [rad]: below a quarter of a beat two modes act as one.

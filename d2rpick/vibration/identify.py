@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.histories.history import Memory
 from d2rpick.vibration import fitting
 from d2rpick.vibration.fitting import MAX_MISFIT
 from d2rpick.vibration.modes import Mode, Modes, energy_and_jacobian, sum_and_jacobian
@@ -30,9 +31,6 @@ _OF_A_PRELOAD: Final = 0.03  # of the vibration energy: lifts a residual of 0.2,
 
 # The energy below which a rest is not held against a mode: a solver errs by 1e-5 of the maximum anywhere.
 _FLOOR: Final = 1e-4  # of the highest vibration energy
-
-# A parameter with no larger derivatives, of energies of the size of 1, changes nothing; squares below it underflow.
-_NO_EFFECT: Final = 1e-100
 
 # Free parameters of the models, simplest first, and the vibration periods it takes to tell them apart.
 _MODELS: Final = ((fitting.VIBRATION, 1.25), (fitting.WITH_PLASTIC, 1.5), (fitting.WITH_PRELOAD, 2.0))
@@ -105,7 +103,7 @@ class Identification(NamedTuple):
         return np.sqrt(np.maximum(variance, 0.0))
 
 
-def identify(time: Samples, energy: Samples, *, quick: bool = False) -> Identification:
+def identify(time: Samples, energy: Samples, *, quick: bool = False, memory: Memory | None = None) -> Identification:
     """Fit one vibration to E(t), else one over plastic work, else one about a preload, and judge the fit.
 
     Parameters
@@ -116,6 +114,8 @@ def identify(time: Samples, energy: Samples, *, quick: bool = False) -> Identifi
         Internal energy; may be zero or negative, as some solvers write it [energy].
     quick : bool
         Refuse where a few samples show that no model follows, without the best fit to all of them and its misfit.
+    memory : Memory
+        Of the record that these samples are a window of: its ends tell the window.
 
     Returns
     -------
@@ -137,11 +137,10 @@ def identify(time: Samples, energy: Samples, *, quick: bool = False) -> Identifi
     >>> identify(t, np.ones(121)).reason
     'the energy is constant, 1: nothing vibrates'
     """
-    lacking = _lacking(time, energy)
-    if lacking:
-        return _nothing(time, lacking)
+    if lacking := _lacking(time, energy):
+        return lacking
     record = _Record.scaled(time, energy)
-    poles = fitting.Pencil.of(record.s, record.e).rates()
+    poles = record.pencil(memory).rates()
     if poles.size == 0:
         return _nothing(time, "the energy does not oscillate: nothing vibrates, or it is overdamped")
     if quick and fitting.hopeless(poles, record.s, record.e, HOPELESS):
@@ -152,7 +151,9 @@ def identify(time: Samples, energy: Samples, *, quick: bool = False) -> Identifi
     return _first_to_follow(attempts, record)
 
 
-def identify_several(time: Samples, energy: Samples, *, quick: bool = False) -> Identification:
+def identify_several(
+    time: Samples, energy: Samples, *, quick: bool = False, memory: Memory | None = None
+) -> Identification:
     """Fit two vibrations of one damping to E(t), else three, and judge the fit.
 
     Parameters and result as for ``identify``; for records that one vibration does not describe.
@@ -170,11 +171,10 @@ def identify_several(time: Samples, energy: Samples, *, quick: bool = False) -> 
     >>> found.describes_record, [f"{mode.omega:.6f}" for mode in found.mode.modes]
     (True, ['5.000000', '8.000000'])
     """
-    lacking = _lacking(time, energy)
-    if lacking:
-        return _nothing(time, lacking)
+    if lacking := _lacking(time, energy):
+        return lacking
     record = _Record.scaled(time, energy)
-    pencil, worst = fitting.Pencil.of(record.s, record.e), HOPELESS if quick else np.inf
+    pencil, worst = record.pencil(memory), HOPELESS if quick else np.inf
     fits = (fitting.fit_several(pencil, record.s, record.e, count, worst) for count in _SEVERAL)
     return _first_to_follow(((_sum(found, record), _PERIODS_OF_SEVERAL) for found in fits if found is not None), record)
 
@@ -182,11 +182,9 @@ def identify_several(time: Samples, energy: Samples, *, quick: bool = False) -> 
 def identify_beside(time: Samples, energy: Samples, mode: Mode, rates: Samples) -> Identification:
     """Fit a second mode beside ``mode``, from each of ``rates`` [1/time], and judge the best fit of both."""
     record = _Record.scaled(time, energy)
-    span = record.end - record.start
-    starts = [
-        fitting.linear_fit(span * np.array([mode.omega, rate]), span * mode.alpha, record.s, record.e) for rate in rates
-    ]
-    ends = [fitting.minimise(start, sum_and_jacobian, record.s, record.e) for _, start in starts]
+    s, e, span = record.s, record.e, record.end - record.start
+    starts = (fitting.linear_fit(span * np.array([mode.omega, rate]), span * mode.alpha, s, e)[1] for rate in rates)
+    ends = [fitting.minimise(start, sum_and_jacobian, s, e) for start in starts]
     best = _sum(min(ends, key=lambda end: end[1])[0], record)
     return _judged(best, _PERIODS_OF_SEVERAL, record, MIN_SAMPLES_BESIDE)
 
@@ -228,9 +226,8 @@ def judge_given(mode: Mode, time: Samples, energy: Samples, *, quick: bool = Fal
 
     Parameters and result as for ``identify``; the mode stays as it is and has no scatter.
     """
-    lacking = _lacking(time, energy)
-    if lacking:
-        return _nothing(time, lacking)
+    if lacking := _lacking(time, energy):
+        return lacking
     few = slice(None, None, -(-time.size // fitting.COARSE))
     if quick and np.var(energy[few] - mode.energy(time[few])) > HOPELESS * np.var(energy[few]):
         return _out_of_reach(time)
@@ -258,6 +255,10 @@ class _Record(NamedTuple):
         start, end, scale = float(time[0]), float(time[-1]), float(np.ptp(energy))
         return cls((time - start) / (end - start), energy / scale, start, end, scale)
 
+    def pencil(self, memory: Memory | None) -> fitting.Pencil:
+        """What exponentials E may consist of, found once for all fits that share a memory."""
+        return (memory or Memory()).once(("pencil", self.start, self.end), lambda: fitting.Pencil.of(self.s, self.e))
+
     @property
     def units(self) -> Samples:
         """Units of the parameters of a fit in those of the record."""
@@ -265,13 +266,13 @@ class _Record(NamedTuple):
         return np.array([rate, rate, root, root, self.scale, root])
 
 
-def _lacking(time: Samples, energy: Samples) -> str | None:
-    """Say what a record lacks for any judgement."""
+def _lacking(time: Samples, energy: Samples) -> Identification | None:
+    """Refuse a record that lacks what any judgement needs."""
     if time.size < MIN_SAMPLES:
         found = "1 state" if time.size == 1 else f"{time.size} states"
-        return f"there are only {found} to fit, at least {MIN_SAMPLES} are needed"
+        return _nothing(time, f"there are only {found} to fit, at least {MIN_SAMPLES} are needed")
     if float(np.ptp(energy)) <= 1e-12 * float(np.max(np.abs(energy))):  # the rounding of a constant
-        return f"the energy is constant, {energy[0]:g}: nothing vibrates"
+        return _nothing(time, f"the energy is constant, {energy[0]:g}: nothing vibrates")
     return None
 
 
@@ -328,7 +329,7 @@ def _judged(
         structure=structure * record.scale,
         start=record.start,
         end=record.end,
-        covariance=_covariance(attempt.normal, rest) * attempt.units * attempt.units[:, None],
+        covariance=fitting.covariance(attempt.normal, rest) * attempt.units * attempt.units[:, None],
         vibration=vibration * record.scale,
         follows=loose is None,
         plausible=wrong is None,
@@ -377,16 +378,6 @@ def _implausible(
         found = f"the energy has {density:.2f} samples per period, fewer than {least_density}"
         return f"{found}, and this mode may be aliased: write the output at intervals of {finer:.2g} or less"
     return None
-
-
-def _covariance(normal: Samples, rest: Samples) -> Samples:
-    """s**2 (J J^T)^-1, by the pseudo-inverse of the matrix scaled to a unit diagonal."""
-    norm = np.sqrt(normal.diagonal())
-    norm[norm < _NO_EFFECT] = 1.0
-    scale = norm * norm[:, None]
-    variance = float(rest @ rest) / (rest.size - norm.size)
-    covariance: Samples = variance * np.linalg.pinv(normal / scale, hermitian=True) / scale
-    return covariance
 
 
 def _mode(parameters: Samples, origin: float) -> Mode:

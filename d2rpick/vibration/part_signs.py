@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
 import numpy as np
 
+from d2rpick.histories.history import Memory
 from d2rpick.histories.samples import stretches
 from d2rpick.vibration import measures
 from d2rpick.vibration.identify import Identification, identify, identify_several
@@ -100,10 +101,10 @@ def by_own_modes(time: Samples, energy: Samples, followed: PartMotion | None) ->
 
     Else, or where they leave hardly less, ``followed`` is given.
     """
-    fit = identify(time, energy, quick=True)
-    if not _purely_vibrates(fit):
-        fit = identify_several(time, energy, quick=True)
-    if not _purely_vibrates(fit):
+    memory = Memory()
+    fits = (fitter(time, energy, quick=True, memory=memory) for fitter in (identify, identify_several))
+    fit = next(filter(_purely_vibrates, fits), None)
+    if fit is None:
         return followed
     fit = resolved(time, energy, fit)
     if fit.mode is None or (followed and fit.hidden_share > _CLEARLY * followed.hidden):
@@ -241,6 +242,11 @@ class SignedParts:
     names : sequence of str
         Of the k parts.
 
+    Attributes
+    ----------
+    unsigned_share : float
+        What the parts that were left out hold of the energy, on average; of too many, those that hold most [-].
+
     Examples
     --------
     >>> t = np.linspace(0.0, 2.0, 201)
@@ -255,29 +261,18 @@ class SignedParts:
     def __init__(self, time: Samples, energies: Samples, names: Sequence[str]) -> None:
         self.time, self._names = time, names
         self._roots = np.sqrt(np.maximum(energies.T, 0.0), order="C")
-        self._held = np.sum(self._roots**2, axis=1)
-        self._order = np.argsort(-self._held, kind="stable")
-
-    @cached_property
-    def _main(self) -> dict[int, PartMotion | Unsigned]:
-        """The parts that hold most, by their places, up to where too much has no sign."""
-        found: dict[int, PartMotion | Unsigned] = {}
-        lost, most = 0.0, MOST_UNSIGNED * self._held.sum()
+        held = np.sum(self._roots**2, axis=1)
+        self._order = np.argsort(-held, kind="stable")
+        lost, self._main = 0.0, dict[int, PartMotion | Unsigned]()
         for i, known in self._by_zeros(self._order):
             motion = known if isinstance(known, PartMotion) else None
             if motion is None or motion.hidden > SMALLEST:
-                motion = by_own_modes(self.time, self._roots[i] ** 2, motion)
-            found[i] = motion or known
-            lost += 0.0 if motion else self._held[i]
-            if lost > most:
+                motion = by_own_modes(time, self._roots[i] ** 2, motion)
+            self._main[i] = motion or known
+            lost += 0.0 if motion else held[i]
+            if lost > MOST_UNSIGNED * held.sum():
                 break
-        return found
-
-    @cached_property
-    def _all(self) -> list[PartMotion | Unsigned]:
-        """All parts: where too much has no sign, no modes of their own are looked for in those that hold less."""
-        found = {**self._main, **dict(self._by_zeros(self._order[len(self._main) :]))}
-        return [found[i] for i in sorted(found)]
+        self.unsigned_share = float(lost / held.sum()) if lost else float(not held.any())
 
     def _by_zeros(self, places: Places) -> Iterator[tuple[int, PartMotion | Unsigned]]:
         """Read the signs of parts from the zeros of their energy."""
@@ -290,10 +285,10 @@ class SignedParts:
             yield i, motion or Unsigned(self._names[i], reason or _NOT_FOLLOWED)
 
     @cached_property
-    def unsigned_share(self) -> float:
-        """What parts that were left out hold of the energy, on average: all, or those by which it is too much [-]."""
-        lost = sum(self._held[i] for i, known in self._main.items() if isinstance(known, Unsigned))
-        return float(lost / self._held.sum()) if lost else float(not self._held.any())
+    def _all(self) -> list[PartMotion | Unsigned]:
+        """All parts: where too much has no sign, no modes of their own are looked for in those that hold less."""
+        found = {**self._main, **dict(self._by_zeros(self._order[len(self._main) :]))}
+        return [found[i] for i in sorted(found)]
 
     @property
     def signed(self) -> bool:
@@ -319,11 +314,6 @@ class SignedParts:
     def owner(self) -> Places:
         """Place in ``names`` of the part of each deformation: a part has one for each of its modes."""
         return np.repeat(np.arange(len(self.names)), [len(one.model.amplitudes(0.0)) for one in self.motions])
-
-    @cached_property
-    def unclear(self) -> Samples:
-        """Times where the sign of some part may turn or not: no two times on different sides can be compared."""
-        return np.sort(np.concatenate([np.zeros(0), *(one.unclear for one in self.motions)]))
 
     def amplitudes(self, t: Samples | float) -> Samples:
         """Signed deformations of the parts' modes, of the shape of ``t`` with an axis before it [sqrt(energy)]."""
@@ -353,9 +343,9 @@ class SignedParts:
         return np.asarray(np.sqrt(residual**2 + apart**2 / self.vibration_energy(td)))
 
     def comparable_since(self, td: float) -> float:
-        """Earliest time whose signs can be compared with those at ``td`` [time]."""
-        before = self.unclear[self.unclear < td]
-        return float(before[-1] if before.size else self.time[0])
+        """Earliest time whose signs can be compared with those at ``td``: the last unclear one before it [time]."""
+        unclear = np.concatenate([one.unclear for one in self.motions])
+        return float(np.max(unclear[unclear < td], initial=self.time[0]))
 
 
 def _no_sign(lasting: Samples, deformation: Samples, zeros: Samples) -> str | None:
