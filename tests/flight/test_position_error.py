@@ -1,6 +1,7 @@
 """How far a body is out of place at td: of bodies that turn, of those that tell nothing, and of a solver's runs."""
 
 import csv
+from functools import cache
 
 import numpy as np
 import pytest
@@ -138,6 +139,7 @@ def test_without_rotation_a_slow_swing_passes_for_nothing() -> None:
     assert not drift(momenta(np.zeros(3), slides)).at_least
 
 
+@cache
 def computed_drift(name: str, parts: str, flight: tuple[float, float]) -> Drift:
     """By the momenta of a run that a solver computed."""
     history = solved(name, parts).history

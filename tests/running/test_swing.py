@@ -1,12 +1,14 @@
 """What is said of parts that still swing as a body becomes rigid: by the flight so far, without td."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
 from d2rpick.deck import read_inventory
 from d2rpick.flight.flight import Flight
-from d2rpick.flight.position_error import drift_in_flight
-from d2rpick.histories.history import EXACT, Momenta
+from d2rpick.flight.position_error import Drift, drift_in_flight
+from d2rpick.histories.history import EXACT, History, Momenta
 from d2rpick.histories.names import Part
 from d2rpick.running.drive import Looks
 from d2rpick.running.sequence import Window
@@ -19,12 +21,18 @@ CAR = ROOT / "tests" / "data" / "carT01.gz"
 FREE, TD = 0.0385, 0.1464
 
 
-@pytest.mark.parametrize("tr", [0.0605, 0.0676, 0.075, 0.09])
-def test_what_a_flight_shows_up_to_tr_is_about_the_error_at_td(tr: float) -> None:
+@cache
+def car() -> tuple[History, Drift]:
+    """A computed run, and how its bodies drift in its flight."""
     history = solved("carT01.gz").history
     (momenta,) = (one for one in history.momenta if one.parts is not None)
     moving = tuple(known(momenta.parts)[i] for i in momenta.moving)
-    whole = known(drift_in_flight(history, Flight(FREE, TD, "momentum", moving)))
+    return history, known(drift_in_flight(history, Flight(FREE, TD, "momentum", moving)))
+
+
+@pytest.mark.parametrize("tr", [0.0605, 0.0676, 0.075, 0.09])
+def test_what_a_flight_shows_up_to_tr_is_about_the_error_at_td(tr: float) -> None:
+    history, whole = car()
     error = float(whole.errors(np.array([tr]), float(whole.time[-1]))[0])
     found = known(swing_in(history, FREE, tr))
     assert found.name == "engine"
