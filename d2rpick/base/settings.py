@@ -61,7 +61,8 @@ def _table(path: str, *, shared: bool) -> object:
     try:
         with open(path, encoding="utf-8") as file:
             text = file.read()
-        if shared and not any(sign in text.translate({ord(" "): None}) for sign in ("tool.d2rpick", "[tool]")):
+        solid = text.replace(" ", "")
+        if shared and "tool.d2rpick" not in solid and "[tool]" not in solid:
             return None
         import tomllib
 
