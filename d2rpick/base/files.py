@@ -10,9 +10,10 @@ import stat
 import time
 from contextlib import suppress
 from errno import ELOOP
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from d2rpick.base.errors import D2RPickError
+from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:
     from io import FileIO

@@ -6,11 +6,12 @@ takes them, and left out where that is tiny.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from d2rpick.base.errors import RangeError
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.warnings import Caution
 from d2rpick.flight.flight import MOST_WORK
 from d2rpick.flight.internal_energy import largest

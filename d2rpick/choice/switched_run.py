@@ -8,11 +8,12 @@ than the part's largest energy without switching is reported wrongly, and the pa
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.base.errors import FormatError, RangeError, if_written, listing
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.warnings import Caution
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.momentum import believed

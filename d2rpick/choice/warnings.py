@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import listing, name_units
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.digits import not_after, window_as_read
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib
 import os
 import sys
+from functools import cached_property
 from inspect import cleandoc
 from typing import TYPE_CHECKING, Any, Final, NoReturn, TypeVar
 
@@ -62,8 +63,23 @@ class _PipeClosed(Exception):  # noqa: N818  not an error: the reader of the pip
     """Carries BrokenPipeError past click, which would exit with 1: an objection."""
 
 
+def _show_help(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+    if value and not ctx.resilient_parsing:
+        click.echo(ctx.get_help(), color=ctx.color)
+        ctx.exit()
+
+
 class Documented(click.Command):
     """A command whose help ends with examples."""
+
+    def get_help_option(self, ctx: click.Context) -> click.Option:  # noqa: ARG002  click's signature
+        """Give our own: click looks for the words of its own in other languages, in the folders of the system."""
+        return self._help
+
+    @cached_property
+    def _help(self) -> click.Option:
+        flag: Any = {"is_flag": True, "is_eager": True, "expose_value": False, "allow_from_autoenv": False}
+        return click.Option(["-h", "--help"], **flag, callback=_show_help, help="Show this message and exit.")
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """Write the examples no wider than the help."""
@@ -179,7 +195,7 @@ def documented(cls: type[_Made], **settings: Any) -> Callable[[Any], _Made]:
 
 @documented(
     _Group,
-    context_settings={"auto_envvar_prefix": "D2RPICK", "help_option_names": ["-h", "--help"], "max_content_width": 100},
+    context_settings={"auto_envvar_prefix": "D2RPICK", "max_content_width": 100},
 )
 @click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=_versions, help=_VERSIONS)
 def d2rpick() -> None:

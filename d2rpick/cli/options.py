@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shlex
 from functools import wraps
 from typing import TYPE_CHECKING, Any, Final
 
@@ -92,6 +91,8 @@ class Command(Documented):
         if ctx.meta.get("d2rpick.show-settings"):
             return click.echo(text_bytes("\n".join(_settings(ctx))))
         if (words := words_of(ctx)) and not ctx.params.get("quiet"):
+            import shlex  # not above: start-up
+
             tell(f"note: {shlex.join(words)} by {ctx.meta['d2rpick.settings']}")
         try:
             return super().invoke(ctx)

@@ -285,7 +285,8 @@ def with_options(message: str) -> str:
     >>> with_options("give it as `after` where it is known")
     'give it as --after where it is known'
     """
-    return re.sub(r"`(\w+)`", lambda found: option_of(found[1]) or found[0], message)
+    named = "`" in message
+    return re.sub(r"`(\w+)`", lambda found: option_of(found[1]) or found[0], message) if named else message
 
 
 def option_of(argument: str) -> str:

@@ -9,9 +9,10 @@ import math
 import re
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from d2rpick.base.graph import reached
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.expression import REFERENCE, ExpressionError, Number, evaluate, names_in, number
 
 if TYPE_CHECKING:
@@ -124,15 +125,6 @@ class Definition(NamedTuple):
 _Table = dict[str, list[Definition]]
 
 
-@dataclass(eq=False, repr=False)
-class _Whole:
-    """What all files of a deck share."""
-
-    definitions: _Table = field(default_factory=dict)
-    latest_wins: bool = False
-    count: int = 0
-
-
 class Scope:
     """Parameters visible in one file: its own local ones first, then those of the files that include it.
 
@@ -145,14 +137,19 @@ class Scope:
     def __init__(self, outer: Scope | None = None) -> None:
         self._outer = outer
         self._local: _Table = {}
-        self._whole: _Whole = outer._whole if outer else _Whole()
+        self._whole: Scope = outer._whole if outer else self  # that of the main file, which has what all files share
+        self._shared: _Table = {}
+        self._latest_wins = False
+        self._count = 0
         self._known: float = math.inf  # how many definitions of the deck were read before
+        self._seen = self
 
     def as_of_now(self) -> Scope:
         """Return the same scope as a card sees it that stands here: later definitions do not count for its values."""
-        seen = Scope(self._outer)
-        seen._local, seen._whole, seen._known = self._local, self._whole, self._whole.count
-        return seen
+        if self._seen._known != self._whole._count:
+            self._seen = Scope(self._outer)
+            self._seen._local, self._seen._whole, self._seen._known = self._local, self._whole, self._whole._count
+        return self._seen
 
     def definitions(self, name: str) -> tuple[Definition, ...]:
         """All definitions of ``name`` (lower case), later ones too, in the innermost scope that has one by now."""
@@ -164,7 +161,7 @@ class Scope:
         found = [definition for definition in self.definitions(name) if definition.order < self._known]
         if not found:
             return None
-        return found[-1] if self._whole.latest_wins or found[-1].replaceable else found[0]
+        return found[-1] if self._whole._latest_wins or found[-1].replaceable else found[0]
 
     def closure(self, names: tuple[str, ...]) -> list[str]:
         """Return ``names`` and all parameters their definitions refer to, directly or not."""
@@ -193,18 +190,18 @@ class Scope:
         options = set(keyword.split("_")[1:])
         if "DUPLICATION" in options:
             flags = [row.field(0).text for row in rows[:1]]
-            self._whole.latest_wins = flags[:1] in (["2"], ["4"])
+            self._whole._latest_wins = flags[:1] in (["2"], ["4"])
             return
-        target = self._local if "LOCAL" in options else self._whole.definitions
+        target = self._local if "LOCAL" in options else self._whole._shared
         for row, name, text in _pairs(rows, options):
             definition = self._definition(row, name, text, "MUTABLE" in options)
             if definition is not None:
                 target.setdefault(definition.name, []).append(definition)
-                self._whole.count += 1
+                self._whole._count += 1
 
     def _tables(self) -> Iterator[_Table]:
         yield self._local
-        yield from self._outer._tables() if self._outer else (self._whole.definitions,)
+        yield from self._outer._tables() if self._outer else (self._whole._shared,)
 
     def _definition(self, row: Row, named: str, text: str, replaceable: bool) -> Definition | None:
         kind, name = named[:1].upper(), named[1:].strip().lstrip("&").strip().lower()
@@ -221,7 +218,7 @@ class Scope:
                 value = int(value) if kind == "I" else float(value)
             except ExpressionError as error:
                 value, problem = 0, str(error)
-        return Definition(name, value, row.field(0), self._whole.count, replaceable, uses, problem)
+        return Definition(name, value, row.field(0), self._whole._count, replaceable, uses, problem)
 
     def _number(self, name: str) -> Number:
         definition = self.definition(name)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import re
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
+
+from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:
     from d2rpick.deck.card import Field

@@ -108,7 +108,7 @@ def _include(card: Card, source: SourceFile, run: Run, chain: tuple[str, ...]) -
         _read_starter(run.included[path], run, chain)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(eq=False, repr=False)
 class LegSwitch(SwitchSet):
     """Bodies switched at the beginning of a leg, at ``at``; ``stop_field`` is where that time is written."""
 

@@ -8,9 +8,10 @@ from bisect import bisect_right
 from collections import defaultdict
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import DeckError
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.card import LONG, STANDARD, Card, Field, Problem, Row, Scope, Transform
 from d2rpick.deck.source import Block, SourceFile
 

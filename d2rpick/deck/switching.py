@@ -12,8 +12,9 @@ import re
 from collections import defaultdict
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, Literal
 
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.card import Card, Field, Row, Value
 from d2rpick.deck.reader import SWITCHING, Deck
 
@@ -72,7 +73,7 @@ class Header(NamedTuple):
     offset: Value[float]
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(eq=False, repr=False)
 class SwitchSet:
     """One switching card as read: its header where it has one, and its parts.
 

@@ -11,10 +11,11 @@ energy of the whole does not follow as it does where damping takes both.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.flight.window import FEWEST, SHORTEST
 from d2rpick.histories.samples import find_crossings, window
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.samples import window
 
 if TYPE_CHECKING:

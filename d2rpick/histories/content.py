@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import os
 from io import FileIO
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.base.errors import ChangedError, FormatError
 from d2rpick.base.files import FileState, at_rest, settled_state
+from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

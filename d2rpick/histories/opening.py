@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import re
 from importlib import import_module
-from typing import TYPE_CHECKING, Final, NamedTuple, Protocol, cast
+from typing import TYPE_CHECKING, Final, Protocol, cast
 
 from d2rpick.base.errors import FormatError, printable
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.companions import check_companions, check_legs
 from d2rpick.histories.database import Database, Legs
 from d2rpick.histories.names import Selection

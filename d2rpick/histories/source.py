@@ -6,10 +6,11 @@ import os
 import re
 import stat
 import sys
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.base.files import FileState, bound, unpacked_beyond
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.content import OnDisk, stored
 from d2rpick.histories.names import in_seconds, near_miss
 

@@ -7,9 +7,10 @@ From a row of fields follow the JSON of a thing, its line of csv, the columns of
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Final, Literal, NamedTuple
+from typing import Any, Final, Literal
 
 from d2rpick.base import __version__
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.report import tables
 
 

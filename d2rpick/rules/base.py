@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, one_line
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.parts import Constraint, Parts, read_constraints, read_parts, read_sections
 from d2rpick.deck.switching import Event, Header, SwitchSet, Window, Windows, find_windows, read_switching
 
@@ -83,7 +84,7 @@ class Unreadable(NamedTuple):
         return f"{self.deck}: {one_line(self.error)}" if self.code == INTERNAL_ERROR else one_line(self.error)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(eq=False, repr=False)
 class Case:
     """A deck as the rules see it; ``judge`` is given when there is an energy history to judge windows by."""
 
@@ -168,7 +169,7 @@ class Case:
         return tuple((card, card.real(card.rows[0], 0)) for card in cards)
 
 
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+@dataclass(eq=False, repr=False, kw_only=True)
 class RunCase(Case):
     """The starter deck and the legs, with the windows that they make."""
 

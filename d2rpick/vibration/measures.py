@@ -9,10 +9,11 @@ from q(tr) - q(td) and -q'(td).  All measures compare that difference with the v
 from __future__ import annotations
 
 from math import sqrt
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.samples import narrow
 
 if TYPE_CHECKING:
