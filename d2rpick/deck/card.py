@@ -9,6 +9,7 @@ import math
 import re
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import islice
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from d2rpick.base.graph import reached
@@ -16,7 +17,7 @@ from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.expression import REFERENCE, ExpressionError, Number, evaluate, names_in, number
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from d2rpick.deck.source import Block
 
@@ -55,12 +56,21 @@ Problem = tuple[Field, str]
 
 
 class Value(NamedTuple, Generic[T]):
-    """What a field says: ``problem`` is empty, or tells why ``value`` is only the default."""
+    """What a field says: ``problem`` is empty, or tells why ``value`` is only the default.
+
+    ``place`` is the field, or its row, where it has that ``position``: most are never pointed at.
+    """
 
     value: T
-    field: Field
+    place: Field | Row
     problem: str = ""
     parameters: tuple[str, ...] = ()
+    position: int = 0
+
+    @property
+    def field(self) -> Field:
+        """The field itself."""
+        return self.place.field(self.position) if isinstance(self.place, Row) else self.place
 
 
 @dataclass(eq=False, repr=False)
@@ -71,6 +81,7 @@ class Row:
     distance: int
     text: str
     width: int
+    _cells: list[str] | None = None
 
     @property
     def blank(self) -> bool:
@@ -79,20 +90,20 @@ class Row:
 
     def field(self, position: int) -> Field:
         """Field ``position`` from 0, between commas or in fixed columns; empty beyond the end of the line."""
-        fields = self._fields
-        beyond = len(self.text) + 1
-        return fields[position] if position < len(fields) else Field("", self.block, self.distance, beyond)
+        start, text = next(islice(self._pieces(), position, None), (len(self.text), ""))
+        column = 1 + start + len(text) - len(text.lstrip() or text)
+        return Field(text.strip(), self.block, self.distance, column)
 
-    @cached_property
-    def _fields(self) -> list[Field]:
-        """All fields: they are asked for one after the other, and again."""
-        line, width, block, distance = self.text, self.width, self.block, self.distance
+    def cell(self, position: int) -> str:
+        """Text of a field alone; all are kept, since they are asked for one after the other, and again."""
+        if self._cells is None:
+            self._cells = [text.strip() for _, text in self._pieces()]
+        return self._cells[position] if position < len(self._cells) else ""
+
+    def _pieces(self) -> Iterable[tuple[int, str]]:
+        line, width = self.text, self.width
         in_columns = ((at, line[at : at + width]) for at in range(0, len(line), width))
-        pieces = _between_commas(line) if "," in line else in_columns
-        return [
-            Field(found := text.strip(), block, distance, 1 + start + (text.index(found[0]) if found else 0))
-            for start, text in pieces
-        ]
+        return _between_commas(line) if "," in line else in_columns
 
 
 def _between_commas(text: str) -> Iterator[tuple[int, str]]:
@@ -189,7 +200,7 @@ class Scope:
         """Take over the definitions of a ``*PARAMETER`` card."""
         options = set(keyword.split("_")[1:])
         if "DUPLICATION" in options:
-            flags = [row.field(0).text for row in rows[:1]]
+            flags = [row.cell(0) for row in rows[:1]]
             self._whole._latest_wins = flags[:1] in (["2"], ["4"])
             return
         target = self._local if "LOCAL" in options else self._whole._shared
@@ -250,9 +261,9 @@ def _pairs(rows: Sequence[Row], options: set[str]) -> Iterator[tuple[Row, str, s
         return
     for row in rows:
         for pair in range(1 if "TYPE" in options else _PAIRS):
-            name = row.field(2 * pair).text
+            name = row.cell(2 * pair)
             if name:
-                yield row, name, row.field(2 * pair + 1).text
+                yield row, name, row.cell(2 * pair + 1)
 
 
 def _expressions(rows: Sequence[Row]) -> Iterator[tuple[Row, str, str]]:
@@ -359,17 +370,16 @@ class Card:
         return self._number(row, position, default, int)
 
     def _number(self, row: Row, position: int, default: T, kind: Callable[[float], T]) -> Value[T]:
-        found = row.field(position)
-        text = found.text
+        text = row.cell(position)
         if not text:
-            return Value(default, found)
+            return Value(default, row, position=position)
         names = names_in(text) if "&" in text else ()
         try:
-            value = kind(exact := float(self.scope.value(text)))
+            value = kind(exact := float(self.scope.value(text) if "&" in text or text[0] == "<" else number(text)))
         except (ExpressionError, OverflowError) as error:
-            return Value(default, found, str(error), names)
+            return Value(default, row, str(error), names, position)
         problem = "" if value == exact else f"{text!r} is not an integer"
-        return Value(default if problem else value, found, problem, names)
+        return Value(default if problem else value, row, problem, names, position)
 
     def positive(self, row: Row, position: int) -> float | None:
         """Read a positive number, or None; of an include in other units none is known."""
@@ -378,5 +388,5 @@ class Card:
 
     def word(self, row: Row, position: int, default: str = "") -> Value[str]:
         """Read a word, in upper case."""
-        found = row.field(position)
-        return Value(self.scope.text(found.text).upper() or default, found, parameters=names_in(found.text))
+        text = row.cell(position)
+        return Value(self.scope.text(text).upper() or default, row, "", names_in(text), position)

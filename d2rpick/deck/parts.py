@@ -208,7 +208,7 @@ def node_sets(deck: Deck) -> dict[int, frozenset[int]]:
 def _listed(card: Card, options: Collection[str]) -> list[Value[int]]:
     """Ids below the first line of a set."""
     places = range(1 if "COLUMN" in options else _PER_LINE)
-    return [value for row in card.data[1:] for at in places if (value := card.integer(row, at)).field.text]
+    return [card.integer(row, at) for row in card.data[1:] for at in places if row.cell(at)]
 
 
 class SectionCard(NamedTuple):

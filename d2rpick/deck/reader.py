@@ -8,6 +8,7 @@ from bisect import bisect_right
 from collections import defaultdict
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import chain
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import DeckError
@@ -126,17 +127,16 @@ class Deck:
 
     def named(self, *names: str) -> list[Card]:
         """Cards of a deck that was read whose keyword is one of ``names``, or one with an option behind ``_``."""
-        found = [self._places[name] for name in names if name in self._places]
-        return [self.cards[place] for place in (found[0] if len(found) == 1 else sorted(set().union(*found)))]
+        wanted = tuple(f"{name}_" for name in names)
+        found = [places for name, places in self._places.items() if f"{name}_".startswith(wanted)]
+        return [self.cards[place] for place in (found[0] if len(found) == 1 else sorted(chain(*found)))]
 
     @cached_property
     def _places(self) -> Mapping[str, Sequence[int]]:
-        """Places of the cards by the first words of their names: every rule asks for some."""
+        """Places of the cards by their names: every rule asks for some."""
         found: defaultdict[str, list[int]] = defaultdict(list)
         for place, card in enumerate(self.cards):
-            words = card.name.split("_")
-            for count in range(1, len(words) + 1):
-                found["_".join(words[:count])].append(place)
+            found[card.name].append(place)
         return found
 
     def silences(self, rule: str, file: str, line: int) -> bool:

@@ -167,7 +167,7 @@ def _automatic(card: Card) -> SwitchSet:
         problem = f"D2R is {rigid} and R2D is {deformable}, but {_lines(len(lines))} of parts follow"
         problem += "" if lines else ": the third line, with the first part, is missing"
     elif not lines:
-        short = sum(bool(rows[1].field(at).text) for at in range(_COUNTS_FIELD + 1)) <= _COUNTS_FIELD
+        short = sum(bool(rows[1].cell(at)) for at in range(_COUNTS_FIELD + 1)) <= _COUNTS_FIELD
         lost = "; is the second line (NRBF to OFFSET) missing?" if short else ""
         problem = f"D2R and R2D are 0, so the card switches nothing{lost}"
     elif any(row.blank for row in lines):
@@ -194,7 +194,7 @@ def _missing(rows: Sequence[Row]) -> str:
 
 
 def _is_of_part(row: Row) -> bool:
-    return row.field(1).text.upper() in _PTYPES or row.field(2).text.upper() in _PTYPES
+    return row.cell(1).upper() in _PTYPES or row.cell(2).upper() in _PTYPES
 
 
 def _lines(count: int) -> str:
@@ -207,12 +207,12 @@ def _header(card: Card, first: Row, second: Row) -> Header:
     found = Header(*values)
     code, swset, time1 = found.code, found.swset, found.time1
     if not code.problem and not BY_TIME <= code.value <= BY_SENSOR:
-        code = Value(code.value, code.field, f"CODE is {code.value}, {BY_TIME} to {BY_SENSOR} was expected")
+        code = code._replace(problem=f"CODE is {code.value}, {BY_TIME} to {BY_SENSOR} was expected", parameters=())
     if not swset.problem and swset.value <= 0:
-        swset = Value(swset.value, swset.field, f"SWSET is {swset.value}, a positive number was expected")
+        swset = swset._replace(problem=f"SWSET is {swset.value}, a positive number was expected", parameters=())
     if code.value == BY_TIME and not time1.problem and _runs_over(first):
-        problem = f"TIME1 runs over its columns into TIME2 ({time1.field.text} and {first.field(3).text})"
-        time1 = Value(time1.value, time1.field, problem)
+        problem = f"TIME1 runs over its columns into TIME2 ({time1.field.text} and {first.cell(3)})"
+        time1 = time1._replace(problem=problem, parameters=())
     swset, relsw = (_moved(one, card.transform.rest) for one in (swset, found.relsw))
     return found._replace(swset=swset, code=code, time1=time1, relsw=relsw)
 
@@ -243,9 +243,7 @@ def _line(card: Card, row: Row, *, to_rigid: bool, ptype: bool) -> _Line:
 
 def _moved(value: Value[int], offset: int) -> Value[int]:
     """Add the offset of the include to an id; 0 stays none."""
-    if value.problem or not value.value:
-        return value
-    return Value(value.value + offset, value.field, "", value.parameters)
+    return value if value.problem or not value.value or not offset else value._replace(value=value.value + offset)
 
 
 def _with(card: Card, kind: Kind, header: Header | None, lines: Sequence[_Line], count_problem: str = "") -> SwitchSet:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Mapping
+from functools import cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
@@ -208,10 +209,17 @@ def _told(windows: Iterable[Window]) -> Iterator[CheckedWindow]:
         yield CheckedWindow(unit, tr, td, opened.by.card.here, (opening, closing))
 
 
+@cache
+def _rules_for(solver: str, select: tuple[str, ...], ignore: tuple[str, ...]) -> tuple[Rule, ...]:
+    """Give the rules that count, and look at decks of a solver: there may be thousands of those."""
+    asked = Configuration(select, ignore)
+    return tuple(rule for rule in RULES.values() if solver in rule.solvers and asked.selects(rule.id))
+
+
 def _findings(case: Case, configuration: Configuration) -> Iterator[Finding]:
     """Apply the rules that count to what they look at; what a comment silences is left out."""
     solver, silences = case.solver, case.deck.silences
-    for rule in (rule for rule in RULES.values() if solver in rule.solvers and configuration.selects(rule.id)):
+    for rule in _rules_for(solver, *configuration[:2]):
         for place, message in rule.check(case):
             if silences(rule.id, place.file, place.line):
                 continue
