@@ -207,9 +207,8 @@ def objections(
     most = situations[0].settings.tolerance
     too_much = judged & (error > most)
     yield Objection(too_much, lambda i: [f"error {above(error[i], most)} above the tolerance {most:g}"])
-    means = [
-        means_of(one) if one.td <= one.latest_td else None for one in situations
-    ]  # beyond, the flight tells nothing
+    # beyond its end the flight tells nothing of what comes after td
+    means = [means_of(one) if one.td <= one.latest_td else None for one in situations]
     if any(means):
         more = energy > np.array([one.most if one else np.inf for one in means])[place]
         yield Objection(more, lambda i: _above_the_reference(means[place[i]], energy[i]))

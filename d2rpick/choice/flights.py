@@ -7,7 +7,6 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.question import Settings
 from d2rpick.flight.flight import Flight, all_seen, landed, witnesses
 from d2rpick.flight.margin import margin_before_contact
 from d2rpick.flight.window import moments
@@ -16,6 +15,7 @@ from d2rpick.histories.digits import not_after, sum_as_read
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
+    from d2rpick.choice.question import Settings
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import History
     from d2rpick.vibration.span import Fits
@@ -52,52 +52,13 @@ def last_td(end: float, margin: float) -> float:
 
 
 def flights_of(history: History, settings: Settings, fits: Fits | None = None) -> tuple[Flight, ...]:
-    """Find all flights, that of the landing that is given up to there.
-
-    Where the energy is all there is, one oscillator for the whole record, else none is sought.
-    """
-    landing = settings.landing
-    if landing is None:
-        return _flights_of(history, settings, fits)
-    history.check(landing, argument="landing")
-    found = _flights_of(history, replace(settings, landing=None), fits)
-    last = _last_before(landing, found)
-    if last and landing <= last.within(history.time)[1]:
-        return tuple(landed(one, landing) if one is last else one for one in found)
-    from d2rpick.choice.situation import examine
-
-    before = examine(history, landing, settings, fits).flight
-    return tuple(sorted((*found, before))) if before.end == landing and not before.refusal else found
-
-
-def _last_before(landing: float, flights: Iterable[Flight]) -> Flight | None:
-    """Give the last flight that begins before a landing [time]."""
-    return max((one for one in flights if (one.start or 0.0) < landing), key=lambda one: one.start or 0.0, default=None)
-
-
-def _flights_of(history: History, settings: Settings, fits: Fits | None) -> tuple[Flight, ...]:
-    if any(True for _ in witnesses(history)) or not settings.replay:
-        return find_flights(history, settings, fits)
-    first = float(history.time[0]) if settings.after is None else settings.after
-    middle = _looking(history, settings, fits)((first + float(history.time[-1])) / 2)
-    start, end = middle.flight.within(history.time)
-    if middle.evidence.span and start < end and not middle.flight.refusal:
-        # it ends with the oscillator, also where its start is given
-        return (middle.flight,)
-    return find_flights(history, replace(settings, replay=False))
-
-
-_PLAIN = Settings()
-
-
-def find_flights(history: History, settings: Settings = _PLAIN, fits: Fits | None = None) -> tuple[Flight, ...]:
-    """Find every flight of a record, ascending in time.
+    """Find every flight of a record, ascending in time, that of the landing that is given up to there.
 
     Parameters
     ----------
     history : History
         With its evidence, as a run gives it.
-    settings : Settings, optional
+    settings : Settings
         How an oscillator is looked for where no better evidence shows a flight.
     fits : Fits, optional
         Those of an earlier look at the record; none of its windows is fitted twice.
@@ -112,14 +73,40 @@ def find_flights(history: History, settings: Settings = _PLAIN, fits: Fits | Non
     RangeError
         If the record has fewer than 3 states.
     """
+    landing = settings.landing
+    if landing is None:
+        return _flights_of(history, settings, fits)
+    history.check(landing, argument="landing")
+    found = _flights_of(history, replace(settings, landing=None), fits)
+    last = _last_before(landing, found)
+    if last and landing <= last.within(history.time)[1]:
+        return tuple(landed(one, landing) if one is last else one for one in found)
+    before = _looking(history, settings, fits, quick=False)(landing).flight
+    return tuple(sorted((*found, before))) if before.end == landing and not before.refusal else found
+
+
+def _last_before(landing: float, flights: Iterable[Flight]) -> Flight | None:
+    """Give the last flight that begins before a landing [time]."""
+    return max((one for one in flights if (one.start or 0.0) < landing), key=lambda one: one.start or 0.0, default=None)
+
+
+def _flights_of(history: History, settings: Settings, fits: Fits | None) -> tuple[Flight, ...]:
+    """Find them without a landing: where the energy is all there is, by one oscillator of the whole record, or none."""
     seen = all_seen(history)
     if seen:
         return tuple(
             Flight(one.start, one.end if one.end_seen else None, source, one.parts, one.damping, gravity=one.gravity)
             for source, one in seen
         )
-    found: list[Flight] = []
     look = _looking(history, settings, fits)
+    if settings.replay and not witnesses(history):
+        first = float(history.time[0]) if settings.after is None else settings.after
+        middle = look((first + float(history.time[-1])) / 2)
+        start, end = middle.flight.within(history.time)
+        if middle.evidence.span and start < end and not middle.flight.refusal:
+            return (middle.flight,)  # it ends with the oscillator, also where its start is given
+        look = _looking(history, replace(settings, replay=False), None)
+    found: list[Flight] = []
     for td in sorted(moments(history.time), reverse=True):  # the last quiet time before td tells most of the flight
         if found and found[-1].start is not None and td > found[-1].start:
             continue
@@ -130,12 +117,14 @@ def find_flights(history: History, settings: Settings = _PLAIN, fits: Fits | Non
     return tuple(reversed(found))
 
 
-def _looking(history: History, settings: Settings, fits: Fits | None) -> Callable[[float], Situation]:
-    """Give what examines a td quickly, which is loaded only where nothing better than the energy shows a flight."""
+def _looking(
+    history: History, settings: Settings, fits: Fits | None, *, quick: bool = True
+) -> Callable[[float], Situation]:
+    """Give what examines a td, which is loaded only where nothing better than the energy shows a flight."""
     from d2rpick.choice.situation import examine
     from d2rpick.vibration.span import Fits
 
-    return partial(examine, history, settings=settings, fits=Fits() if fits is None else fits, quick=True)
+    return partial(examine, history, settings=settings, fits=Fits() if fits is None else fits, quick=quick)
 
 
 def _overlap(earlier: Flight, later: Flight) -> bool:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.choice.flights import find_flights
+from d2rpick.choice.flights import flights_of
 from d2rpick.choice.question import Settings
 from d2rpick.histories.history import Balance, Given, History, Momenta, Precision
 from d2rpick.histories.names import Part
@@ -139,7 +139,7 @@ def history_of(run: Flown, form: str) -> History:
 
 def counted(run: Flown, form: str) -> Counter[str]:
     """Count flights claimed that are not graded poor, those that are wrong, true flights, and those that are missed."""
-    found = find_flights(history_of(run, form), Settings(replay=False))
+    found = flights_of(history_of(run, form), Settings(replay=False))
     claims = [(f.start or 0.0, TIME[-1] if f.end is None else f.end) for f in found]
     believed = [claim for claim, flight in zip(claims, found, strict=True) if not flight.unknown_load]
     impulse = np.concatenate([np.zeros((1, 2)), np.cumsum((run.force[1:] + run.force[:-1]) / 2, axis=0) / STATES])

@@ -12,7 +12,7 @@ import d2rpick as d2
 from d2rpick.base.errors import D2RPickError
 from d2rpick.choice.answers import suggest
 from d2rpick.choice.deck_of_run import doubts_of_solver
-from d2rpick.choice.flights import find_flights
+from d2rpick.choice.flights import flights_of
 from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.warnings import Caution
@@ -270,7 +270,7 @@ def test_a_part_that_is_held_does_not_fly_also_where_the_end_of_the_load_is_give
         assert found.recommended is None
         (why,) = [one.message for one in found.cautions if one.code == "no-free-flight"]
         assert "part 1 is held or moved by /BCS/7 (deck:12)" in why
-    assert find_flights(flying_history(held), PLAIN) == ()
+    assert flights_of(flying_history(held), PLAIN) == ()
 
 
 @pytest.mark.parametrize("settings", [PLAIN, replace(PLAIN, after=0.3)])
@@ -279,7 +279,7 @@ def test_a_flight_begins_where_an_imposed_motion_ends_and_ends_where_one_begins(
     flight = examine(flying_history(moved), 0.7, settings).flight
     assert (flight.start, flight.end) == (0.4, 0.9)
     assert examine(flying_history(moved), 0.35, settings).flight.refusal
-    assert [(one.start, one.end) for one in find_flights(flying_history(moved), settings)] == [(0.4, 0.9)]
+    assert [(one.start, one.end) for one in flights_of(flying_history(moved), settings)] == [(0.4, 0.9)]
 
 
 @pytest.fixture(scope="module")

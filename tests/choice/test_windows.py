@@ -9,7 +9,7 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from d2rpick.choice.answers import Suggestion, suggest, verify, verify_at
-from d2rpick.choice.flights import find_flights
+from d2rpick.choice.flights import flights_of
 from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.windows import (
@@ -87,7 +87,7 @@ def landings(name: str, column: str) -> Iterator[tuple[str, float]]:
 def test_the_landings_of_the_switched_car_lie_within_the_margin() -> None:
     """All that were switched in the flight and back before the contact."""
     history = solved("carT01.gz").history
-    flight = find_flights(history)[-1]
+    flight = flights_of(history, Settings())[-1]
     margin = margin_before_contact(history, flight)
     starts, ends = dict(landings("car_runs.csv", "tr_s")), dict(landings("car_runs.csv", "td_s"))
     kept = [name for name in starts if starts[name] > (flight.start or 0) and ends[name] < 0.15]
@@ -105,7 +105,7 @@ def test_the_landings_of_the_switched_car_lie_within_the_margin() -> None:
 )
 def test_the_landings_of_the_switched_box_lie_within_the_margin(run: str, column: str, end: float) -> None:
     history = solved("drop2T01.gz").history
-    (flight,) = (one for one in find_flights(history) if one.end == pytest.approx(end, abs=1e-3))
+    (flight,) = (one for one in flights_of(history, Settings()) if one.end == pytest.approx(end, abs=1e-3))
     moved = abs(dict(landings("drop2_runs.csv", column))[run]) / 1e3
     assert 1e-3 < moved < margin_before_contact(history, flight).time
 

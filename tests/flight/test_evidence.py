@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from d2rpick.choice.answers import suggest, verify_at
-from d2rpick.choice.flights import find_flights
+from d2rpick.choice.flights import flights_of
 from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.flight.flight import seen_flight
@@ -181,7 +181,7 @@ def history_of(source: str, *parts: str) -> History:
 def test_all_flights_of_runs_of_a_solver_are_found(
     source: str, parts: tuple[str, ...], flights: list[tuple[float, float]]
 ) -> None:
-    found = [(f.start, f.end) for f in find_flights(history_of(source, *parts)) if f.start is not None]
+    found = [(f.start, f.end) for f in flights_of(history_of(source, *parts), Settings()) if f.start is not None]
     for start, end in flights:
         assert [one for one in found if abs(one[0] - start) <= 5e-4 and abs((one[1] or np.inf) - end) <= 5e-4]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.answers import suggest
-from d2rpick.choice.flights import find_flights
+from d2rpick.choice.flights import flights_of
 from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.warnings import cautions_of
@@ -154,7 +154,7 @@ def test_a_wall_that_does_no_work_is_no_flight_however_constant_the_energies_are
     history = totals(900 - pushed + ringing, 100 + pushed - ringing)
     for td in (0.4, 0.6):
         assert not examine(history, td, PLAIN).in_flight
-    flights = find_flights(history, PLAIN)
+    flights = flights_of(history, PLAIN)
     assert [flight for flight in flights if flight.start and flight.start > 0.75]
     assert not [flight for flight in flights if flight.certain]
 
@@ -166,7 +166,7 @@ def test_a_spring_to_ground_does_not_fly(kept: float) -> None:
     history = totals(internal, 100 - internal + kept - 10 * np.maximum(0.05 - TIME, 0))
     balance = known(history.balance)
     assert moves_as_a_whole(balance, 0.1, 1.0) is (kept > 0)
-    assert bool(find_flights(history, PLAIN)) is (kept > 0)
+    assert bool(flights_of(history, PLAIN)) is (kept > 0)
 
 
 def test_a_level_is_kept_by_a_vibration_and_by_one_that_damping_takes_but_not_by_a_drift() -> None:
@@ -191,7 +191,7 @@ def test_a_flight_in_which_energies_ring_about_their_law_is_found_and_uncertain(
     rung = 100 * np.sin(60 * TIME) ** 2
     pushed = np.minimum(TIME / 0.2, 1) ** 2
     lost = 0.5 * (TIME - np.sin(240 * TIME) / 240) * (TIME > 0.2)
-    found = find_flights(totals(pushed * (150 + rung), pushed * (900 - rung) - lost - 0.4 * np.sin(171 * TIME)), PLAIN)
+    found = flights_of(totals(pushed * (150 + rung), pushed * (900 - rung) - lost - 0.4 * np.sin(171 * TIME)), PLAIN)
     assert any(flight.start == pytest.approx(0.2, abs=0.05) and flight.end is None for flight in found)
     assert not [flight for flight in found if flight.certain or (flight.start or 0.0) < 0.15]
 
@@ -211,10 +211,10 @@ def test_a_momentum_that_stays_while_a_load_works_is_prescribed() -> None:
     values[0] = 0.0
     energies = Balance(TIME, 8e3 * wound, np.full(TIME.size, 3.75))
     whole = Momenta(TIME, values, None, Precision(7), (0,))
-    assert not find_flights(table(TIME, 8e3 * wound, whole, balance=energies), PLAIN)
+    assert not flights_of(table(TIME, 8e3 * wound, whole, balance=energies), PLAIN)
     stored = np.exp(-(((TIME - 0.2) / 0.05) ** 2))  # by a contact for a while
     fallen = replace(energies, kinetic=8e3 * (1.5 - wound - 0.2 * stored))
-    (flight,) = find_flights(table(TIME, 8e3 * wound, whole, balance=fallen), PLAIN)
+    (flight,) = flights_of(table(TIME, 8e3 * wound, whole, balance=fallen), PLAIN)
     assert known(flight.start) == pytest.approx(0.4, abs=0.02)  # two bodies have hit each other
 
 

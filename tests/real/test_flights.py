@@ -7,7 +7,7 @@ import pytest
 
 from d2rpick.base.errors import D2RPickError
 from d2rpick.choice.answers import suggest, verify
-from d2rpick.choice.flights import find_flights
+from d2rpick.choice.flights import flights_of
 from d2rpick.choice.of_run import suggest_of
 from d2rpick.choice.question import Reference, Settings
 from d2rpick.histories.opening import Selection, open_run
@@ -52,7 +52,7 @@ def test_nothing_fails_at_any_td_and_no_flight_contradicts_the_health(name: str)
 @pytest.mark.parametrize("name", DRIVEN)
 def test_a_driven_model_does_not_fly(name: str) -> None:
     history = open_run([real(name)]).history(Selection())
-    assert find_flights(history, Settings(replay=False)) == ()
+    assert flights_of(history, Settings(replay=False)) == ()
     for share in (0.25, 0.5, 0.75):
         td = float(history.time[0] + share * np.ptp(history.time))
         found = suggest(history, td, Settings(replay=False))
