@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 from d2rpick.base.errors import RangeError
@@ -13,10 +12,9 @@ from d2rpick.flight.window import moments
 from d2rpick.histories.digits import not_after, sum_as_read
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Iterable
 
     from d2rpick.choice.question import Settings
-    from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import History
     from d2rpick.vibration.span import Fits
 
@@ -81,7 +79,9 @@ def flights_of(history: History, settings: Settings, fits: Fits | None = None) -
     last = _last_before(landing, found)
     if last and landing <= last.within(history.time)[1]:
         return tuple(landed(one, landing) if one is last else one for one in found)
-    before = _looking(history, settings, fits, quick=False)(landing).flight
+    from d2rpick.choice.situation import examine
+
+    before = examine(history, landing, settings, fits).flight
     return tuple(sorted((*found, before))) if before.end == landing and not before.refusal else found
 
 
@@ -98,14 +98,16 @@ def _flights_of(history: History, settings: Settings, fits: Fits | None) -> tupl
             Flight(one.start, one.end if one.end_seen else None, source, one.parts, one.damping, gravity=one.gravity)
             for source, one in seen
         )
-    look = _looking(history, settings, fits)
+    from d2rpick.choice.situation import looking  # not above: better evidence than the energy does without it
+
+    look = looking(history, settings, fits)
     if settings.replay and not witnesses(history):
         first = float(history.time[0]) if settings.after is None else settings.after
         middle = look((first + float(history.time[-1])) / 2)
         start, end = middle.flight.within(history.time)
         if middle.evidence.span and start < end and not middle.flight.refusal:
             return (middle.flight,)  # it ends with the oscillator, also where its start is given
-        look = _looking(history, replace(settings, replay=False), None)
+        look = looking(history, replace(settings, replay=False))
     found: list[Flight] = []
     for td in sorted(moments(history.time), reverse=True):  # the last quiet time before td tells most of the flight
         if found and found[-1].start is not None and td > found[-1].start:
@@ -115,16 +117,6 @@ def _flights_of(history: History, settings: Settings, fits: Fits | None) -> tupl
         if situation.in_flight and not flight.refusal and not (found and _overlap(flight, found[-1])):
             found.append(flight)
     return tuple(reversed(found))
-
-
-def _looking(
-    history: History, settings: Settings, fits: Fits | None, *, quick: bool = True
-) -> Callable[[float], Situation]:
-    """Give what examines a td, which is loaded only where nothing better than the energy shows a flight."""
-    from d2rpick.choice.situation import examine
-    from d2rpick.vibration.span import Fits
-
-    return partial(examine, history, settings=settings, fits=Fits() if fits is None else fits, quick=quick)
 
 
 def _overlap(earlier: Flight, later: Flight) -> bool:

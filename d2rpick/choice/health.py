@@ -22,6 +22,7 @@ from d2rpick.histories.samples import window as within
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
+    from d2rpick.choice.question import Settings
     from d2rpick.histories.history import Balance, History, Samples
     from d2rpick.histories.names import Part
 
@@ -253,11 +254,20 @@ _FEWEST: Final = 12
 _NOTHING: Final = 1e-20
 
 
-def refuse_unsound(history: History, *, choosing: bool = False) -> None:
-    """RangeError where no number of the run can be used, and for ``choosing`` where there is nothing to choose by."""
+def refuse_unsound(
+    history: History, settings: Settings, td: float | tuple[float, float] | None = None, *, choosing: bool = True
+) -> None:
+    """RangeError where no number of the run can be used, and for ``choosing`` where there is nothing to choose by.
+
+    Also where a time that was asked for, ``td`` or a window for it among them, looks to be in another unit.
+    """
     for one in unsound(history):
         if choosing or one.code != "nothing-to-judge":
             raise RangeError(f"{', '.join(history.source)}: {one.message}")
+    times = {"after": settings.after, "landing": settings.landing}
+    for name, time in {**times, "td_window" if isinstance(td, tuple) else "td": td}.items():
+        if time is not None:
+            history.check_unit(*(time if isinstance(time, tuple) else (time,)), argument=name)
 
 
 def unsound(history: History) -> Iterator[Caution]:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, TypeVar
 
 from d2rpick.choice.answers import Suggestion, Verdict, suggest_at, verify, verify_at
 from d2rpick.choice.health import OF_THE_MODEL, assess, cautions_of_health, refuse_unsound
-from d2rpick.choice.question import check_units
 from d2rpick.choice.situation import Situation, examine
 from d2rpick.choice.warnings import cautions_of_engine
 from d2rpick.histories.balance import balance_of
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.choice.question import Reference, Settings
-    from d2rpick.histories.history import History, Track
+    from d2rpick.histories.history import Track
     from d2rpick.histories.names import Part
     from d2rpick.histories.run import Run
     from d2rpick.vibration.span import Fits
@@ -48,7 +47,7 @@ def suggest_of(
     RangeError
         If td or the window lies outside the record, no flight is seen, or the run cannot be judged.
     """
-    _check(reference.history, td, settings, choosing=True)
+    refuse_unsound(reference.history, settings, td)
     if td is None or isinstance(td, tuple):
         from d2rpick.choice.suggest_td import suggest_in_window
 
@@ -66,7 +65,7 @@ def verify_of(reference: Reference, tr: float, td: float, settings: Settings) ->
     RangeError
         If a time lies outside the record or tr is not before td.
     """
-    _check(reference.history, td, settings)
+    refuse_unsound(reference.history, settings, td, choosing=False)
     return _with_health(verify(reference.history, tr, td, settings), reference.run)
 
 
@@ -119,18 +118,6 @@ def compare_with(verdict: Verdict, reference: Reference, switched: Reference, mi
         reasons=verdict.reasons + objections,
         cautions=(*verdict.cautions, *cautions_of_engine(switched.run.sources)),
     )
-
-
-def _check(
-    history: History, td: float | tuple[float, float] | None, settings: Settings, *, choosing: bool = False
-) -> None:
-    """RangeError where the run cannot be judged, or a time that was asked for looks to be in another unit."""
-    refuse_unsound(history, choosing=choosing)
-    check_units(history, settings)
-    if isinstance(td, tuple):
-        history.check_unit(*td, argument="td_window")
-    elif td is not None:
-        history.check_unit(td, argument="td")
 
 
 def _with_health(answer: _Answer, run: Run) -> _Answer:

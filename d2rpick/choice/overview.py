@@ -209,8 +209,8 @@ def _history(run: Run, selection: Selection) -> History | None:
 def _flights(history: History) -> tuple[tuple[str, FreeFlight], ...]:
     """Give those that ``plan`` and ``suggest`` choose from; none where they refuse the run."""
     try:
-        refuse_unsound(history, choosing=True)
-        found = flights_of(history, Settings())
+        refuse_unsound(history, settings := Settings())
+        found = flights_of(history, settings)
     except RangeError:
         return ()
     return tuple(

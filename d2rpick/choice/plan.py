@@ -19,7 +19,6 @@ import numpy as np
 from d2rpick.choice.flights import flights_of, last_td
 from d2rpick.choice.health import refuse_unsound
 from d2rpick.choice.of_run import suggest_of
-from d2rpick.choice.question import Reference, check_units
 from d2rpick.choice.switched_run import Done, Times, done_windows, switched_history
 from d2rpick.choice.warnings import WRONG_ENERGY, Caution, cautions_of_engine
 from d2rpick.flight.internal_energy import round_off
@@ -31,7 +30,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.answers import Suggestion
     from d2rpick.choice.candidates import Candidate
-    from d2rpick.choice.question import Settings
+    from d2rpick.choice.question import Reference, Settings
     from d2rpick.choice.ranking import Quality
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History
@@ -191,10 +190,9 @@ def plan_of(
         If ``after`` or a window lies outside the record, or the parts were deformable in a window that is done.
     """
     history = reference.history
-    refuse_unsound(history, choosing=True)
+    refuse_unsound(history, settings)
     span = float(history.time[-1] - history.time[0])
     shortest = MIN_RIGID * span if min_rigid is None else min_rigid
-    check_units(history, settings)
     history, found, cautions = switched_history(reference, done)
     reference = reference._replace(history=history)
     fits = Fits()

@@ -93,10 +93,3 @@ class Settings:
         """Give the expected run time over that of the reference [-]; None where the cost share is not known."""
         share = self.cost_share
         return None if share is None else run_time_share(rigid_fraction, share, self.step_ratio)
-
-
-def check_units(history: History, settings: Settings) -> None:
-    """RangeError where a time that was given looks to be in another unit than the history."""
-    for name in ("after", "landing"):
-        if (time := getattr(settings, name)) is not None:
-            history.check_unit(time, argument=name)

@@ -6,7 +6,7 @@ That is the flight, the vibration, the level, and whether anything vibrates.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from math import inf
 from typing import TYPE_CHECKING, Final
 
@@ -24,10 +24,14 @@ from d2rpick.vibration.span import Fits, Span, described_span, span_of
 from d2rpick.vibration.uncertainty import resolved
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from d2rpick.choice.question import Settings
     from d2rpick.flight.bodies import Bodies
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.swings import Swings
+
+    Look = Callable[[float], "Situation"]
 
 
 # Of the highest energy a solver errs by so much at any time.
@@ -254,6 +258,25 @@ def examine(
     settled = flight.start if flight.settled is None else flight.settled
     within = Span(settled, flight.end or float(history.time[-1]))
     return replace(situation, evidence=evidence._replace(swings=_swings(history, within, fits)))
+
+
+def looking(
+    history: History, settings: Settings, fits: Fits | None = None, since: float | None = None, *, quick: bool = True
+) -> Look:
+    """Give what examines a record once for each td, by ``fits`` of an earlier look with the same settings.
+
+    No flight is taken to begin before ``since`` [time].  ``quick`` as for `examine`.
+    """
+    look = partial(examine, history, settings=settings, fits=fits or Fits(), quick=quick)
+    return cache(look if since is None else lambda td: _beginning(look(td), since))
+
+
+def _beginning(situation: Situation, since: float) -> Situation:
+    """Give the same with a flight that does not begin before ``since`` [time]."""
+    flight = situation.flight
+    if flight.start is None or flight.start >= since:
+        return situation
+    return replace(situation, flight=flight._replace(start=since))
 
 
 def _between_supports(history: History, flight: Flight, td: float) -> Flight:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache, partial
 from itertools import chain
 from math import sqrt
 from typing import TYPE_CHECKING, Final
@@ -15,7 +14,7 @@ from d2rpick.choice.candidates import Pair, judged_of
 from d2rpick.choice.expectation import mean_in_flight, shortfall
 from d2rpick.choice.flights import longest_flight
 from d2rpick.choice.ranking import LIKE_LEVELS, like_quality, ranked
-from d2rpick.choice.situation import Situation, examine
+from d2rpick.choice.situation import Situation, looking
 from d2rpick.flight.flight import SOURCES
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.margin import margin_before_contact
@@ -24,12 +23,12 @@ from d2rpick.histories.samples import union
 from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.choice.question import Settings
+    from d2rpick.choice.situation import Look
     from d2rpick.histories.history import History, Samples
 
-    Look = Callable[[float], Situation]
     Choice = tuple[Situation, Pair]
 
 
@@ -197,25 +196,6 @@ def _beating(own: Choice, situations: Iterable[Situation]) -> list[Choice]:
         for there, best, its in found
         if its <= error and best.rigid_time >= rigid and (its, best.rigid_time) != (error, rigid)
     ]
-
-
-def looking(
-    history: History, settings: Settings, fits: Fits | None = None, since: float | None = None, *, quick: bool = True
-) -> Look:
-    """Give what examines a record once for each td, by ``fits`` of an earlier look with the same settings.
-
-    No flight is taken to begin before ``since`` [time].  ``quick`` as for `examine`.
-    """
-    look = partial(examine, history, settings=settings, fits=fits or Fits(), quick=quick)
-    return cache(look if since is None else lambda td: _beginning(look(td), since))
-
-
-def _beginning(situation: Situation, since: float) -> Situation:
-    """Give the same with a flight that does not begin before ``since`` [time]."""
-    flight = situation.flight
-    if flight.start is None or flight.start >= since:
-        return situation
-    return replace(situation, flight=flight._replace(start=since))
 
 
 def within_flight(look: Look, history: History, window: tuple[float, float]) -> tuple[Situation, tuple[float, float]]:

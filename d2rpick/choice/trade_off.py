@@ -15,10 +15,9 @@ from d2rpick.choice.candidates import find_candidates, judged_of
 from d2rpick.choice.flights import longest_flight
 from d2rpick.choice.health import refuse_unsound
 from d2rpick.choice.of_run import suggest_of
-from d2rpick.choice.question import Reference, check_units
 from d2rpick.choice.ranking import EQUALLY_GOOD, rank, ranked
-from d2rpick.choice.situation import OfTd, Situation
-from d2rpick.choice.suggest_td import STEPS, as_printed, error_of, looking, offered_times, within_flight
+from d2rpick.choice.situation import OfTd, Situation, looking
+from d2rpick.choice.suggest_td import STEPS, as_printed, error_of, offered_times, within_flight
 from d2rpick.choice.warnings import Caution, cautions_of
 from d2rpick.histories.digits import as_read
 from d2rpick.vibration.span import Fits
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.candidates import Candidate, Candidates, Pair
     from d2rpick.choice.plan import Plan
-    from d2rpick.choice.question import Settings
+    from d2rpick.choice.question import Reference, Settings
     from d2rpick.choice.ranking import Quality
 
 
@@ -163,10 +162,7 @@ def explore_of(
         If td or the window lies outside the record, or no flight is seen and neither is given.
     """
     history, fits = reference.history, Fits()
-    refuse_unsound(history, choosing=True)
-    check_units(history, settings)
-    if td is not None:
-        history.check_unit(td, argument="td")
+    refuse_unsound(history, settings, td)
     record = float(history.time[0]), float(history.time[-1])
     window = td_window or longest_flight(history, settings, fits, otherwise=None if td is None else record)
     look = looking(history, settings, fits, since)
