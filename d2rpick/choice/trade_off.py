@@ -84,9 +84,10 @@ class Offer(OfTd):
     @cached_property
     def answer(self) -> Suggestion:
         """What ``suggest`` says: of windows by all candidates, of why there is none by those before the flight too."""
-        again = self.pair and self.basis == "energy"
-        ranked = rank(find_candidates(self.situation, in_flight=True)) if again else self.candidates
-        return suggest_at(self.situation, with_better=False, ranked=ranked)
+        known = self.candidates if self.pair else None  # of a td without a pair all are looked at again
+        if known and self.basis == "energy":
+            known = rank(find_candidates(self.situation, in_flight=True))
+        return suggest_at(self.situation, with_better=False, ranked=known)
 
     @cached_property
     def quality(self) -> Quality | None:

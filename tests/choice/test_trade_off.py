@@ -79,6 +79,15 @@ def test_every_td_of_a_sample_is_answered_as_suggest_answers_it(name: str) -> No
     check(found, known.history, Settings(), [*found.offers][:: len(found.offers) // 2])
 
 
+def test_a_td_without_a_pair_tells_which_of_its_candidates_was_nearest() -> None:
+    """An offer holds none of them: they are looked for again."""
+    known = read(["sample_data/energy.csv"])
+    found = explore_of(known, Settings(), (0.001, 0.07), steps=10)
+    without = [one for one in found.offers if one.pair is None]
+    assert any("the nearest, tr = " in one.answer.why_none for one in without)
+    check(found, known.history, Settings(), without)
+
+
 @st.composite
 def histories(draw: st.DrawFn) -> History:
     """Energy of some modes after a load that may ring, with or without noise, damping and a contact at the end."""
