@@ -67,44 +67,9 @@ class Database:
     no_channels = ""
     no_parts = "this table has no parts; give the matsum, binout or T01 instead, or one of its columns by `energy`"
 
-    @cached_property
-    def time(self) -> Samples:
-        """Times of the columns of the whole model, shape (n,) [time]."""
-        raise FormatError(f"{self.source}: {self.no_channels}")
-
-    @cached_property
-    def part_time(self) -> Samples:
-        """Times of the parts' columns, shape (m,) [time]."""
-        raise FormatError(f"{self.source}: {self.no_parts}")
-
-    def channel(self, name: str) -> Samples:  # noqa: ARG002  as of those that have some
-        """One column of the whole model, shape (n,)."""
-        raise FormatError(f"{self.source}: {self.no_channels}")
-
-    def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:  # noqa: ARG002  as of those that have some
-        """One quantity (``internal_energy``, ``x_momentum``, ...) of some parts, shape (m, len(ids))."""
-        raise FormatError(f"{self.source}: {self.no_parts}")
-
-    @property
-    def energy_channel(self) -> str | None:
-        """Name of the internal energy of the whole model; None where there is none."""
-        return next((name for name in ("internal energy", "internal_energy") if name in self.channels), None)
-
-    def find(self, wanted: str) -> str:
-        """Name of the column that the user means, by name or, in tables, by number; FormatError with what there is."""
-        return resolve(wanted, self.channels, self.source)
-
-    def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:  # noqa: ARG002  all are written alike
-        """How finely the times and these channels were written; of no channels: those of the parts."""
-        return Precision(self.digits), Precision(self.digits)
-
-
-class Branched(Database):
-    """A database that has the whole model in one branch, as of a glstat, and the parts in another, as of a matsum."""
-
     def branch(self, name: str) -> Database:
-        """Give the branch ``glstat`` or ``matsum``, each with its own times; FormatError where it is not there."""
-        raise NotImplementedError
+        """Give what holds the whole model, ``glstat``, or the parts, ``matsum``; FormatError where there is none."""
+        raise FormatError(f"{self.source}: {self.no_channels if name == 'glstat' else self.no_parts}")
 
     @cached_property
     def time(self) -> Samples:
@@ -121,8 +86,21 @@ class Branched(Database):
         return self.branch("glstat").channel(name)
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
-        """One quantity of some parts, shape (m, len(ids))."""
+        """One quantity (``internal_energy``, ``x_momentum``, ...) of some parts, shape (m, len(ids))."""
         return self.branch("matsum").part_channel(quantity, ids)
+
+    @property
+    def energy_channel(self) -> str | None:
+        """Name of the internal energy of the whole model; None where there is none."""
+        return next((name for name in ("internal energy", "internal_energy") if name in self.channels), None)
+
+    def find(self, wanted: str) -> str:
+        """Name of the column that the user means, by name or, in tables, by number; FormatError with what there is."""
+        return resolve(wanted, self.channels, self.source)
+
+    def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:  # noqa: ARG002  all are written alike
+        """How finely the times and these channels were written; of no channels: those of the parts."""
+        return Precision(self.digits), Precision(self.digits)
 
 
 # An interval so many times the median one is no output interval.

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.errors import FormatError, listing
-from d2rpick.histories.database import DIGITS, Branched, Database
+from d2rpick.histories.database import DIGITS, Database
 from d2rpick.histories.formats.lsda import DirectoryLayout, Lsda, Variable, recognises
 from d2rpick.histories.names import Part, Selection, plain_text
 
@@ -339,7 +339,7 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[Binout]:
     return [Binout(family) for family in folders.values()]
 
 
-class Binout(Branched):
+class Binout(Database):
     """All binout files of one leg, by name and content, those of a family in their order, read as one `Database`.
 
     FormatError if a file is no binout, or none of them holds glstat or matsum.

@@ -17,7 +17,8 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.content import content_of, line_at
-from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, Stretch, like_example
+from d2rpick.histories.database import Database
+from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, Stretch, head, like_example
 from d2rpick.histories.formats.printed import decode
 
 if TYPE_CHECKING:
@@ -45,8 +46,8 @@ class Portions(NamedTuple):
 PORTIONS: Final = Portions()
 
 
-class Blocks:
-    """The whole states of one file.
+class Blocks(Database):
+    """The whole states of one file; what they hold, and whether a file without any is one, says a database made of it.
 
     Parameters
     ----------
@@ -54,8 +55,6 @@ class Blocks:
         The file.
     source : str
         Its name, for messages.
-    begin : int
-        Address behind the head.
     grammar : Grammar
         What a block looks like.
     ahead : sequence of names, optional
@@ -66,25 +65,20 @@ class Blocks:
     ----------
     states : int
         Number of whole states.
-    complete : bool
-        False when the file ends within a state or a line.
-    notes : tuple of str
-        What was left out.
     tail : int
-        Address at which the last block of the file starts, whole or not; ``begin`` when there is none.
+        Address at which the last block of the file starts, whole or not; that behind the head when there is none.
     rest : Stretch or None
         The last block, when the file ends within it: it is no state unless ``admit_rest`` makes it one.
     """
 
     def __init__(
-        self, data: bytes | Content, source: str, begin: int, grammar: Grammar, ahead: Sequence[Hashable] = (),
-        portions: Portions = PORTIONS,
-    ) -> None:  # fmt: skip
+        self, data: bytes | Content, source: str, grammar: Grammar, portions: Portions, ahead: Sequence[Hashable] = ()
+    ) -> None:
         self.source, self._portions = source, portions
+        self.title, self.version, self._begin = head(data)
         self._data = content_of(data)
         self._grammar = grammar
         self._end = self._data.rfind(b"\n", 0, len(self._data)) + 1
-        self._begin = begin
         self._runs = array("q")  # packed: a file whose blocks all differ must not fill the memory
         data, end = self._data, self._end  # not self: a circle would keep the file open
         self.layout = lru_cache(maxsize=16)(lambda at, size: grammar.layout(data[at : min(at + size, end)]))
@@ -93,9 +87,6 @@ class Blocks:
         self._varied: dict[int, Bytes] = {}  # by the start of a run of many blocks: 0 for the bytes that they share
         self._asked_ahead = tuple(ahead)
         self._ahead: dict[int, Fields] = {}  # by the start of such a run: the numbers taken of its blocks, as printed
-        self.states, self.complete = 0, True
-        self.notes: tuple[str, ...] = ()
-        self.rest: Stretch | None = None
         self._walk()
         if not self._compared and not self._is_even():
             self._compared = True
@@ -103,6 +94,12 @@ class Blocks:
 
     def __iter__(self) -> Iterator[Stretch]:
         return (Stretch(*self._runs[at : at + 4]) for at in range(0, len(self._runs), 4))
+
+    def refuse_foreign(self) -> None:
+        """FormatError where there is neither a head nor a state."""
+        if not self.version and not self.states:
+            told = f"{self.source}:1: neither a line with 'ls-dyna' nor a whole state was found, this is not a"
+            raise FormatError(f"{told} {self.format}; choose another input format")
 
     def numbers(self, names: Sequence[Hashable], anchors: Sequence[Hashable] = ()) -> Samples:
         """Numbers of all states, shape (states, len(names)).
@@ -216,7 +213,8 @@ class Blocks:
         self._runs, self._varied, self._ahead = array("q"), {}, {}
         self.notes = ()
         self.complete = not self._data[self._end : self._end + 4096].strip()
-        self.states, self.tail, self.rest = 0, self._begin, None
+        self.states, self.tail = 0, self._begin
+        self.rest: Stretch | None = None
         recent: list[tuple[int, int]] = []
         previous: BlockLayout | None = None
         position = self._find(self._begin)
@@ -345,9 +343,10 @@ class Blocks:
         )
 
     def _compare_in_full(self, names: Sequence[Hashable]) -> None:
-        states = self.states
+        states, told = self.states, (self.complete, self.notes)
         self._compared, self._asked_ahead = True, tuple(names)
         self._walk()
+        self.complete, self.notes = told
         if self.states != states:
             raise FormatError(f"{self.source}: states overlap, the file is damaged")
 

@@ -12,7 +12,6 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import FormatError
-from d2rpick.histories.database import Database
 from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, head, written_head
 from d2rpick.histories.formats.fixed_text import PORTIONS, Blocks, Portions
 from d2rpick.histories.history import Samples, frozen
@@ -28,7 +27,7 @@ _TIME: Final = "time"
 _ENERGY: Final = "internal energy"
 _SPRINGS: Final = "spring and damper energy"  # a part of it, which is looked at wherever it is written
 _START: Final = b" time".ljust(32, b".")
-_NEAR: Final = 4096  # bytes that hold the first state
+_NEAR: Final = 4096  # bytes that hold the head and the first state
 _WIDTH: Final = 14
 _CONTROL: Final = b"\n dt of cycle"
 _LAST: Final = "time per zone cycle.(nanosec)"  # in every glstat seen; mass scaling may add lines behind it
@@ -53,7 +52,7 @@ def open_legs(sources: Sequence[Source], selection: Selection) -> list[Glstat]:
     return [Glstat(source.data, source.name, selection.energy or (_ENERGY,)) for source in sources]
 
 
-class Glstat(Database):
+class Glstat(Blocks):
     """One glstat file; a ``Database`` without parts.
 
     A last state in which the file stops counts if it has the lines that are ``needed``.  FormatError if there is
@@ -66,49 +65,44 @@ class Glstat(Database):
     def __init__(
         self, data: bytes | Content, source: str, needed: Sequence[str] = (), portions: Portions = PORTIONS
     ) -> None:
-        self.source = source
-        self.title, self.version, begin = head(data)
-        springs = [_SPRINGS] if _SPRINGS.encode() in data[begin : begin + _NEAR] else []
-        self._blocks = Blocks(data, source, begin, _GRAMMAR, (_TIME, _ENERGY, *springs), portions)
+        springs = [_SPRINGS] if _SPRINGS.encode() in data[:_NEAR] else []
+        super().__init__(data, source, _GRAMMAR, portions, (_TIME, _ENERGY, *springs))
         self.channels = self._names()
         names = [_TIME]
         with suppress(FormatError):  # that there is no such line is said when it is read
             names += [self.find(name) for name in needed or self.channels]
-            self._blocks.admit_rest(names)
-        if not self.version and not self._blocks.states:
-            told = f"{source}:1: neither a line with 'ls-dyna' nor a whole state was found, this is not a glstat"
-            raise FormatError(f"{told}; choose another input format")
-        self.complete, self.notes = self._blocks.complete, self._blocks.notes
-        if self.complete and _CONTROL in data[self._blocks.tail :]:
+            self.admit_rest(names)
+        self.refuse_foreign()
+        if self.complete and _CONTROL in data[self.tail :]:
             self.complete = False
             self.notes += ("the file ends before the time of its next state",)
         if not self.version:
             self.notes += ("the file has no header; everything before its first time line was left out",)
         self._even = True  # until a state lacks what another has
-        self._columns = self._read([*names, *springs], [_TIME])
+        self._columns = self._pass_over([*names, *springs], [_TIME])
         self.time = self._columns[_TIME]
 
     def channel(self, name: str) -> Samples:
         """Values of the line ``name``, shape (n,); FormatError unless every state has a number in one such line."""
         if name not in self._columns:  # who wants one more mostly wants the others
             every = dict.fromkeys((*self.channels, name)) if self._even else [name]
-            self._columns |= self._read([one for one in every if one not in self._columns], [name])
+            self._columns |= self._pass_over([one for one in every if one not in self._columns], [name])
         return self._columns[name]
 
-    def _read(self, names: list[str], least: list[str]) -> dict[str, Samples]:
+    def _pass_over(self, names: list[str], least: list[str]) -> dict[str, Samples]:
         """Columns in one pass; where a state lacks one, the least alone, and why is said when it is asked for."""
         try:
-            columns = self._blocks.numbers(names)
+            columns = self.numbers(names)
         except FormatError:
             self._even, names = False, least
-            columns = self._blocks.numbers(least)
+            columns = self.numbers(least)
         return dict(zip(names, map(frozen, columns.T), strict=True))
 
     def _names(self) -> tuple[str, ...]:
-        layouts = {(run.example, run.stride) for run in self._blocks}
-        if not layouts and self._blocks.rest:
-            layouts = {(self._blocks.rest.example, self._blocks.rest.stride)}
-        names = {str(name): None for layout in sorted(layouts) for name in self._blocks.layout(*layout).fields}
+        layouts = {(run.example, run.stride) for run in self}
+        if not layouts and self.rest:
+            layouts = {(self.rest.example, self.rest.stride)}
+        names = {str(name): None for layout in sorted(layouts) for name in self.layout(*layout).fields}
         return tuple(name for name in names if name != _TIME)
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.errors import FormatError, listing, printable
-from d2rpick.histories.database import DIGITS, Branched, Database
+from d2rpick.histories.database import DIGITS, Database
 from d2rpick.histories.formats.hdf5_columns import Column, check_data, check_file, columns_of, finite
 from d2rpick.histories.formats.printed import of_one_run
 from d2rpick.histories.history import Precision, Samples
@@ -124,7 +124,7 @@ class Columns(Database):
             return column.load(opened, self._file.getvalue(), self.source)
 
 
-class SavedBinout(Branched):
+class SavedBinout(Database):
     """A binout that lasso-python saved: channels of its glstat branch, parts of its matsum branch."""
 
     format = "hdf5"

@@ -24,7 +24,7 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.content import Content, content_of
-from d2rpick.histories.formats.blocks import Pattern, repeats
+from d2rpick.histories.formats.blocks import repeats
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -271,12 +271,12 @@ class Lsda:
         if any(known and known[-1][0] > previous for known in self.metadata.values()):
             return 0
         stride = position - previous
-        pattern = self._pattern(previous, position)
-        times, steps = repeats(self.data, previous, pattern)
+        fixed, numbers = self._pattern(previous, position)
+        times, steps = repeats(self.data, previous, fixed, numbers)
         if times < 2:
             return 0
         # A number ends its record: the next byte is where the state's records start.
-        growth = {previous + at + width: step for (at, width), step in zip(pattern.numbers, steps, strict=True)}
+        growth = {previous + at + width: step for (at, width), step in zip(numbers, steps, strict=True)}
         ahead = np.arange(1, times)[:, None, None]
         for visits in self.visits.values():
             known = np.array(visits[-3 * len(growth) :]).reshape(-1, 3)
@@ -292,7 +292,7 @@ class Lsda:
         ahead = range(position, position + _WORTH * stride, stride)
         return all(self.data[place : place + head] == first for place in ahead)
 
-    def _pattern(self, begin: int, end: int) -> Pattern:
+    def _pattern(self, begin: int, end: int) -> tuple[NDArray[np.uint8], list[tuple[int, int]]]:
         """Which bytes from one record to another are structure, and where states are numbered."""
         fixed = np.zeros(end - begin, dtype=np.uint8)
         numbers = []
@@ -313,7 +313,7 @@ class Lsda:
                     numbers.append((at + head + state.start(1), len(state[1])))
                     fixed[at + head + state.start(1) : at + length] = 0
             position += length
-        return Pattern(fixed, tuple(numbers))
+        return fixed, numbers
 
 
 def _header(data: Content, source: str) -> tuple[int, str, struct.Struct, struct.Struct]:

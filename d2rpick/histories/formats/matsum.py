@@ -14,8 +14,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import FormatError
-from d2rpick.histories.database import Database
-from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, head, written_head
+from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, written_head
 from d2rpick.histories.formats.fixed_text import PORTIONS, Blocks, Portions
 from d2rpick.histories.names import Part, Selection
 
@@ -71,7 +70,7 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[Matsum]:
     return [Matsum(source.data, source.name) for source in sources]
 
 
-class Matsum(Database):
+class Matsum(Blocks):
     """One matsum file; a ``Database`` without channels of the whole model.
 
     FormatError if it has neither a head nor a state, or a time that is no number.
@@ -81,21 +80,16 @@ class Matsum(Database):
     no_channels = "a matsum has parts only; choose with `parts` or add the glstat of the run"
 
     def __init__(self, data: bytes | Content, source: str, portions: Portions = PORTIONS) -> None:
-        self.title, self.version, begin = head(data)
-        self.source = source
         self._legend = _legend(data)
         describe, whole = partial(_describe, self._legend), partial(_is_whole, self._legend)
         grammar = Grammar(_START, _LINE, describe, _CHANGING, _TIME, whole, width=13, decimals=4, compare_all=False)
-        self._blocks = Blocks(data, source, begin, grammar, portions=portions)
-        if not self.version and not self._blocks.states:
-            told = f"{source}:1: neither a line with 'ls-dyna' nor a whole state was found, this is not a matsum"
-            raise FormatError(f"{told}; choose another input format")
-        self.complete = self._blocks.complete
-        self.part_time = self._blocks.numbers([_TIME])[:, 0]
-        self._ahead: dict[tuple[str | int, ...], Samples] = {}  # read with what was asked for
+        super().__init__(data, source, grammar, portions)
+        self.refuse_foreign()
+        self.part_time = self.numbers([_TIME])[:, 0]
+        self._together: dict[tuple[str | int, ...], Samples] = {}  # read with what was asked for
         present = self._present()
         self.parts = tuple(Part(id_, self._legend.get(id_, "")) for id_ in present if id_ > _LUMPED)
-        self.notes = self._blocks.notes + self._remarks(present)
+        self.notes += self._remarks(present)
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
         """Values of one of ``QUANTITIES`` for the parts ``ids``, shape (n, len(ids)).
@@ -113,27 +107,27 @@ class Matsum(Database):
             found = f"{self.source}: no part {', '.join(map(str, missing))}"
             raise FormatError(f"{found}; choose from {', '.join(str(part.id) for part in self.parts) or 'none'}")
         wanted: tuple[str | int, ...] = (quantity, *ids)
-        if wanted not in self._ahead:
+        if wanted not in self._together:
             together = _AXES if quantity in _AXES else (quantity,)  # who asks for one component asks for the others
             names = [(id_, QUANTITIES[one]) for id_ in ids for one in together]
-            values = self._blocks.numbers(names, anchors=[(id_, _MAT) for id_, _ in names])
-            self._ahead = {(one, *ids): values[:, place :: len(together)] for place, one in enumerate(together)}
-        return self._ahead.pop(wanted)
+            values = self.numbers(names, anchors=[(id_, _MAT) for id_, _ in names])
+            self._together = {(one, *ids): values[:, place :: len(together)] for place, one in enumerate(together)}
+        return self._together.pop(wanted)
 
     def _present(self) -> Counter[int]:
         """In how many states each part is, in the order in which the parts appear."""
         states = Counter[int]()
-        for run in self._blocks:
-            names = self._blocks.layout(run.example, run.stride).fields
+        for run in self:
+            names = self.layout(run.example, run.stride).fields
             ids = {name[0]: run.repeats for name in names if isinstance(name, tuple) and name[1] == _MAT}
             states.update(ids)
         return states
 
     def _remarks(self, present: Counter[int]) -> tuple[str, ...]:
         unseen = [id_ for id_ in self._legend if id_ not in present]
-        passing = [id_ for id_, states in present.items() if id_ > 0 and states < self._blocks.states]
+        passing = [id_ for id_, states in present.items() if id_ > 0 and states < self.states]
         remarks = []
-        if unseen and self._blocks.states:
+        if unseen and self.states:
             remarks.append(f"no state has part {', '.join(map(str, unseen))} of the legend")
         if passing:
             remarks.append(f"only some states have part {', '.join(map(str, passing))}")
