@@ -279,14 +279,15 @@ def inserted(command: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
 
 def _settings(ctx: click.Context) -> Iterator[str]:
     """Write every option with its value, and where that comes from."""
-    from d2rpick.report.tables import as_line
+    from d2rpick.report.tables import as_json
 
     for one in ctx.command.get_params(ctx):
         if one.expose_value and one.name:
             value, source = ctx.params[one.name], _source(ctx, one.name)
             named = {"environment": f", {_variable(ctx, one.name)}", "settings": f", {ctx.meta['d2rpick.settings']}"}
             name = spelled(one) if isinstance(one, click.Option) else one.name
-            yield f"{name} = {'none' if value in (None, ()) else as_line(value)}  # {source}{named.get(source, '')}"
+            shown = "none" if value in (None, ()) else as_json(value, None)
+            yield f"{name} = {shown}  # {source}{named.get(source, '')}"
 
 
 def _source(ctx: click.Context, name: str) -> str:

@@ -101,25 +101,20 @@ def doubts(databases: Sequence[Legs]) -> Iterator[str]:
             found = f"{one.source} ends at {times[0][-1]:.6g} and {other.source} at {times[1][-1]:.6g}"
             yield f"{found}; are they from the same run, or is one cut?"
         coarse, fine = sorted(_common(*times), key=np.size)
-        shared = coinciding(coarse, fine, _room((one, other), times))
+        shared = _coincident(coarse, fine, _room((one, other), times))[0].size
         if shared < _FEWEST * coarse.size:
             found = f"{one.source} and {other.source} have only {shared} of {coarse.size} states at the same times"
             yield f"{found}; are they from the same run?"
 
 
-def coinciding(times: Samples, others: Samples, room: float) -> int:
-    """Count the times that lie within ``room`` [time] of one of the others, which increase.
+def _coincident(times: Samples, others: Samples, room: float) -> tuple[Indices, Indices]:
+    """Indices of the times that lie within ``room`` [time] of one of the others, and of the nearest of these.
 
     Examples
     --------
-    >>> coinciding(np.array([0.0, 0.0048730, 0.0099579]), np.array([0.0, 0.00487301, 0.00995]), 5e-7)
-    2
+    >>> _coincident(np.array([0.0, 0.0048730, 0.0099579]), np.array([0.0, 0.00487301, 0.00995]), 5e-7)
+    (array([0, 1]), array([0, 1]))
     """
-    return _coincident(times, others, room)[0].size
-
-
-def _coincident(times: Samples, others: Samples, room: float) -> tuple[Indices, Indices]:
-    """Indices of the times that lie within ``room`` [time] of one of the others, and of the nearest of these."""
     if not others.size:
         return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp)
     behind = np.searchsorted(others, times)

@@ -164,13 +164,9 @@ class Document(NamedTuple):
         head = {"schema": self.name, "tool_version": __version__, "command": list(command)}
         return {**head, **self.row.plain(answer)}
 
-    def as_json(self, answer: Any, command: Sequence[str]) -> str:
-        """Write an answer by its schema."""
-        return tables.as_json(self.of(answer, command))
-
-    def as_line(self, answer: Any, command: Sequence[str]) -> str:
-        """Write the same in one line, to be appended to those of other runs."""
-        return tables.as_line(self.of(answer, command))
+    def as_json(self, answer: Any, command: Sequence[str], indent: int | None = 2) -> str:
+        """Write an answer by its schema; without an ``indent`` in one line, to be appended to those of other runs."""
+        return tables.as_json(self.of(answer, command), indent)
 
 
 def csv_of(keys: Sequence[str], rows: Iterable[Mapping[str, Any]], between: str = "; ") -> str:

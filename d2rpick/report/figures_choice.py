@@ -93,16 +93,12 @@ def _draw(
     panels[-1].set_xlabel(with_unit("time", situation.history.time_unit))
     for panel in panels:
         finish(panel, legend=not page)
-    _show(panels[0], situation, seen)
+    # the level belongs to the flight, also where td lies beyond
+    show_span(panels[0], (seen.start, seen.end), scale_in(situation, seen, [situation.energy_td]), seen.above)
     if page:
         arrange(figure, panels, _PANELS[bool(motion)])
     mark_times(panels, tr, situation.td, page=page)
     return figure
-
-
-def _show(axes: Axes, situation: Situation, seen: View) -> None:
-    """Show the flight; the level belongs to it, also where td lies beyond."""
-    show_span(axes, (seen.start, seen.end), scale_in(situation, seen, [situation.energy_td]), seen.above)
 
 
 def _draw_energy(

@@ -85,7 +85,8 @@ def as_table(checks: Checks, _: Shown) -> str:
 
 def as_ndjson(checks: Checks, shown: Shown) -> str:
     """Give a line for each deck, by the same schema as the JSON of all."""
-    return "\n".join(DOCUMENT.as_line(replace(checks, results=[result]), shown.command) for result in checks.results)
+    each = (replace(checks, results=[result]) for result in checks.results)
+    return "\n".join(DOCUMENT.as_json(one, shown.command, None) for one in each)
 
 
 def as_csv(checks: Checks, _: Shown) -> str:
@@ -124,20 +125,14 @@ def as_junit(checks: Checks, _: Shown) -> str:
         case = ET.SubElement(suite, "testcase", name="d2rpick check", classname=name)
         ET.SubElement(case, "error", type=one.code, message=_xml(one.reason))
     for result in checks.results:
-        failures = sum(finding.severity.rank <= fail_on.rank for finding in result.findings)
-        suite = ET.SubElement(
-            suites,
-            "testsuite",
-            name=_xml(_shown(result.deck, root)),
-            tests=str(max(1, len(result.findings))),
-            failures=str(failures),
-            errors="0",
-        )
+        name, tests = _xml(_shown(result.deck, root)), str(max(1, len(result.findings)))
+        failures = str(sum(finding.severity.rank <= fail_on.rank for finding in result.findings))
+        suite = ET.SubElement(suites, "testsuite", name=name, tests=tests, failures=failures, errors="0")
         if not result.findings:
-            ET.SubElement(suite, "testcase", name="d2rpick check", classname=suite.attrib["name"])
+            ET.SubElement(suite, "testcase", name="d2rpick check", classname=name)
         for f in result.findings:
             place = f"{_shown(f.file, root)}:{f.line}:{f.column}"
-            case = ET.SubElement(suite, "testcase", name=_xml(f"{f.rule} {place}"), classname=suite.attrib["name"])
+            case = ET.SubElement(suite, "testcase", name=_xml(f"{f.rule} {place}"), classname=name)
             text = _xml(f"{place}: {f.severity} {f.rule} {f.message}")
             if f.severity.rank <= fail_on.rank:
                 ET.SubElement(case, "failure", type=f.rule, message=_xml(f.message)).text = text
@@ -170,24 +165,13 @@ def as_sarif(checks: Checks, _: Shown) -> str:
             "ruleIndex": ids.index(f.rule),
             "level": _SARIF[f.severity],
             "message": {"text": f.message},
-            "locations": [
-                {
-                    "physicalLocation": {
-                        "artifactLocation": {"uri": _uri(f.file, root)},
-                        "region": {"startLine": f.line, "startColumn": f.column},
-                    }
-                }
-            ],
+            "locations": _places(f.file, root, region={"startLine": f.line, "startColumn": f.column}),
         }
         for result in checks.results
         for f in result.findings
     ]
     messages = [
-        {
-            "level": "error",
-            "message": {"text": one.reason},
-            "locations": [{"physicalLocation": {"artifactLocation": {"uri": _uri(one.deck, root)}}}],
-        }
+        {"level": "error", "message": {"text": one.reason}, "locations": _places(one.deck, root)}
         for one in checks.failed
     ]
     run = {
@@ -275,11 +259,13 @@ def _shown(path: str, root: str) -> str:
     return os.fsencode(shown).decode("utf-8", "replace").replace(os.sep, "/")
 
 
-def _uri(path: str, root: str) -> str:
+def _places(path: str, root: str, **more: Any) -> list[dict[str, Any]]:
+    """Give a place in a file as SARIF has it."""
     from urllib.parse import quote
 
     shown = _shown(path, root)
-    return quote(shown) if not shown.startswith("/") else f"file://{quote(shown)}"
+    uri = f"{'file://' * shown.startswith('/')}{quote(shown)}"
+    return [{"physicalLocation": {"artifactLocation": {"uri": uri}, **more}}]
 
 
 def _escaped(text: str, more: str = "") -> str:

@@ -132,7 +132,7 @@ def grid(head: Sequence[str], rows: Iterable[Sequence[Cell]], marked: int | None
     lines = [
         tag(
             "tr",
-            *(_cell(_text(cell), own) for cell, own in zip(row, classes, strict=True)),
+            *(_cell(cell, own) for cell, own in zip(row, classes, strict=True)),
             **({"class_": "marked"} if i == marked else {}),
         )
         for i, row in enumerate(body)
@@ -140,7 +140,8 @@ def grid(head: Sequence[str], rows: Iterable[Sequence[Cell]], marked: int | None
     return tag("table", tag("thead", tag("tr", *top)), tag("tbody", *lines))
 
 
-def _cell(text: str, own: Mapping[str, str]) -> Markup:
+def _cell(cell: Cell, own: Mapping[str, str]) -> Markup:
+    text = cell if isinstance(cell, Markup) else short(cell)
     return tag("td", text, **(own or ({"class_": "words"} if " " in text else {})))
 
 
@@ -152,10 +153,6 @@ def pairs(rows: Iterable[tuple[str, str]]) -> Markup:
 
 def _escape(text: str, *, quote: bool = True) -> str:
     return escape(text, quote=quote).translate(_CONTROLS)
-
-
-def _text(cell: Cell) -> str:
-    return cell if isinstance(cell, Markup) else short(cell)
 
 
 def _figure(caption: str, svg: str) -> Markup:

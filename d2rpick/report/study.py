@@ -112,7 +112,7 @@ def as_csv(answer: Study, _: Shown) -> str:
 
 def as_ndjson(answer: Study, shown: Shown) -> str:
     """The lines of the runs, as far as they are not written yet, and what the runs have in common."""
-    return "\n".join([*shown.lines, LAST.as_line(answer, shown.command)])
+    return "\n".join([*shown.lines, LAST.as_json(answer, shown.command, None)])
 
 
 def with_errors(answer: Study) -> Iterator[tuple[StudyRow, float | None]]:

@@ -262,18 +262,11 @@ def _exact(value: Cell) -> Cell:
     return printable(value) if isinstance(value, str) else value
 
 
-def as_line(result: Any) -> str:
-    """Write a result as JSON in one line."""
-    return _json(result, None)
+def as_json(result: Any, indent: int | None = 2) -> str:
+    r"""Write a result as JSON: full precision, null for what is not known; a NaN would be a fault and raises.
 
-
-def as_json(result: Any) -> str:
-    """Write a result as JSON: full precision, null for what is not known; a NaN would be a fault and raises."""
-    return _json(result, 2)
-
-
-def _json(result: Any, indent: int | None) -> str:
-    r"""Write JSON in which nothing commands a terminal or turns the text around: that is written as ``\u....``."""
+    Without an ``indent`` it is one line.  What commands a terminal or turns the text around is written as ``\u....``.
+    """
     import json
     import unicodedata
 

@@ -42,27 +42,6 @@ OFFER: Final = row(
 COLUMNS: Final = [key for key in OFFER.keys if key not in ("quality_reasons", "acceptable_windows", "expected")]
 
 
-def _answer(found: TradeOff) -> str:
-    return answer(found)
-
-
-DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; times in the unit of the history.", row(
-    *keys.FRAME,
-    Field("td", "number?", "the td that was asked for", lambda found: found.asked and found.asked.td),
-    Field("td_window", "span",
-          "where td was explored: the window asked for or the longest flight, less the margin before the contact"),
-    *keys.MECHANICS.of_part(lambda found: found.situation, ("flight", "oscillator", "modes")),
-    Field("answer", "text", "the shortest sensible answer", _answer),
-    Field("recommended", maybe(keys.TIMES)),
-    Field("start", "number?",
-          "td of the offer that the answer starts from: the one asked for, else the one that saves most",
-          lambda found: found.start and found.start.td),
-    Field("step", "number?",
-          "the nearest unbeaten td with half the error of that, else the recommended one where it has less",
-          lambda found: found.step and found.step.td),
-    Field("offers", many(OFFER),
-          "by ascending td: a grid, the peaks of the energy, the td asked for and the recommended one"),
-))  # fmt: skip
 # A change of the rigid time below this share is none that people read.
 _NO_CHANGE: Final = 5e-4
 # An error that falls to about this share of itself is halved; much further, it is as good as gone.
@@ -77,7 +56,9 @@ def as_table(found: TradeOff, shown: Shown) -> str:
     """What was read, some of the offers that nothing beats, and the answer in a sentence."""
     some = some_of(found, shown.limit)
     offered = tables.as_text(*tables.known(*table(some)), shown.width, _SPARE) if some else "nothing to offer"
-    lines = [read_line(found.situation.history), *_heading(found), "", offered]
+    low, high = found.td_window
+    window = f"td       {len(found.offers)} times from {low:.6g} to {high:.6g}"
+    lines = [read_line(found.situation.history), window, "", offered]
     left = len(found.offers) - len(some)
     if left:
         lines.append(f"... and {left} more td (--limit; csv and json have all)")
@@ -115,6 +96,25 @@ def answer(found: TradeOff) -> str:
         small = start.error is not None and start.error <= EQUALLY_GOOD
         return f"{what}; no other td in the window {'is better' if small else _NOT_HALVED}"
     return f"{what}; {_away(start, step, unit)} {_less(start, step)} and {_cost(start, step)}"
+
+
+DOCUMENT: Final = Document("d2rpick/explore/1", "Answer of d2rpick explore; times in the unit of the history.", row(
+    *keys.FRAME,
+    Field("td", "number?", "the td that was asked for", lambda found: found.asked and found.asked.td),
+    Field("td_window", "span",
+          "where td was explored: the window asked for or the longest flight, less the margin before the contact"),
+    *keys.MECHANICS.of_part(lambda found: found.situation, ("flight", "oscillator", "modes")),
+    Field("answer", "text", "the shortest sensible answer", answer),
+    Field("recommended", maybe(keys.TIMES)),
+    Field("start", "number?",
+          "td of the offer that the answer starts from: the one asked for, else the one that saves most",
+          lambda found: found.start and found.start.td),
+    Field("step", "number?",
+          "the nearest unbeaten td with half the error of that, else the recommended one where it has less",
+          lambda found: found.step and found.step.td),
+    Field("offers", many(OFFER),
+          "by ascending td: a grid, the peaks of the energy, the td asked for and the recommended one"),
+))  # fmt: skip
 
 
 def _away(start: Offer, step: Offer, unit: str) -> str:
@@ -156,11 +156,6 @@ def _error(one: Offer) -> str:
     if one.basis == "energy":
         return f"error {tables.measure(one.error)} (shortfall of the level at td)"
     return f"residual {tables.measure(one.error)}"
-
-
-def _heading(found: TradeOff) -> list[str]:
-    low, high = found.td_window
-    return [f"td       {len(found.offers)} times from {low:.6g} to {high:.6g}"]
 
 
 def some_of(found: TradeOff, limit: int) -> list[Offer]:

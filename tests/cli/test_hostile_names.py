@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 from d2rpick.base.errors import UNSEEN, printable
 from d2rpick.report.figures import with_unit
-from d2rpick.report.tables import as_json, as_line, as_markdown, in_markdown, positional, shell_line
+from d2rpick.report.tables import as_json, as_markdown, in_markdown, positional, shell_line
 from tests.command import DECK, ENERGY, ROOT, run
 from tests.sample_deck import DECK as SAMPLE_DECK
 
@@ -65,8 +65,8 @@ def test_files_that_begin_with_a_dash_are_typed_behind_two() -> None:
 
 @given(st.text(max_size=60))
 def test_json_gives_a_name_back_in_signs_that_are_seen(name: str) -> None:
-    for write in (as_json, as_line):
-        text = write({name: [name]})
+    for indent in (2, None):
+        text = as_json({name: [name]}, indent)
         assert json.loads(text) == {name: [name]}
         assert not unseen(text)
 

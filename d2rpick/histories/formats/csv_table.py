@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
@@ -12,7 +11,7 @@ from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats import printed
 from d2rpick.histories.formats.curves import Curves, find_curves
-from d2rpick.histories.formats.layout import Layout, find_layout, is_skipped, split
+from d2rpick.histories.formats.layout import Layout, find_layout, is_skipped, split, unique
 from d2rpick.histories.formats.table_values import columns_of, line_of
 from d2rpick.histories.formats.text import UTF16, Text
 from d2rpick.histories.names import internal_energies, is_time, meant, near_miss, quantity_of, refuse_other_quantity
@@ -27,13 +26,8 @@ if TYPE_CHECKING:
 
 def labelled(layout: Layout, time: int) -> dict[str, int]:
     """Columns beside the time by the name they are called by, with their number where a name is not theirs alone."""
-    names = [layout.channel(column) for column in range(layout.trusted)]
-    bearers, times = Counter(names), {time, *own_times(layout)}
-    return {
-        name if bearers[name] == 1 else f"{name} (column {column + 1})": column
-        for column, name in enumerate(names)
-        if column not in times
-    }
+    names, times = unique([*map(layout.channel, range(layout.trusted))], "column"), {time, *own_times(layout)}
+    return {name: column for column, name in enumerate(names) if column not in times}
 
 
 def own_times(layout: Layout) -> tuple[int, ...]:

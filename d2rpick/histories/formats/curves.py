@@ -9,7 +9,6 @@ curves; for each ``number 'name'`` and pairs.
 from __future__ import annotations
 
 import re
-from collections import Counter
 from functools import cached_property
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Final
@@ -19,7 +18,7 @@ import numpy as np
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats import printed
-from d2rpick.histories.formats.layout import as_number
+from d2rpick.histories.formats.layout import as_number, unique
 from d2rpick.histories.formats.printed import of_one_run
 from d2rpick.histories.names import Selection, internal_energies, is_time, refuse_other_quantity, resolve, unit_of
 
@@ -112,7 +111,7 @@ class Curves(Database):
     def __init__(self, found: _CurveText, selection: Selection) -> None:
         self.source = found.source
         self.time_unit = unit_of(found.x_label)
-        self._curves = _uniquely_named(found.curves)
+        self._curves = dict(zip(unique([one.name for one in found.curves], "curve"), found.curves, strict=True))
         self.channels = tuple(self._curves)
         notes = [f"the file ends within {found.stops}"] if found.stops else []
         if found.x_label and not is_time(found.x_label):
@@ -270,11 +269,3 @@ def _counts(line: str) -> bool:
 def _is_pair(line: str) -> bool:
     cells = line.replace(",", " ").split()
     return len(cells) == 2 and all(as_number(cell, ".") is not None for cell in cells)
-
-
-def _uniquely_named(curves: Sequence[_Curve]) -> dict[str, _Curve]:
-    bearers = Counter(curve.name for curve in curves)
-    return {
-        curve.name if bearers[curve.name] == 1 else f"{curve.name} (curve {number})": curve
-        for number, curve in enumerate(curves, 1)
-    }

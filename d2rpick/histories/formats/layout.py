@@ -98,6 +98,18 @@ def split(line: str, separator: str | None) -> list[str]:
     return [cell.strip().removeprefix('"').removesuffix('"').strip() for cell in cells]
 
 
+def unique(names: Sequence[str], what: str) -> list[str]:
+    """Let names that several of ``what`` have be told apart by number.
+
+    Examples
+    --------
+    >>> unique(["time", "IE", "IE"], "column")
+    ['time', 'IE (column 2)', 'IE (column 3)']
+    """
+    bearers = Counter(names)
+    return [name if bearers[name] == 1 else f"{name} ({what} {number})" for number, name in enumerate(names, 1)]
+
+
 def is_skipped(line: str) -> bool:
     """Whether a line is blank or a comment."""
     line = line.lstrip()
