@@ -144,11 +144,6 @@ def repeated(command: Sequence[str], stdin: bool = False) -> Markup:
     return section("To repeat this", *said, tag("pre", shell_line(command), class_="wrap"))
 
 
-def named(lines: Iterable[str]) -> list[tuple[str, str]]:
-    """Part lines, as they stand above a table, in their name and what it stands for."""
-    return [(line.partition(" ")[0], line.partition(" ")[2].strip()) for line in lines]
-
-
 def solver_input(times: tuple[float, float], record: PageContext) -> Markup:
     """Give the solver's card where it is known whom it switches, else the command that prints it."""
     title, card = "Solver input", record.card
@@ -165,7 +160,7 @@ def solver_input(times: tuple[float, float], record: PageContext) -> Markup:
 
 
 def _read(situation: Situation, run: Run) -> Markup:
-    listed = [*named(heading(situation, verbose=True)), *digests(run.files), *digests_of(situation.settings)]
+    listed = [*heading(situation, verbose=True), *digests(run.files), *digests_of(situation.settings)]
     listed += [(f"{database.format} by", database.version) for database in run.databases if database.version]
     whole = "the files end after a complete state" if situation.history.complete else "only complete states were used"
     listed += [("complete", whole)]

@@ -9,6 +9,7 @@ from d2rpick.choice.study import Study, runs_of
 from d2rpick.report import overview, page, parts, plan, study, suggestion, trade_off, verdict
 from d2rpick.report.explorer import Explorer, explorer
 from d2rpick.report.html import Markup, document, drawings, grid, pairs, remarks, section, table, tag
+from d2rpick.report.situation import what_was_read
 from d2rpick.report.tables import Cell, known, measure, short, unstarred
 
 if TYPE_CHECKING:
@@ -190,7 +191,7 @@ def _of_plan(
         yield section("For the solver's input", tag("pre", card, tabindex="0"))
     files = [*page.digests(run.files), *page.digests_of(found.settings)]
     notes = [("note", note) for note in found.history.notes]
-    yield section("What was read", pairs([*page.named([plan.heading(found)]), *files, *notes]))
+    yield section("What was read", pairs([("history", what_was_read(found.history)), *files, *notes]))
     yield from page.method(command)
 
 
@@ -255,7 +256,7 @@ def _of_parts(found: Parts, command: Sequence[str]) -> Iterator[Markup]:
     yield section("What it means", pairs(parts.outlook(found)))
     weights = [("weights", found.weights.source)] if found.weights else []
     deck = page.deck_digests(found.inventory.files, found.weights) if found.inventory else []
-    read = [*page.named(parts.heading(found)), *weights, *page.digests(found.files.files), *deck]
+    read = [*parts.heading(found), *weights, *page.digests(found.files.files), *deck]
     yield section("What was read", pairs(read))
     yield page.repeated(command)
 

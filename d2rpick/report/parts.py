@@ -137,7 +137,7 @@ _SPARE: Final = ("material", "step", "mass", "saved of a step", "turned [deg]")
 
 def as_table(found: Parts, shown: Shown) -> str:
     """What was read, a row per part in two tables, a row per set, and the set to take; markdown has all columns."""
-    lines = heading(found)
+    lines = tables.in_line(heading(found))
     for names in TABLES.values():
         head, body = tables.known(*table(found, names))
         if body and {*head} - {"", "part", "title"}:
@@ -181,21 +181,21 @@ def draw(found: Parts) -> Figure:
     return figure
 
 
-def heading(found: Parts) -> list[str]:
-    """What was read."""
+def heading(found: Parts) -> list[tuple[str, str]]:
+    """What was read, by names."""
     run, deck = found.files, found.inventory
     formats = " + ".join(one.format for one in run.databases)
-    lines = [f"history  {', '.join(run.sources)}: {formats}, {_number(len(run.parts), 'part')}"]
+    lines = [("history", f"{', '.join(run.sources)}: {formats}, {_number(len(run.parts), 'part')}")]
     if deck is None:
-        lines.append("deck     none")
+        lines.append(("deck", "none"))
     else:
         number = sum(sum(counts.values()) for counts in deck.counts.values())
-        lines.append(f"deck     {deck.solver}, {_number(len(deck.parts), 'part')}, {_number(number, 'element')}")
+        lines.append(("deck", f"{deck.solver}, {_number(len(deck.parts), 'part')}, {_number(number, 'element')}"))
     longest = found.facts.longest
     if longest is not None:
         start, end = found.facts.flights[longest]
-        lines.append(f"flight   {start:.6g} to {end:.6g}, the longest of {len(found.facts.flights)}")
-    return [printable(line) for line in lines]
+        lines.append(("flight", f"{start:.6g} to {end:.6g}, the longest of {len(found.facts.flights)}"))
+    return [(name, printable(text)) for name, text in lines]
 
 
 def table(found: Parts, names: Iterable[str] = ()) -> tuple[list[str], list[list[tables.Cell]]]:

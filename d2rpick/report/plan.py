@@ -85,7 +85,8 @@ def as_table(plan: Plan, shown: Shown) -> str:
     """The plan in a sentence, what was read, a row per flight, what is saved, and why others are not supported."""
     rows = tables.as_text(*table(plan), shown.width, _SPARE) if plan.flights else "no flight"
     told = [(name, printable(text)) for name, text in (*outlook(plan), *reasons(plan))]
-    return "\n".join([sentence(plan), "", heading(plan), "", rows, "", *tables.in_line(told, 9)])
+    above = tables.in_line([("history", what_was_read(plan.history))], 8)
+    return "\n".join([sentence(plan), "", *above, "", rows, "", *tables.in_line(told, 9)])
 
 
 def sentence(plan: Plan) -> str:
@@ -121,11 +122,6 @@ def as_value(plan: Plan, shown: Shown) -> str:
     """
     new = plan.all_windows if shown.every else plan.windows
     return "\n".join(f"{tr!r} {td!r}" for tr, td in ((*plan.done, *new) if new else ()))
-
-
-def heading(plan: Plan) -> str:
-    """What was read."""
-    return f"history   {what_was_read(plan.history)}"
 
 
 def outlook(plan: Plan) -> list[tuple[str, str]]:

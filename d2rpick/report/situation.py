@@ -20,11 +20,6 @@ if TYPE_CHECKING:
 _NAMED = 5
 
 
-def read_line(history: History) -> str:
-    """Say what was read."""
-    return f"history  {what_was_read(history)}"
-
-
 def what_was_read(history: History) -> str:
     """Name files, format, energy and span of a history."""
     unit = f" {history.time_unit}" if history.time_unit else ""
@@ -39,24 +34,24 @@ def energy_name(history: History) -> str:
     return history.channel if len(parts) <= _NAMED else f"internal energy of {listing(parts, most=_NAMED)}"
 
 
-def heading(situation: Situation, *, verbose: bool = False) -> list[str]:
-    """Lines above the table of a result: what was read, and what the choice rests on, ``verbose``: why."""
+def heading(situation: Situation, *, verbose: bool = False) -> list[tuple[str, str]]:
+    """What stands above a table, by names: what was read, and what the choice rests on, ``verbose``: why."""
     flight, share, why = situation.flight, situation.kinetic_share, situation.vibration.reasons if verbose else None
     known = "" if share is None else f", kinetic share {measure(share)}"
     estimate = " (estimate)" if situation.vibration.estimated else ""
     lines = [
-        read_line(situation.history),
-        f"td       {situation.td:.6g}: energy {situation.energy_td:.6g}{known}{estimate}",
-        f"basis    {_basis(situation)}{f': {why}' if why else ''}",
+        ("history", what_was_read(situation.history)),
+        ("td", f"{situation.td:.6g}: energy {situation.energy_td:.6g}{known}{estimate}"),
+        ("basis", f"{_basis(situation)}{f': {why}' if why else ''}"),
     ]
     if flight.start is None:
-        lines.append("flight   unknown")
+        lines.append(("flight", "unknown"))
     else:
         end = "no next contact found" if flight.end is None else f"to {flight.end:.6g}"
         parts = [part.name if part.title else str(part.id) for part in flight.parts or ()]
         who = f" of {listing(parts, most=_NAMED)}" if parts else ""
-        lines.append(f"flight   from {flight.start:.6g} ({spoken(flight.source)}{who}), {end}")
-    return [printable(line) for line in lines]
+        lines.append(("flight", f"from {flight.start:.6g} ({spoken(flight.source)}{who}), {end}"))
+    return [(name, printable(text)) for name, text in lines]
 
 
 def spoken(source: str | None) -> str:

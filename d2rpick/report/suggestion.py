@@ -68,7 +68,7 @@ def as_table(answer: Suggestion, shown: Shown) -> str:
     lines = [
         *tables.in_line((*verdict(answer), *outlook(answer))),
         "",
-        *heading(answer.situation, verbose=shown.verbose),
+        *tables.in_line(heading(answer.situation, verbose=shown.verbose)),
     ]
     if answer.candidates and (answer.recommended or shown.verbose):
         lines += ["", tables.as_text(*_some(answer, shown), shown.width, _SPARE)]

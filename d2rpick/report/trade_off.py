@@ -8,7 +8,7 @@ from d2rpick.base.errors import printable
 from d2rpick.choice.ranking import EQUALLY_GOOD
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, many, maybe, row
-from d2rpick.report.situation import read_line
+from d2rpick.report.situation import what_was_read
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -57,8 +57,9 @@ def as_table(found: TradeOff, shown: Shown) -> str:
     some = some_of(found, shown.limit)
     offered = tables.as_text(*tables.known(*table(some)), shown.width, _SPARE) if some else "nothing to offer"
     low, high = found.td_window
-    window = f"td       {len(found.offers)} times from {low:.6g} to {high:.6g}"
-    lines = [read_line(found.situation.history), window, "", offered]
+    window = f"{len(found.offers)} times from {low:.6g} to {high:.6g}"
+    lines = tables.in_line([("history", what_was_read(found.situation.history)), ("td", window)])
+    lines += ["", offered]
     left = len(found.offers) - len(some)
     if left:
         lines.append(f"... and {left} more td (--limit; csv and json have all)")

@@ -60,8 +60,9 @@ def as_table(answer: Verdict, shown: Shown) -> str:
     reasons = [f"  {printable(reason)}" for reason in answer.reasons]
     if answer.switched:
         lines += ["", *_comparison(answer.switched)]
-    head = [f"verdict  {told(answer)}", *([f"quality  {answer.quality.told}"] if answer.quality else [])]
-    return "\n".join([*head, *reasons, "", *heading(answer.situation, verbose=shown.verbose), "", *lines])
+    head = [("verdict", told(answer)), *([("quality", answer.quality.told)] if answer.quality else [])]
+    above = tables.in_line(heading(answer.situation, verbose=shown.verbose))
+    return "\n".join([*tables.in_line(head), *reasons, "", *above, "", *lines])
 
 
 def as_markdown(answer: Verdict, _: Shown) -> str:

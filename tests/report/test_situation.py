@@ -4,7 +4,7 @@ import numpy as np
 
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Part
-from d2rpick.report.situation import energy_name, read_line
+from d2rpick.report.situation import energy_name, what_was_read
 
 PARTS = tuple(Part(number, f"p{number}") for number in range(1, 9))
 
@@ -18,7 +18,7 @@ def of_parts(parts: tuple[Part, ...], springs: tuple[Part, ...] = ()) -> History
 def test_of_many_parts_the_first_are_named() -> None:
     history = of_parts(PARTS, springs=PARTS[1:2])
     assert energy_name(history) == "internal energy of p1, p3, p4, p5, p6 and 2 more"
-    assert read_line(history) == f"history  run: matsum, {energy_name(history)}, 5 states, 0 to 1"
+    assert what_was_read(history) == f"run: matsum, {energy_name(history)}, 5 states, 0 to 1"
 
 
 def test_few_parts_and_channels_are_named_as_they_are() -> None:
