@@ -85,7 +85,7 @@ def _checked(name: str, value: Any, option: Option) -> Any:
     return value
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(eq=False, repr=False)
 class Cards:
     """How a card is printed: the options of every command that prints one."""
 

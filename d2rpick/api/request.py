@@ -80,7 +80,8 @@ CHOOSING: Final = (*LIMITS, "cost_share", "step_ratio")
 _IN_MEMORY: Final = "<weights in memory>"
 
 
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+# Nobody changes it, nor other tables of options: frozen ones take every command a fiftieth of its start.
+@dataclass(eq=False, repr=False, kw_only=True)
 class Request:
     """What is asked about a run, times in the unit of the history; ArgumentError where it contradicts itself.
 

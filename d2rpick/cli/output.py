@@ -58,7 +58,7 @@ _FOR_PROGRAMS: Final = {"json", "ndjson", "csv", "value"}
 IN_WORDS: Final = {"table", "markdown"}  # forms in which the answer says itself why nothing is recommended
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(eq=False, repr=False)
 class Output:
     """Results to stdout or a file, everything else to stderr unless ``quiet``; ``inputs`` are never written to."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shlex
 from operator import gt
 from typing import TYPE_CHECKING, Any, Final
 
@@ -284,6 +283,8 @@ def shell_line(words: Iterable[str]) -> str:
     >>> print(shell_line(["d2rpick", "info", "my run.csv", "it's\n\udcff"]))
     d2rpick info 'my run.csv' $'it\'s\012\377'
     """
+    import shlex  # not above: start-up
+
     return " ".join(shlex.quote(word) if word.isprintable() else f"$'{''.join(map(_escaped, word))}'" for word in words)
 
 
