@@ -90,10 +90,7 @@ class Candidate(NamedTuple):
 
 
 class Pair(NamedTuple):
-    """A recommended (tr, td) [time] with what it is compared with those of other td by, as of a `Candidate`.
-
-    ``residual`` is None on basis "energy".
-    """
+    """A recommended (tr, td) [time]; pairs of other td are compared by ``error``, the ``residual`` if it is known."""
 
     tr: float
     td: float
