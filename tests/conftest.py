@@ -11,6 +11,8 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # The program is started again and again: that it is compiled each time is no part of any test.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+# What other libraries plug into hypothesis takes a tenth of a second to import, in each process.
+os.environ.setdefault("HYPOTHESIS_NO_PLUGINS", "1")
 
 import pytest
 from hypothesis import settings

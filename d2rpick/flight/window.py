@@ -91,7 +91,7 @@ class Constant(Law):
 
     def __init__(self, time: Samples, values: Samples) -> None:
         super().__init__(time)
-        self.values = values
+        self.values = np.asfortranarray(values)  # columns lie whole: windows are long
 
     def _misfit(self, first: int, last: int) -> float:
         return float(np.ptp(self.values[first : last + 1], axis=0).max()) / 2

@@ -64,7 +64,8 @@ def bent(time: Samples, values: Samples) -> Samples:
     """
     t = time - time.sum() / time.size  # as mean(), which is slow for few
     centred = values - values.sum(axis=0) / time.size
-    centred -= np.outer(t @ centred / (t @ t), t).T
+    columns = centred.T
+    columns -= np.multiply.outer(t @ centred / (t @ t), t)
     return np.asarray(centred)
 
 
