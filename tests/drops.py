@@ -3,9 +3,9 @@
 from functools import cache
 from pathlib import Path
 
-from d2rpick.models import files
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import Record, RigidWindow, simulate
+from d2rpick.report import histories
 
 MESH = 6  # coarse, for speed
 T_END = 1.2
@@ -24,6 +24,6 @@ def written(record: Record, folder: Path) -> list[str]:
     names = []
     for form in ("matsum", "glstat"):
         path = folder / form
-        path.write_bytes(files.BOX_WRITERS[form](record))
+        path.write_bytes(histories.BOX_WRITERS[form](record))
         names.append(str(path))
     return names

@@ -12,10 +12,11 @@ from pathlib import Path
 
 import pytest
 
-from d2rpick.api import request
-from d2rpick.cli import models
+from d2rpick.api import models, request
+from d2rpick.choice.ranking import GRADES
+from d2rpick.cli import output
 from d2rpick.histories.opening import READERS
-from d2rpick.models.files import OSCILLATOR_WRITERS
+from d2rpick.report.histories import OSCILLATOR_WRITERS
 from tests.command import DECK, ENERGY, GLSTAT, ROOT, TIME_LIMIT
 
 PACKAGE = ROOT / "d2rpick"
@@ -271,7 +272,8 @@ def test_no_garbage_is_looked_for_at_the_end() -> None:
     assert printed_by(code).splitlines()[-1] == "True"
 
 
-def test_the_command_line_offers_the_formats_there_are() -> None:
+def test_the_command_line_offers_the_formats_and_grades_there_are() -> None:
+    assert output.GRADES == GRADES
     assert tuple(READERS) == request.FORMATS
     assert tuple(OSCILLATOR_WRITERS) == models.HISTORIES
 

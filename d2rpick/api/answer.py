@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from d2rpick.api import arguments
     from d2rpick.api.asked import Asked
     from d2rpick.api.runs import Run
+    from d2rpick.base.errors import Caution
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.trade_off import TradeOff
-    from d2rpick.choice.warnings import Caution
     from d2rpick.report.formats import Shown
     from d2rpick.report.page import PageContext
 

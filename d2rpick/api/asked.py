@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING
 
 from d2rpick.api import arguments
 from d2rpick.api.request import Request
-from d2rpick.base.errors import ArgumentError, FormatError, listing, name_units
+from d2rpick.base.errors import ArgumentError, Caution, FormatError, listing, name_units
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.question import Reference
-from d2rpick.choice.warnings import Caution
 from d2rpick.histories.names import Selection
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypedDict, Unpack
 
 from d2rpick.api.request import OPTIONS, POSITIVE, TIME, UNLIMITED, Number, Option, Request, dashed, option, options_of
-from d2rpick.base.errors import ArgumentError
+from d2rpick.base.errors import ArgumentError, Caution
 from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from d2rpick.choice.answers import Verdict
     from d2rpick.choice.judged_card import CardRequest
     from d2rpick.choice.switched_run import Times
-    from d2rpick.choice.warnings import Caution
     from d2rpick.deck.printed_card import PrintedCard, Printing
     from d2rpick.deck.printed_card import Solver as Module
 
@@ -238,8 +237,6 @@ def all_cautions(verdicts: Iterable[Verdict]) -> tuple[Caution, ...]:
 
 
 def _cautions(verdict: Verdict) -> Iterator[Caution]:
-    from d2rpick.choice.warnings import Caution
-
     yield from verdict.cautions
     if not verdict.verified:
         yield Caution("not-verified", f"the times as printed: {'; '.join(verdict.reasons)}")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 from d2rpick.api import arguments
 from d2rpick.api.answer import Answer, frame_of
 from d2rpick.api.cards import SETTINGS
-from d2rpick.base.errors import ConfigurationError, D2RPickError, DeckError
+from d2rpick.base.errors import Caution, ConfigurationError, D2RPickError, DeckError
 from d2rpick.deck import main_decks
 from d2rpick.deck.radioss_files import run_files
 from d2rpick.deck.source import STDIN
@@ -138,8 +138,6 @@ def check(
 
 def findings_of(decks: Sequence[str], rules: Configuration, run: Run | None, request: Request, **more: Any) -> Findings:
     """Check decks as they are named, by a run where there is one; ``more`` are fields of the answer."""
-    from d2rpick.choice.warnings import Caution
-
     judge = None
     if run is None:
         request.without_history()

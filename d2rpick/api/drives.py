@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
-    from d2rpick.choice.warnings import Caution
+    from d2rpick.base.errors import Caution
     from d2rpick.running.sequence import Leg
 
 # Of a second: where nothing vibrates so long without a force is flight, and so long before a contact td lies at least.

@@ -1,10 +1,12 @@
-"""What can go wrong, in one line each: where, what was found, what was expected, what to do."""
+"""What can go wrong, in one line each: where, what was found, what was expected, what to do; and what to beware of."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
 from errno import EBADF
 from typing import TYPE_CHECKING, Final, TypeVar
+
+from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence
@@ -45,6 +47,13 @@ class ArgumentError(TypeError, ValueError):
 
 class ConfigurationError(D2RPickError):
     """The configuration of the deck check is wrong: an unknown rule, key or severity."""
+
+
+class Caution(NamedTuple):
+    """Something the user should know: a stable ``code`` for scripts, and a sentence."""
+
+    code: str
+    message: str
 
 
 INTERNAL_ERROR: Final = "internal-error"  # what becomes of one of several inputs where it meets an error of the program

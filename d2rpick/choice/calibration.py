@@ -18,9 +18,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.base.errors import ConfigurationError, DeckError, FormatError
+from d2rpick.base.errors import Caution, ConfigurationError, DeckError, FormatError
 from d2rpick.choice.cost import ELEMENT_SHARE, MEASURED, POINT, RIGID_NODE, Weights
-from d2rpick.choice.warnings import Caution
 from d2rpick.deck import ls_dyna, main_decks, radioss
 from d2rpick.deck.parts import read_parts
 from d2rpick.deck.radioss_files import run_files

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from d2rpick.base.errors import are, if_written, name_units
+from d2rpick.base.errors import Caution, are, if_written, name_units
 from d2rpick.choice.cost import ByDeck, CostModel, Share
-from d2rpick.choice.warnings import Caution
 from d2rpick.deck.geometry import Placement
 from d2rpick.deck.pieces import pieces_of, supports_of
 from d2rpick.deck.radioss_files import LEFT_RIGID, RUINS

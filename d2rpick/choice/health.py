@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from d2rpick.base.errors import RangeError
+from d2rpick.base.errors import Caution, RangeError
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.choice.warnings import Caution
 from d2rpick.flight.flight import MOST_WORK
 from d2rpick.flight.internal_energy import largest
 from d2rpick.flight.work import FEWEST_STATES, work_beyond_gravity

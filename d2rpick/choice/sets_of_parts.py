@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.base.errors import FormatError, RangeError, are, name_units
+from d2rpick.base.errors import Caution, FormatError, RangeError, are, name_units
 from d2rpick.choice.candidates import ONE_BODY
 from d2rpick.choice.cost import CostModel, Share, Weights
 from d2rpick.choice.deck_of_run import (
@@ -24,7 +24,7 @@ from d2rpick.choice.deck_of_run import (
 from d2rpick.choice.of_run import suggest_of, verify_of
 from d2rpick.choice.question import Reference
 from d2rpick.choice.switchable_parts import PartRow, RunFacts, facts_of, rows_of, step_growth
-from d2rpick.choice.warnings import Caution, out_of_place
+from d2rpick.choice.warnings import out_of_place
 from d2rpick.deck.geometry import Placement
 from d2rpick.flight.momentum import asks_for_recommended, with_parts_by_number
 from d2rpick.histories.listings import printed_steps

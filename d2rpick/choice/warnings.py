@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import listing, name_units
-from d2rpick.base.tuples import NamedTuple
+from d2rpick.base.errors import Caution, listing, name_units
 from d2rpick.histories.digits import not_after, window_as_read
 
 if TYPE_CHECKING:
@@ -22,13 +21,6 @@ _NOTABLE_PLASTIC = 0.05
 
 
 WRONG_ENERGY: Final = "engine-wrong-energy"
-
-
-class Caution(NamedTuple):
-    """Something the user should know: a stable ``code`` for scripts, and a sentence."""
-
-    code: str
-    message: str
 
 
 def cautions_of_engine(sources: Collection[str]) -> Iterator[Caution]:

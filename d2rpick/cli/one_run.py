@@ -69,7 +69,7 @@ def extract(write_as: str | None, request: Request, output: Output) -> None:
     d2rpick extract --energy boxIE_J sample_data/rollover.csv -o box.h5
     """
     from d2rpick.api.runs import extracted
-    from d2rpick.histories.opening import TABLES, format_of, write_table
+    from d2rpick.report.histories import TABLES, format_of, write_table
 
     form = write_as or format_of(output.output_file, TABLES)
     selection = request.selection()
@@ -117,9 +117,9 @@ def suggest(td: float | None, td_window: WINDOW, request: Request, cards: Cards,
     if card:
         found = answer.printed(cards)
         told = [] if found is None else [one for one in all_cautions(found.verdicts) if one not in answer.cautions]
-        return output.finish(objection=not output.card(found, told), quality=answer.quality)
+        return output.finish(objection=not output.card(found, told), grade=answer.quality and answer.quality.grade)
     output.answer(answer)
-    return output.finish(objection=answer.recommended is None, quality=answer.quality)
+    return output.finish(objection=answer.recommended is None, grade=answer.quality and answer.quality.grade)
 
 
 @options.command
@@ -165,7 +165,7 @@ def explore(td: float | None, td_window: WINDOW, steps: int, request: Request, c
     output.beside_answer(answer, lambda: answer.page(options.repeat(), request.judging(), cards))
     output.answer(answer)
     chosen = answer.recommended
-    output.finish(objection=chosen is None, quality=chosen.quality if chosen else None)
+    output.finish(objection=chosen is None, grade=chosen.quality.grade if chosen and chosen.quality else None)
 
 
 @options.command
@@ -213,7 +213,7 @@ def verify(
     output.notes(asked.reference.history.notes, answer.cautions)
     output.beside_answer(answer, lambda: answer.page(options.repeat(), request.judging(), cards))
     output.answer(answer)
-    output.finish(objection=not answer.verified, quality=answer.quality)
+    output.finish(objection=not answer.verified, grade=answer.quality and answer.quality.grade)
 
 
 @options.command

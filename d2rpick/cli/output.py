@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
     from d2rpick.api.answer import Answer, Paged
     from d2rpick.api.runs import Run
-    from d2rpick.choice.ranking import Quality
-    from d2rpick.choice.warnings import Caution
+    from d2rpick.base.errors import Caution
     from d2rpick.report.formats import Shown
 
 
 OBJECTION = 1
+GRADES: Final = ("poor", "fair", "good")  # of d2rpick.choice.ranking; a test holds them together
 # A terminal of fewer columns is none that tables are read on.
 _NARROWEST: Final = 40
 # Formats that names of files promise.
@@ -133,13 +133,9 @@ class Output:
         if self.report:
             self.write(self.report, text_bytes(with_options(page())))
 
-    def finish(self, *, objection: bool, quality: Quality | None = None) -> None:
-        """Exit with 1 when the answer is an objection or worse than asked for, unless told otherwise."""
-        poor = False
-        if self.min_quality is not None and quality is not None:
-            from d2rpick.choice.ranking import GRADES
-
-            poor = GRADES.index(quality.grade) < GRADES.index(self.min_quality)
+    def finish(self, *, objection: bool, grade: str | None = None) -> None:
+        """Exit with 1 when the answer is an objection, or its pair worse than asked for, unless told otherwise."""
+        poor = bool(grade and self.min_quality) and GRADES.index(grade) < GRADES.index(self.min_quality)
         if (objection or poor) and not self.exit_zero:
             click.get_current_context().exit(OBJECTION)
 

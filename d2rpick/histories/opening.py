@@ -10,7 +10,7 @@ import re
 from importlib import import_module
 from typing import TYPE_CHECKING, Final, Protocol, cast
 
-from d2rpick.base.errors import FormatError, printable
+from d2rpick.base.errors import FormatError
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.companions import check_companions, check_legs
 from d2rpick.histories.database import Database, Legs
@@ -21,7 +21,6 @@ from d2rpick.histories.source import Source, open_files
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from d2rpick.histories.history import Samples
 
 __all__ = ["READERS", "Reader", "Run", "Selection", "Source", "open_run", "open_sources", "reader"]
 
@@ -45,7 +44,7 @@ _OTHERS: Final = (
 
 
 class Reader(Protocol):
-    """What a module has to offer to be a reader; one of `TABLES` has ``write``, too."""
+    """What a module has to offer to be a reader; that of a table has ``write``, too."""
 
     def recognises(self, head: bytes) -> bool:
         """Whether a file that begins like this is of the reader's format; never raises."""
@@ -154,37 +153,3 @@ def _format(source: Source) -> str:
         raise FormatError(f"{source.name}: {what}; name the glstat, matsum or binout of the run")
     found = f"{source.name}: binary data of no known format, one of {', '.join(READERS)} was expected"
     raise FormatError(f"{found}; export the energy history as text")
-
-
-Table = dict[str, "Samples"]
-
-TABLES: Final = ("csv", "hdf5")  # formats that hold any columns under any names
-_SUFFIXES: Final = {"csv": "csv", "h5": "hdf5", "hdf5": "hdf5", "hdf": "hdf5"}
-
-
-def format_of(name: str | None, formats: Sequence[str]) -> str:
-    """Tell the format that a file's name asks for; csv without a name, FormatError when it asks for none.
-
-    The suffix decides; a name without one of these suffixes is that of a solver's database, or holds it.
-
-    Examples
-    --------
-    >>> every = ("csv", "hdf5", "glstat", "matsum")
-    >>> [format_of(name, every) for name in ("glstat.csv", "run1.glstat", "runglstat.h5", None)]
-    ['csv', 'glstat', 'hdf5', 'csv']
-    """
-    from pathlib import PurePath  # not above: start-up
-
-    if name is None:
-        return "csv"
-    path = PurePath(name.lower())
-    by_name = next((form for form in ("glstat", "matsum") if form in path.name), None)
-    asked = _SUFFIXES.get(path.suffix[1:], by_name)
-    if asked not in formats:
-        raise FormatError(f"{printable(name)}: the suffix names no format; give `write_as`: {', '.join(formats)}")
-    return str(asked)
-
-
-def write_table(form: str, columns: Table) -> bytes:
-    """Write columns (n,) in one of the formats of `TABLES`."""
-    return cast("bytes", reader(form).write(columns))  # type: ignore[attr-defined]

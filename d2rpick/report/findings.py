@@ -9,8 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base import __version__
-from d2rpick.base.errors import name_units, printable
-from d2rpick.choice.warnings import Caution
+from d2rpick.base.errors import Caution, name_units, printable
 from d2rpick.deck.source import STDIN
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, kind_of, many, one_of, row

@@ -14,7 +14,7 @@ from d2rpick.report.tables import Cell, short
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from d2rpick.choice.warnings import Caution
+    from d2rpick.base.errors import Caution
 
 # More columns than this do not fit on a narrow screen.
 _FIT = 3

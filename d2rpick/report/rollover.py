@@ -11,8 +11,8 @@ from d2rpick.report.fields import Document, Field, csv_of, many, row
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from d2rpick.base.errors import Caution
     from d2rpick.choice.answers import Suggestion
-    from d2rpick.choice.warnings import Caution
     from d2rpick.report.formats import Shown
 
 # Of each run, in JSON and as columns.

@@ -8,10 +8,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.base.errors import D2RPickError, FormatError, HistoryError
+from d2rpick.base.errors import Caution, D2RPickError, FormatError, HistoryError
 from d2rpick.base.files import append_whole, record_of, signed, write_whole
 from d2rpick.choice.deck_of_run import in_deck
-from d2rpick.choice.warnings import Caution
 from d2rpick.deck.model import DISCRETE
 from d2rpick.deck.writing import RESTARTS, DrivenDeck
 from d2rpick.histories.names import Selection

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 import d2rpick as d2
-from d2rpick.base.errors import D2RPickError
+from d2rpick.base.errors import Caution, D2RPickError
 from d2rpick.choice.answers import suggest
 from d2rpick.choice.deck_of_run import doubts_of_solver
 from d2rpick.choice.flights import flights_of
 from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import examine
-from d2rpick.choice.warnings import Caution
 from d2rpick.deck import read_inventory
 from d2rpick.flight.momentum import flight_around
 from d2rpick.histories.history import EXACT, Given, History, Momenta

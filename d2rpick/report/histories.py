@@ -1,20 +1,56 @@
-"""What is computed here as files: which columns each format has of the oscillator's motion and of a run of the box."""
+"""Histories as files: any columns; and which each format has of the oscillator's motion and of a run of the box."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, cast
 
-from d2rpick.histories.formats import csv_table, glstat, hdf5_file, matsum
-from d2rpick.models.box_run import PARTS, Record
+from d2rpick.base.errors import FormatError, printable
+from d2rpick.histories.formats import glstat, matsum
+from d2rpick.histories.opening import reader
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
-    from d2rpick.histories.opening import Table
+    from d2rpick.histories.history import Samples
+    from d2rpick.models.box_run import Record
     from d2rpick.vibration.oscillator import Oscillator, Trajectory
 
 
-def oscillator_table(motion: Trajectory) -> Table:
+Table = dict[str, "Samples"]
+
+TABLES: Final = ("csv", "hdf5")  # formats that hold any columns under any names
+_SUFFIXES: Final = {"csv": "csv", "h5": "hdf5", "hdf5": "hdf5", "hdf": "hdf5"}
+
+
+def format_of(name: str | None, formats: Sequence[str]) -> str:
+    """Tell the format that a file's name asks for; csv without a name, FormatError when it asks for none.
+
+    The suffix decides; a name without one of these suffixes is that of a solver's database, or holds it.
+
+    Examples
+    --------
+    >>> every = ("csv", "hdf5", "glstat", "matsum")
+    >>> [format_of(name, every) for name in ("glstat.csv", "run1.glstat", "runglstat.h5", None)]
+    ['csv', 'glstat', 'hdf5', 'csv']
+    """
+    from pathlib import PurePath  # not above: start-up
+
+    if name is None:
+        return "csv"
+    path = PurePath(name.lower())
+    by_name = next((form for form in ("glstat", "matsum") if form in path.name), None)
+    asked = _SUFFIXES.get(path.suffix[1:], by_name)
+    if asked not in formats:
+        raise FormatError(f"{printable(name)}: the suffix names no format; give `write_as`: {', '.join(formats)}")
+    return str(asked)
+
+
+def write_table(form: str, columns: Table) -> bytes:
+    """Write columns (n,) in one of the formats of `TABLES`."""
+    return cast("bytes", reader(form).write(columns))  # type: ignore[attr-defined]
+
+
+def _oscillator_table(motion: Trajectory) -> Table:
     """Columns time z y vz vy internal_energy kinetic_energy."""
     state = motion.state
     return {
@@ -48,7 +84,7 @@ def _oscillator_matsum(motion: Trajectory, oscillator: Oscillator) -> bytes:
     return matsum.write("floating oscillator", motion.time, parts)
 
 
-def box_table(record: Record) -> Table:
+def _box_table(record: Record) -> Table:
     """Columns of the box, time to kinetic_energy; the momentum of box and step together; the balance of the model.
 
     Internal and kinetic energy are those of the box, so that it can be switched by them; those of the step, the terms
@@ -94,6 +130,8 @@ def _box_glstat(record: Record) -> bytes:
 
 def _box_matsum(record: Record) -> bytes:
     """Parts box and step with their energies and momenta; while the box is rigid, those of its motion as one body."""
+    from d2rpick.models.box_run import PARTS  # not above: columns are written without the model
+
     columns = zip(
         PARTS, record.internal_energy.T, record.kinetic_energy.T, record.momentum.T.real, record.momentum.T.imag,
         strict=True,
@@ -102,14 +140,14 @@ def _box_matsum(record: Record) -> bytes:
 
 
 OSCILLATOR_WRITERS: Final[Mapping[str, Callable[[Trajectory, Oscillator], bytes]]] = {
-    "csv": lambda motion, _: csv_table.write(oscillator_table(motion)),
-    "hdf5": lambda motion, _: hdf5_file.write(oscillator_table(motion)),
+    "csv": lambda motion, _: write_table("csv", _oscillator_table(motion)),
+    "hdf5": lambda motion, _: write_table("hdf5", _oscillator_table(motion)),
     "glstat": _oscillator_glstat,
     "matsum": _oscillator_matsum,
 }
 BOX_WRITERS: Final[Mapping[str, Callable[[Record], bytes]]] = {
-    "csv": lambda record: csv_table.write(box_table(record)),
-    "hdf5": lambda record: hdf5_file.write(box_table(record)),
+    "csv": lambda record: write_table("csv", _box_table(record)),
+    "hdf5": lambda record: write_table("hdf5", _box_table(record)),
     "glstat": _box_glstat,
     "matsum": _box_matsum,
 }
