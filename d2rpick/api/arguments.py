@@ -1,4 +1,7 @@
-"""Arguments of the library, checked before any file is opened: a wrong one is named in a TypeError or ValueError."""
+"""Arguments of the library, checked before any file is opened: a wrong one is named in a TypeError or ValueError.
+
+And windows as a file gives them.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn, TypedDict
 
 from d2rpick.api.request import OPTIONS, Number
+from d2rpick.base.errors import DeckError
 
 if TYPE_CHECKING:
     from d2rpick.vibration.oscillator import Oscillator
@@ -57,7 +61,7 @@ def number(name: str, value: object, low: float = -math.inf, high: float = math.
     ValueError: margin is -1, a number of at least 0 was expected
     """
     if isinstance(value, bool | str | bytes) or not hasattr(value, "__float__"):
-        raise TypeError(f"{name} is {value!r}, a number was expected")
+        raise TypeError(f"{name} is {value!r}, a number was expected{without_unit(value)}")
     found = float(value)
     if not math.isfinite(found):
         raise ValueError(f"{name} is {found}, a finite number was expected")
@@ -66,6 +70,14 @@ def number(name: str, value: object, low: float = -math.inf, high: float = math.
     if found > high:
         raise ValueError(f"{name} is {found:g}, a number of at most {high:g} was expected")
     return found
+
+
+def without_unit(value: object) -> str:
+    """Say how a time with a unit is given, or nothing."""
+    from d2rpick.histories.names import in_seconds
+
+    seconds = in_seconds(str(value))
+    return "" if seconds is None else f": give a number in the unit of the history, {seconds:g} where it is s"
 
 
 def optional(name: str, value: object) -> float | None:
@@ -213,3 +225,55 @@ def one_path(name: str, value: Path) -> str:
     if len(found) > 1:
         raise ValueError(f"{name} names {len(found)} files, one was expected")
     return found[0]
+
+
+def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
+    """Read windows as ``d2rpick plan -f value`` prints them: a line ``tr td`` for each; or the journal of a driven run.
+
+    Empty lines and those that begin with ``#`` are passed over.
+
+    Raises
+    ------
+    DeckError
+        For any other line, with its number, and when there is no window at all.
+    """
+    windows: list[tuple[float, float]] = []
+    if text.lstrip().startswith("{"):
+        windows = _of_journal(text)
+        text = ""
+    for number, line in enumerate(text.splitlines(), start=1):
+        words = line.split()
+        if not words or words[0].startswith("#"):
+            continue
+        try:
+            tr, td = map(float, words)
+        except ValueError:
+            raise DeckError(f"{source}:{number}: {line.strip()[:60]!r} was found, 'tr td' was expected") from None
+        windows.append((tr, td))
+    if not windows:
+        raise DeckError(f"{source}: no window was found, a line 'tr td' for each was expected")
+    return tuple(windows)
+
+
+def _of_journal(text: str) -> list[tuple[float, float]]:
+    """Windows of the rigid legs that ended: each begins with the probe, or another rigid leg, that it goes on from."""
+    import json  # not above: start-up
+
+    windows: dict[float, float] = {}
+    tr = None
+    for line in text.splitlines():
+        try:
+            record = json.loads(line)
+            if record["event"] != "ended":
+                continue
+            kind = record["order"][0]
+            start, until, reached = (float(one) for one in (*record["order"][2:4], record["seen"][0]))
+        except (ValueError, KeyError, TypeError, IndexError):
+            continue  # cut, or of another kind
+        if kind not in {"probe", "rigid"}:
+            tr = None
+            continue
+        tr = start if tr is None else tr
+        if kind == "rigid":
+            windows[tr] = reached if record["cut"] else until
+    return list(windows.items())

@@ -76,12 +76,16 @@ def _checked(name: str, value: Any, option: Option) -> Any:
         return found
     if not isinstance(value, str):
         raise TypeError(f"{name} is {value!r}, a text was expected")
-    if kind == "solver":
-        from d2rpick.deck.printing import SOLVERS
-
-        if value not in SOLVERS:
-            raise ValueError(f"{name} is {value!r}, one of {', '.join(SOLVERS)} was expected")
+    if kind == "solver" and value not in solvers():
+        raise ValueError(f"{name} is {value!r}, one of {', '.join(solvers())} was expected")
     return value
+
+
+def solvers() -> Sequence[str]:
+    """Names of the solvers whose input can be printed."""
+    from d2rpick.deck.printing import SOLVERS  # not above: start-up
+
+    return tuple(SOLVERS)
 
 
 @dataclass(eq=False, repr=False)
@@ -136,6 +140,18 @@ class Cards:
                 owner = next(one for one, takes in places.items() if name in takes)
                 hint = "" if self.solver else f"; without `solver` the card is one for {SOLVERS[solver].title}"
                 raise ArgumentError(f"`{name}` is an option of `solver` {owner}{hint}")
+
+    def by_deck(self, deck: str | None) -> Cards:
+        """Take the solver and the name of the run from the deck, unless they are given."""
+        if deck is None:
+            return self
+        from d2rpick.deck.radioss_files import run_files
+        from d2rpick.deck.radioss_run import read_run
+
+        if not run_files(deck):
+            return replace(self, solver=self.solver or "ls-dyna")
+        legs = read_run(deck).legs
+        return replace(self, solver=self.solver or "radioss", name=self.name or (legs[0].name if legs else None))
 
     def for_bodies(self, asked: Asked) -> tuple[Cards, tuple[str, ...]]:
         """Let the deck say which rigid bodies switch the parts, with what it lacks, and notes of that.

@@ -6,19 +6,19 @@ import os
 import sys
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
 from d2rpick.api.answer import Answer, frame_of
 from d2rpick.api.cards import SETTINGS
 from d2rpick.base.errors import Caution, ConfigurationError, D2RPickError, DeckError
+from d2rpick.base.files import STDIN
 from d2rpick.deck import main_decks
 from d2rpick.deck.radioss_files import run_files
-from d2rpick.deck.source import STDIN
 from d2rpick.report.findings import FINDING, Checks
 from d2rpick.report.tables import positional
 from d2rpick.rules import RULES, Checked, Configuration, check_deck, configuration_for
-from d2rpick.rules.base import LS_DYNA, Unreadable
+from d2rpick.rules.base import LS_DYNA, Severity, Unreadable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -130,14 +130,23 @@ def check(
     named = [text for name in ("select", "ignore") for one in getattr(rules, name) for text in (f"--{name}", one)]
     files = [text for name in request.history for text in ("--history", name)]
     command = ("check", *files, *request.asking(), *named, *positional(names))
-    found = findings_of(names, rules, history, request, command=command)
+    found = findings_of(names, history, request, *rules[:2], command=command)
     for one in found.failed:
         raise one.error
     return found
 
 
-def findings_of(decks: Sequence[str], rules: Configuration, run: Run | None, request: Request, **more: Any) -> Findings:
-    """Check decks as they are named, by a run where there is one; ``more`` are fields of the answer."""
+def findings_of(
+    decks: Sequence[str],
+    run: Run | None,
+    request: Request,
+    select: tuple[str, ...],
+    ignore: tuple[str, ...],
+    fail_on: str = Severity.ERROR,
+    *,
+    command: tuple[str, ...] = (),
+) -> Findings:
+    """Check decks as they are named, by a run where there is one."""
     judge = None
     if run is None:
         request.without_history()
@@ -145,6 +154,7 @@ def findings_of(decks: Sequence[str], rules: Configuration, run: Run | None, req
         from d2rpick.rules.judgement import HistoryJudge  # it loads numpy
 
         judge = HistoryJudge(run.files, request.selection(), request.settings)
+    rules = Configuration(select, ignore)
     rules.verify(RULES)
     found = list(_each(decks, rules, judge))
     results = tuple(one for one in found if isinstance(one, Checked))
@@ -155,8 +165,15 @@ def findings_of(decks: Sequence[str], rules: Configuration, run: Run | None, req
         cautions=(*(judge.cautions if judge else ()), *(Caution("unknown-rule", remark) for remark in remarks)),
         history=run.sources if run else None,
         notes=judge.notes if judge else (),
-        **more,
+        fail_on=Severity(fail_on),
+        command=command,
     )
+
+
+def check_written(deck: str, judge: HistoryJudge) -> Findings:
+    """Check a deck that was written here by the configuration nearest to it."""
+    checked = check_deck(deck, configuration_for(deck, Configuration(), SETTINGS), judge)
+    return Findings(results=(checked,), cautions=tuple(judge.cautions), history=judge.run.sources)
 
 
 def _each(named: Sequence[str], rules: Configuration, judge: HistoryJudge | None) -> Iterator[Checked | Unreadable]:

@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 # Of a second: where nothing vibrates so long without a force is flight, and so long before a contact td lies at least.
 _SHORTEST = 2e-3
-_INSTALLED = Commands()
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -65,9 +64,13 @@ class Driving:
         part: Sequence[str] = (),
         wait: float | None = None,
         margin: float | None = None,
-        commands: Commands = _INSTALLED,
+        *,
+        starter: str | None = None,
+        engine: str | None = None,
+        threads: int = 1,
     ) -> None:
-        self.name, self.folder, self.commands, self._told = deck, folder, commands, told
+        self.name, self.folder, self._told = deck, folder, told
+        self.commands = Commands(starter, engine, threads)
         self.deck = driven_deck(deck, numbers("--part", part) if part else ())
         self.inventory = read_inventory(deck)
         known = wait_of_deck(self.inventory)
@@ -76,7 +79,7 @@ class Driving:
         shortest = _SHORTEST * self.deck.second if self.deck.second else 0.0
         self.limits = Limits(self.deck.end, self.deck.interval, shortest, margin)
         self.looks = Looks(self.deck.parts, self.inventory, wait, known)
-        self.solver = Solver(folder, self.deck.name, commands.threads)
+        self.solver = Solver(folder, self.deck.name, threads)
         self.cautions: tuple[Caution, ...] = tuple(doubts_of_solver(self.deck.parts, self.inventory))
 
     @contextmanager

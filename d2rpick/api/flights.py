@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from d2rpick.api.arguments import Choosing, Parts
+    from d2rpick.api.checking import Findings
     from d2rpick.api.runs import Run
     from d2rpick.choice.cost import Weights
     from d2rpick.choice.switched_run import Times
@@ -240,3 +241,18 @@ def planned(asked: Asked, min_rigid: float | None, done: Sequence[Times], before
     times += ["--done", "-"] if windows else []  # on its standard input, a line for each
     times += [text for name in (before.sources if before else ()) for text in ("--before", name)]
     return Plan.about(asked, found, *times)
+
+
+def written(plan: Plan, card: JudgedCard, folder: str, *, overwrite: bool) -> tuple[list[str], Findings]:
+    """Write a copy of the deck of a plan with a card of it, and check the copy by the history.
+
+    Gives the names of the files, the main one first, and what is found in it.
+    """
+    from d2rpick.api.checking import check_written
+    from d2rpick.deck.writing import write_deck
+    from d2rpick.rules.judgement import HistoryJudge
+
+    asked, done = plan.question, card.card.windows[: len(plan.done)]  # as printed
+    names = write_deck(asked.request.deck or "", card.card, folder, overwrite=overwrite)
+    judge = HistoryJudge(asked.reference.run, asked.request.selection(parts=False), plan.settings, done)
+    return names, check_written(names[0], judge)

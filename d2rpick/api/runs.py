@@ -70,11 +70,14 @@ class Run:
         """What was left out or assumed in reading."""
         return self.files.notes
 
-    def overview(self) -> Overview:
-        """Give what ``d2rpick info`` shows: format, states, sampling, channels, parts, flights, health."""
+    def overview(self, deck: Path | None = None) -> Overview:
+        """Give what ``d2rpick info`` shows: format, states, sampling, channels, parts, flights, health.
+
+        The main ``deck`` of the run tells gravity, supports and imposed motion.
+        """
         from d2rpick.choice.overview import survey
 
-        return survey(self.files, self.chosen)
+        return survey(self.files, self.chosen, None if deck is None else arguments.one_path("deck", deck))
 
     def to_frame(self, parts: Parts | None = None) -> pd.DataFrame:
         """Give energies over time as a table, at full precision.

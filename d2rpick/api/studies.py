@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import chain
@@ -220,19 +221,41 @@ def study(
 
     asked = needed_time(time_or_window(arguments.optional("td", td), arguments.window("td_window", td_window)))
     processes = arguments.whole("jobs", jobs, 1)
-    names = core.find_runs(arguments.paths("runs", [runs] if isinstance(runs, str) else runs))
+    names = find_runs(arguments.paths("runs", [runs] if isinstance(runs, str) else runs))
     request = request_of(None, parts, flying, None, None, choosing)
     chosen = selection_of(time, energy, channels)
     request = replace(
         request, time=chosen.time, energy=chosen.energy, channel=tuple("=".join(one) for one in chosen.channels),
         input_format=known_format(input_format),
     )  # fmt: skip
-    question = core.Question(asked, request.settings, request.selection(), request.input_format, curve=True)
+    question = question_of(request, asked, curve=True)
     with on_cores(min(processes, len(names)), "d2rpick.choice.study") as farm:
         return summary(request, question, names, list(rows_of(question, names, farm)))
 
 
-def summary(request: Request, question: core.Question, names: Sequence[str], rows: Sequence[StudyRow]) -> Study:
+def find_runs(names: Iterable[str]) -> tuple[str, ...]:
+    """Replace patterns by the files and folders they match, each a run; what matches nothing stays."""
+    from glob import glob
+
+    found: list[str] = []
+    for name in names:
+        pattern = any(sign in name for sign in "*?[") and not Path(name).exists()
+        found += (pattern and _once(glob(name, recursive=True))) or [name]  # noqa: PTH207  Path drops "./"
+    return tuple(found)
+
+
+def _once(names: Iterable[str]) -> list[str]:
+    """Give each file or folder by its shortest name only: links that lead in a circle give it many."""
+    shortest_first = sorted(names, key=lambda name: (len(name), name), reverse=True)
+    return sorted({os.path.realpath(name): name for name in shortest_first}.values())
+
+
+def question_of(request: Request, td: float | tuple[float, float], *, curve: bool) -> Question:
+    """Say what every run is asked; with its ``curve`` where the energies of all are drawn."""
+    return Question(td, request.settings, request.selection(), request.input_format, curve=curve)
+
+
+def summary(request: Request, question: Question, names: Sequence[str], rows: Sequence[StudyRow]) -> Study:
     """Hold the rows of all runs against each other."""
     td = question.td
     times = ("--td-window", *map(repr, td)) if isinstance(td, tuple) else ("--td", repr(td))
@@ -242,7 +265,7 @@ def summary(request: Request, question: core.Question, names: Sequence[str], row
 
 
 def rows_of(
-    question: core.Question,
+    question: Question,
     sources: Sequence[str],
     farm: Farm,
     ledger: Ledger | None = None,

@@ -29,6 +29,7 @@ class Searched(Protocol):
         """Place of the last ``wanted`` there, -1 where there is none."""
 
 
+STDIN: Final = "-"  # name of what was read from standard input
 # The largest value of each, and what it counts.
 _BOUNDS: Final = {
     "RATIO": (100.0, "times as many bytes"),  # histories become 3 to 30 times as many

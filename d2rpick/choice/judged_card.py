@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from d2rpick.base.errors import D2RPickError
 from d2rpick.choice.of_run import judge_of
 from d2rpick.deck.printed_card import PrintedCard, Printing, Times
-from d2rpick.deck.printing import SOLVERS, cards, solver_of
+from d2rpick.deck.printing import DEFAULT, SOLVERS, cards, solver_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -50,10 +50,12 @@ class CardRequest(NamedTuple):
 class SolverInput(NamedTuple):
     """Solver input for a pair of times: its ``text``, or ``refusal``, why it cannot be printed.
 
-    Both are None where nobody says whom it switches; ``solver`` is the one that it is for in any case.
+    Both are None where nobody says whom it switches.  ``solver`` is empty where it is the default, ``switches`` names
+    the option that says whom.
     """
 
     solver: str
+    switches: str
     text: str | None = None
     refusal: str | None = None
 
@@ -61,12 +63,13 @@ class SolverInput(NamedTuple):
 def input_for(reference: Reference, situation: Situation, tr: float, request: CardRequest) -> SolverInput:
     """Print the card of ``tr`` and the td of a situation, judged as it is printed."""
     solver, _ = request.of(situation.history)
+    named = "" if solver == DEFAULT else solver, SOLVERS[solver].switches
     judge = partial(judge_of, reference, situation)
     try:
         found = judged_card([(tr, situation.td)], situation.history, judge, request.by(situation.settings))
     except D2RPickError as error:
-        return SolverInput(solver, refusal=str(error))
-    return SolverInput(solver, found[0].text if found else None)
+        return SolverInput(*named, refusal=str(error))
+    return SolverInput(*named, found[0].text if found else None)
 
 
 def judged_card(

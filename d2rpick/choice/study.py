@@ -30,7 +30,7 @@ from d2rpick.histories.samples import outline
 from d2rpick.histories.source import expand
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from d2rpick.choice.answers import Suggestion
     from d2rpick.choice.question import Settings
@@ -159,23 +159,6 @@ class Study:
     def objection(self) -> bool:
         """Whether a run has no tr, or all have none in common."""
         return self.common.tr is None or any(row.status != OK for row in self.runs)
-
-
-def find_runs(names: Iterable[str]) -> tuple[str, ...]:
-    """Replace patterns by the files and folders they match, each a run; what matches nothing stays."""
-    from glob import glob
-
-    found: list[str] = []
-    for name in names:
-        pattern = any(sign in name for sign in "*?[") and not Path(name).exists()
-        found += (pattern and _once(glob(name, recursive=True))) or [name]  # noqa: PTH207  Path drops "./"
-    return tuple(found)
-
-
-def _once(names: Iterable[str]) -> list[str]:
-    """Give each file or folder by its shortest name only: links that lead in a circle give it many."""
-    shortest_first = sorted(names, key=lambda name: (len(name), name), reverse=True)
-    return sorted({os.path.realpath(name): name for name in shortest_first}.values())
 
 
 def ask(question: Question, source: str) -> StudyRow:

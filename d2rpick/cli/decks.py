@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.api.request import Request
-    from d2rpick.choice.switched_run import Times
 
 
 @options.command
@@ -60,7 +59,7 @@ def card(
     output.finish(objection=not found.verified)
 
 
-def _windows(tr: Sequence[float], td: Sequence[float], file: str | None) -> Sequence[Times]:
+def _windows(tr: Sequence[float], td: Sequence[float], file: str | None) -> Sequence[tuple[float, float]]:
     """Pair the times, or read them from the file; UsageError where they do not say windows."""
     if file is not None:
         if tr or td:
@@ -109,13 +108,10 @@ def check(
     d2rpick check -f json --select D2R0,D2R1 --fail-on warning sample_data/switching.k
     """
     from d2rpick.api.checking import findings_of
-    from d2rpick.rules import Configuration
-    from d2rpick.rules.base import Severity
 
     run = options.judging_run(request)
     output = output.beside(*deck, *(run.sources if run else ()))
-    rules = Configuration(_ids(select), _ids(ignore))
-    found = findings_of(deck, rules, run, request, fail_on=Severity(fail_on))
+    found = findings_of(deck, run, request, _ids(select), _ids(ignore), fail_on)
     output.spare(file for many in (found.results, found.failed) for one in many for file in one.files)
     output.notes(found.notes, found.cautions)
     for one in found.failed:
@@ -143,10 +139,8 @@ def rule(id: tuple[str, ...], output: Output) -> None:  # noqa: A002  the name i
     d2rpick rule
     d2rpick rule D2R105
     """
-    from d2rpick.report import findings as report
-    from d2rpick.rules import find_rules
+    from d2rpick.report.findings import as_list, explained_rules
 
     output = output.beside()
-    rules = [rule for name in id for rule in find_rules(name)]
-    text = "\n\n\n".join(report.as_text(rule, output.shown().width) for rule in rules)
-    output.result(text or in_words(report.as_list(), "table", output.columns))
+    text = explained_rules(id, output.shown().width)
+    output.result(text or in_words(as_list(), "table", output.columns))

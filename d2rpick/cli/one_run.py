@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import click
 
 from d2rpick.api.cards import Cards, all_cautions
@@ -37,11 +39,9 @@ def info(request: Request, output: Output) -> None:
     d2rpick info sample_data/energy.glstat
     d2rpick info -f json sample_data/rollover.csv
     """
-    from d2rpick.choice.overview import survey
-
     selection = request.selection()
     with opened(request, output) as (run, output):
-        overview = survey(run.files, selection, request.deck)
+        overview = replace(run, chosen=selection).overview(request.deck)
     output.notes((), overview.cautions)
     form = output.output_format
     shown = output.shown()

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from d2rpick.api.runs import Run
-    from d2rpick.choice.switched_run import Times
 
 WINDOW = tuple[float, float] | None
 Decorated = Any  # a command function; click's decorators do not say more
@@ -217,9 +216,9 @@ def file(name: str, text: str, metavar: str = "FILE", **more: Any) -> Callable[[
     return option(name[2:].replace("-", "_"), Option(text, "file", metavar, **more), required=required)
 
 
-def windows_in(file: str) -> Sequence[Times]:
+def windows_in(file: str) -> Sequence[tuple[float, float]]:
     """Read the windows in a file with lines 'tr td'."""
-    from d2rpick.deck.printed_card import read_windows
+    from d2rpick.api.arguments import read_windows
 
     with click.open_file(file, encoding="utf-8", errors="replace") as stream:
         return read_windows(stream.read(), file)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import click
 
-from d2rpick.api.cards import SETTINGS, Cards, all_cautions
+from d2rpick.api.cards import Cards, JudgedCard, all_cautions
 from d2rpick.api.request import CHOOSING, NOT_NEGATIVE, READING, Option, Request
 from d2rpick.base.errors import ArgumentError, DeckError, printable
 from d2rpick.cli import options
@@ -17,9 +16,7 @@ from d2rpick.cli.values import CARDS
 from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:
-    from d2rpick.api.asked import Asked
     from d2rpick.api.flights import Plan
-    from d2rpick.deck.printed_card import PrintedCard
 
 
 @options.command
@@ -78,19 +75,19 @@ def plan(
     if every and form not in ("value", "card") and not write_deck:
         raise click.UsageError("--all belongs to -f value, -f card and --write-deck; other forms hold every window")
     _check_deck(request, cards, form, write_deck)
-    cards = _by_deck(cards, request.deck) if form == "card" or write_deck else cards
+    cards = cards.by_deck(request.deck) if form == "card" or write_deck else cards
     output.check(cards, by_itself=bool(write_deck))
     with opened(request, output, done, *before) as (run, output):
         asked = ask(run, request, merge=cards.merge)
-        if write_deck:
-            _check_model(asked)
+        if write_deck and (foreign := [one for one in asked.cautions if one.code == "deck-of-another-model"]):
+            raise DeckError(f"{request.deck}: {foreign[0].message}")
         cards, added = cards.for_bodies(asked) if form == "card" or write_deck else (cards, ())
         earlier = open_run(request, before) if before else None
     answer = planned(asked, min_rigid, options.windows_in(done) if done else (), earlier)
     output.notes((*answer.history.notes, *added), answer.cautions)
     output.beside_answer(answer, lambda: answer.page(options.repeat(), (), cards))
     found = answer.printed(cards, every=every) if form == "card" or write_deck else None
-    checked, passed = _write_and_check(found.card, answer, write_deck, output) if found and write_deck else ("", True)
+    checked, passed = _write_and_check(found, answer, write_deck, output) if found and write_deck else ("", True)
     if checked and form != "table":
         click.echo(checked, err=True)
     if form == "card":
@@ -108,30 +105,7 @@ def _check_deck(request: Request, cards: Cards, form: str, folder: str | None) -
         check_switched("-f card" if form == "card" else "--write-deck", request, cards)
 
 
-def _check_model(asked: Asked) -> None:
-    """Raise DeckError where the deck that is to be copied is not that of the run."""
-    from d2rpick.choice.deck_of_run import of_another_model
-
-    foreign = of_another_model(asked.run.files, asked.model.inventory) if asked.model else None
-    if foreign:
-        raise DeckError(f"{asked.request.deck}: {foreign.message}")
-
-
-def _by_deck(cards: Cards, deck: str | None) -> Cards:
-    """Let a card take the solver and the name of the run from the deck, unless they are given."""
-    if deck is None:
-        return cards
-
-    from d2rpick.deck.radioss_files import run_files
-    from d2rpick.deck.radioss_run import read_run
-
-    if not run_files(deck):
-        return replace(cards, solver=cards.solver or "ls-dyna")
-    legs = read_run(deck).legs
-    return replace(cards, solver=cards.solver or "radioss", name=cards.name or (legs[0].name if legs else None))
-
-
-def _write_and_check(card: PrintedCard, plan: Plan, folder: str, output: Output) -> tuple[str, bool]:
+def _write_and_check(card: JudgedCard, plan: Plan, folder: str, output: Output) -> tuple[str, bool]:
     """Write the copy, and check it by the history.
 
     Returns
@@ -141,17 +115,8 @@ def _write_and_check(card: PrintedCard, plan: Plan, folder: str, output: Output)
     passed : bool
         Whether no finding is an error.
     """
-    from d2rpick.deck.writing import write_deck
-    from d2rpick.report.findings import Checks, as_table
-    from d2rpick.rules import Configuration, check_deck, configuration_for
-    from d2rpick.rules.base import Severity
-    from d2rpick.rules.judgement import HistoryJudge
+    from d2rpick.api.flights import written
 
-    request = plan.question.request
-    written = write_deck(request.deck or "", card, folder, overwrite=output.overwrite)
-    done = card.windows[: len(plan.done)]  # as printed
-    judge = HistoryJudge(plan.question.reference.run, request.selection(parts=False), plan.settings, done)
-    checked = check_deck(written[0], configuration_for(written[0], Configuration(), SETTINGS), judge)
-    listed = [f"written  {printable(name)}" for name in written]
-    text = "\n".join([*listed, "", as_table(Checks([checked], history=judge.run.sources), output.shown())])
-    return text, all(one.severity is not Severity.ERROR for one in checked.findings)
+    names, checked = written(plan, card, folder, overwrite=output.overwrite)
+    listed = [f"written  {printable(name)}" for name in names]
+    return "\n".join([*listed, "", checked.text("table", output.shown())]), checked.passed

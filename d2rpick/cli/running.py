@@ -17,7 +17,6 @@ from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:
     from d2rpick.api.drives import Driving
-    from d2rpick.running.drive import Driver
 
 
 CMD = ("text", "CMD")
@@ -84,19 +83,15 @@ def drive(
     from pathlib import Path
 
     from d2rpick.api.drives import Driving
-    from d2rpick.running.engine import Commands
 
     output = output.beside(deck)
     told = (lambda _: None) if output.quiet else tell
-    driving = Driving(deck, Path(folder), told, part, wait, margin, Commands(starter, engine, threads))
+    driving = Driving(deck, Path(folder), told, part, wait, margin, starter=starter, engine=engine, threads=threads)
     output.notes(driving.deck.notes, driving.cautions)
     if dry_run:
         return click.echo("\n".join(_plan(driving)))
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    with (
-        driving.driver(resume=resume) as driver,
-        telling(lambda seconds: _progress(driver, seconds), quiet=output.quiet),
-    ):
+    with driving.driver(resume=resume) as driver, telling(driver.progress, quiet=output.quiet):
         driver.prepare()
         driver.run()
         answer = driving.answer(driver, click.get_current_context().meta["d2rpick.command"])
@@ -115,13 +110,6 @@ def _plan(driving: Driving) -> list[str]:
         f"          {shlex.join(commands.words('engine', f'{deck.name}_0001.rad'))}, and further legs",
         f"switches  {len(deck.parts)} parts by main node {bodies}, to the end at {deck.end:g}",
     ]
-
-
-def _progress(driver: Driver, seconds: float) -> str:
-    if driver.at is None:
-        return f"starting ... {seconds:.0f} s"
-    order, time = driver.at
-    return f"leg {order.number}, {order.kind}: {time:.6g} of {driver.limits.end:g}"
 
 
 @options.command

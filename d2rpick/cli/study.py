@@ -73,8 +73,7 @@ def study(
     d2rpick study --td 0.37 --part box --resume runs.ndjson -f json sample_data/rolloverT01.gz
     d2rpick study --td 0.064 --tolerance 0.1 -f ndjson sample_data/energy.csv sample_data/energy.glstat
     """
-    from d2rpick.api.studies import Ledger, fingerprint, line, rows_of, summary
-    from d2rpick.choice.study import Question
+    from d2rpick.api.studies import Ledger, fingerprint, line, question_of, rows_of, summary
 
     if scheduler and jobs:
         raise click.UsageError("--scheduler and --jobs exclude each other: the cluster has its own processes")
@@ -83,9 +82,7 @@ def study(
     output = output.beside(*sources)
     written = {"output-file": output.file, "plot": output.plot, "report": output.report}
     _check_ledger(resume, written)
-    question = Question(
-        asked, request.settings, request.selection(), request.input_format, curve=bool(output.plot or output.report)
-    )
+    question = question_of(request, asked, curve=bool(output.plot or output.report))
     ledger = Ledger(resume, question) if resume is not None else None
     mark, rows = fingerprint(question), []
     by_line = output.output_format == "ndjson"
@@ -111,7 +108,7 @@ def study(
 
 def _sources(names: Sequence[str], listed: str | None) -> tuple[str, ...]:
     """Names of all runs, given and listed, patterns replaced by what they match."""
-    from d2rpick.choice.study import find_runs
+    from d2rpick.api.studies import find_runs
 
     sources = find_runs([*names, *(_listed(listed) if listed is not None else ())])
     if not sources:

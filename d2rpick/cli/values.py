@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 from click.core import ParameterSource
 
-from d2rpick.api.cards import SETTINGS, Cards
+from d2rpick.api.cards import SETTINGS, Cards, solvers
 from d2rpick.api.request import JUDGING, UNLIMITED, Number, options_of, typed
 from d2rpick.base.errors import ConfigurationError
 from d2rpick.base.settings import RULE_KEYS, refuse_unknown
@@ -19,7 +19,7 @@ from d2rpick.cli import COMMANDS
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
-    from d2rpick.histories.run import Run
+    from d2rpick.api.runs import Run
 
 
 if TYPE_CHECKING:
@@ -42,7 +42,9 @@ class NumberType(FloatType):
         try:
             number = float(value)
         except ValueError:
-            self.fail(f"{value!r} is not a number{_without_unit(str(value))}", param, ctx)
+            from d2rpick.api.arguments import without_unit
+
+            self.fail(f"{value!r} is not a number{without_unit(value)}", param, ctx)
         if not math.isfinite(number):
             self.fail(f"{value!r} is not a finite number", param, ctx)
         limit = f"{'above' if above else 'of at least'} {low:g}" if number < low or (above and number == low) else ""
@@ -50,14 +52,6 @@ class NumberType(FloatType):
         if limit:
             self.fail(f"{value} was found, a number {limit} was expected", param, ctx)
         return number
-
-
-def _without_unit(text: str) -> str:
-    """Say how a time with a unit is given, or nothing."""
-    from d2rpick.histories.names import in_seconds
-
-    value = in_seconds(text)
-    return "" if value is None else f": give a number in the unit of the history, {value:g} where it is s"
 
 
 class File(click.types.StringParamType):
@@ -102,9 +96,10 @@ class RuleIds(click.types.StringParamType):
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
         """Offer the rules that begin so, with what they say."""
-        from d2rpick.rules import RULES
+        from d2rpick.report.findings import as_list
 
-        return _completed([(rule.id, rule.summary) for rule in RULES.values()], incomplete.upper())
+        rows = (line.split(maxsplit=2) for line in as_list().split("\n"))
+        return _completed([(id_, summary) for id_, _, summary in rows], incomplete.upper())
 
 
 class ChannelNames(Names):
@@ -113,21 +108,20 @@ class ChannelNames(Names):
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
         """Offer the channels of the files that were typed before; underscores stand for blanks, as they may."""
         run = _typed_run(ctx)
-        names = (name.replace(" ", "_") for one in (run.databases if run else ()) for name in one.channels)
-        return _completed([(name, "") for name in names], incomplete)
+        return _completed([(name.replace(" ", "_"), "") for name in (run.channels if run else ())], incomplete)
 
 
 def _typed_run(ctx: click.Context) -> Run | None:
     """Open the files that were typed before; None where they are none of a run."""
     from pathlib import Path
 
+    from d2rpick.api.runs import read
     from d2rpick.base.errors import D2RPickError
-    from d2rpick.histories.opening import open_run
 
     words = ctx.meta.get("d2rpick.command", ())[1:]  # click has read no argument yet when an option is completed
     try:
-        return open_run([word for word in words if Path(word).exists()])
-    except (D2RPickError, OSError, IndexError):
+        return read([word for word in words if Path(word).exists()])
+    except (D2RPickError, OSError, ValueError):
         return None
 
 
@@ -148,23 +142,17 @@ class SolverName(click.types.StringParamType):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """Take a name or fail with those there are."""
-        from d2rpick.deck.printing import SOLVERS
-
-        if value not in SOLVERS:
-            self.fail(f"{value!r} was found, one of {', '.join(SOLVERS)} was expected", param, ctx)
+        if value not in solvers():
+            self.fail(f"{value!r} was found, one of {', '.join(solvers())} was expected", param, ctx)
         return str(value)
 
     def get_metavar(self, *_: Any, **__: Any) -> str:
         """Show the names in the help."""
-        from d2rpick.deck.printing import SOLVERS
-
-        return f"[{'|'.join(SOLVERS)}]"
+        return f"[{'|'.join(solvers())}]"
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
         """Offer the names that begin so."""
-        from d2rpick.deck.printing import SOLVERS
-
-        return _completed([(name, "") for name in SOLVERS], incomplete)
+        return _completed([(name, "") for name in solvers()], incomplete)
 
 
 _NAMED: Final = {

@@ -242,7 +242,6 @@ def _encrypted(piece: bytearray, first: int, end: int) -> list[int]:
     return found
 
 
-STDIN: Final = "-"  # name of what was read from standard input
 _PIECE: Final = 4 << 20  # bytes of whole lines that are looked at together
 _COUNTED: Final = 16  # line ends are counted in this part of a piece, which stays in the cache
 _GZIP: Final = b"\x1f\x8b\x08"

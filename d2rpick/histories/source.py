@@ -9,7 +9,7 @@ import sys
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import FormatError, listing
-from d2rpick.base.files import FileState, bound, unpacked_beyond
+from d2rpick.base.files import STDIN, FileState, bound, unpacked_beyond
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.content import OnDisk, stored
 from d2rpick.histories.names import in_seconds, near_miss
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-STDIN = "-"
 _GZIP = b"\x1f\x8b"
 _BLOCK = 1 << 16  # packed bytes at a time, which become 68 MB at most
 # Files of a folder often share their suffix, and have it in common with any name that has it.

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base import __version__
 from d2rpick.base.errors import Caution, name_units, printable
-from d2rpick.deck.source import STDIN
+from d2rpick.base.files import STDIN
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, kind_of, many, one_of, row
-from d2rpick.rules import RULES, Checked, CheckedWindow
+from d2rpick.rules import RULES, Checked, CheckedWindow, find_rules
 from d2rpick.rules.base import MAIN_DECK, Example, Rule, Severity, Unreadable, grouped
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.report.formats import Shown
 
@@ -281,6 +281,11 @@ def _xml(text: str) -> str:
 def as_list() -> str:
     """Id, severity and summary of every rule."""
     return "\n".join(f"{rule.id}  {rule.severity:<7}  {rule.summary}" for rule in RULES.values())
+
+
+def explained_rules(names: Iterable[str], width: int) -> str:
+    """Explain the rules by ids or their beginnings; ConfigurationError where there is none of them."""
+    return "\n\n\n".join(as_text(rule, width) for name in names for rule in find_rules(name))
 
 
 def as_text(rule: Rule, width: int) -> str:

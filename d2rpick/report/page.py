@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.deck.printing import DEFAULT, SOLVERS
 from d2rpick.report.explorer import Explorer, explorer, scripts, styles
 from d2rpick.report.html import Markup, document, drawings, join, pairs, resource, section, table, tag
 from d2rpick.report.situation import heading, measures_of
@@ -153,9 +152,8 @@ def solver_input(times: tuple[float, float], record: PageContext) -> Markup:
     if card.text:
         return section(title, tag("pre", card.text, tabindex="0"))
     command = ["d2rpick", "card", "--tr", repr(times[0]), "--td", repr(times[1])]
-    command += [] if card.solver == DEFAULT else ["--solver", card.solver]
-    switches = f"--{SOLVERS[card.solver].switches}"
-    line = tag("pre", shell_line([*command, switches, "IDS", *record.judging]), class_="wrap")
+    command += ["--solver", card.solver] if card.solver else []
+    line = tag("pre", shell_line([*command, f"--{card.switches}", "IDS", *record.judging]), class_="wrap")
     return section(title, tag("p", "Printed, and judged again as printed, by"), line)
 
 

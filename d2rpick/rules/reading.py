@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.base.files import STDIN
 from d2rpick.deck.card import Card, Field, Problem
 from d2rpick.deck.parts import element_cards
 from d2rpick.deck.reader import UNKNOWN_KIND, cure, cuts
-from d2rpick.deck.source import STDIN
 from d2rpick.deck.switching import SwitchSet, misspelt
 from d2rpick.rules.base import BOTH, ERROR, INFO, LS_DYNA, WARNING, Case, Example, Objection, rule
 from d2rpick.rules.examples import BACK, END, GOOD, HEAD, PARTS, PASSES, THERE, automatic, deck

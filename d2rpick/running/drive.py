@@ -114,6 +114,14 @@ class Driver:
         while self.solver.alive:
             time.sleep(_SHORTEST)
 
+    def progress(self, seconds: float) -> str:
+        """Say which leg is computed and how far it is; until the first one has begun, for how many seconds."""
+        at = self.at
+        if at is None:
+            return f"starting ... {seconds:.0f} s"
+        order, time = at
+        return f"leg {order.number}, {order.kind}: {time:.6g} of {self.limits.end:g}"
+
     def run(self) -> None:
         """Compute leg after leg to the end of the run.
 

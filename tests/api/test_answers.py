@@ -385,6 +385,7 @@ def test_a_figure_shows_itself() -> None:
             "`td` and `td_window` exclude",
         ),
         (lambda: loose.suggest(d2.read(ENERGY), "0.064"), TypeError, "td is '0.064', a number was expected"),
+        (lambda: loose.suggest(d2.read(ENERGY), "64ms"), TypeError, "of the history, 0.064 where it is s"),
         (lambda: loose.suggest(d2.read(ENERGY), td_window=(2, 1)), ValueError, "td_window is 2 to 1, which is empty"),
         (lambda: loose.suggest(d2.read(ENERGY), 0.06, tolerence=1), TypeError, "'tolerence'; is 'tolerance' meant"),
         (lambda: loose.suggest(d2.read(BOX), 0.06, part=1), TypeError, "no argument 'part'; is 'parts' meant"),

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from d2rpick.api.studies import find_runs
 from d2rpick.choice.answers import verify
 from d2rpick.choice.question import Settings
 from d2rpick.choice.study import (
@@ -21,7 +22,6 @@ from d2rpick.choice.study import (
     cut_runs,
     failed,
     fewest_digits,
-    find_runs,
     outliers,
     summarise,
 )

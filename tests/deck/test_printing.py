@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from d2rpick.api.arguments import read_windows
 from d2rpick.base.errors import DeckError
-from d2rpick.deck.printed_card import LONGEST, Printing, check_windows, read_windows, shortest
+from d2rpick.deck.printed_card import LONGEST, Printing, check_windows, shortest
 from d2rpick.deck.printing import SOLVERS, cards, solver_of
 from d2rpick.histories.opening import READERS
 from d2rpick.rules import check_deck
