@@ -14,7 +14,7 @@ from d2rpick.api.request import Request
 from d2rpick.base.errors import ArgumentError, Caution, FormatError, listing, name_units
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.question import Reference
-from d2rpick.histories.names import Selection
+from d2rpick.histories.names import Selection, asks_for_recommended
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -160,25 +160,22 @@ def selected(run: histories.Run, selection: Selection, settings: Settings, model
     from d2rpick.choice.deck_of_run import of_another_model
     from d2rpick.choice.sets_of_parts import recommended_parts
     from d2rpick.deck.model import DISCRETE
-    from d2rpick.flight.momentum import asks_for_recommended
 
     if foreign := of_another_model(run, model.inventory):
-        if asks_for_recommended(selection.parts, run):
+        if asks_for_recommended(selection.parts, run.parts):
             raise FormatError(f"{run.name}: no set of parts can be recommended: {foreign.message}, or the parts")
         return selection
     counts = model.inventory.counts
     springs = {part.id for part in run.springs} | {part for part, kinds in counts.items() if {*kinds} <= DISCRETE}
     parts = selection.parts
-    if asks_for_recommended(parts, run):
+    if asks_for_recommended(parts, run.parts):
         parts = tuple(map(str, recommended_parts(run, settings, model)))
     return selection._replace(parts=parts, springs=tuple(map(str, sorted(springs))))
 
 
 def _check_recommended(request: Request, run: histories.Run) -> None:
     """Refuse the word for the recommended set beside other parts, or without a deck."""
-    from d2rpick.flight.momentum import asks_for_recommended
-
-    if asks_for_recommended(request.part, run):
+    if asks_for_recommended(request.part, run.parts):
         if len(request.part) > 1:
             raise ArgumentError("`parts` recommended stands for a whole set; leave the other `parts` out")
         if request.deck is None:
@@ -187,7 +184,7 @@ def _check_recommended(request: Request, run: histories.Run) -> None:
 
 def _merged(asked: Asked, merge: int) -> Asked:
     """Let the parts become one rigid body, with a caution where nothing joins them."""
-    from d2rpick.flight.bodies import RigidBody
+    from d2rpick.choice.deck_of_run import merged
 
     parts = asked.reference.history.parts
     if not parts:
@@ -197,6 +194,5 @@ def _merged(asked: Asked, merge: int) -> Asked:
         apart = listing([name_units(body.parts) for body in bodies], between="; ")
         found = f"--merge {merge} makes one rigid body of what nothing joins: {apart}"
         cautions = (*cautions, Caution("merged-apart", f"{found}; leave it out to keep them apart"))
-    merged = tuple(sorted({part.id for part in parts} | {merge}))
-    whole = len(merged) > 1 or any(body.whole for body in bodies)  # a part alone may be of pieces
-    return asked._replace(settings=replace(asked.settings, bodies=(RigidBody(merged, whole=whole),)), cautions=cautions)
+    body = merged({part.id for part in parts} | {merge}, bodies)
+    return asked._replace(settings=replace(asked.settings, bodies=(body,)), cautions=cautions)

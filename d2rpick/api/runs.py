@@ -299,6 +299,7 @@ def extracted(run: histories.Run, selection: Selection) -> tuple[dict[str, Sampl
     ``time`` and ``internal_energy``, with several parts ``part_<id>`` for each, then quantities of the whole model and
     the momentum by which the flight is seen, each of shape (n,).
     """
+    from d2rpick.choice.flights import momentum_of_flight
     from d2rpick.choice.question import Reference
 
     history = Reference.of(run, selection).history
@@ -306,7 +307,7 @@ def extracted(run: histories.Run, selection: Selection) -> tuple[dict[str, Sampl
     if history.parts and len(history.parts) > 1:
         energies = run.part_energies(history.parts)
         table |= {f"part_{part.id}": column for part, column in zip(history.parts, energies.T, strict=True)}
-    return table | run.quantities(history.time) | _of_model(history) | _momentum(history), history.notes
+    return table | run.quantities(history.time) | _of_model(history) | momentum_of_flight(history), history.notes
 
 
 def _of_model(history: History) -> dict[str, Samples]:
@@ -321,27 +322,3 @@ def _of_model(history: History) -> dict[str, Samples]:
         return {}
     terms = {"kinetic_energy": balance.kinetic, "total_internal_energy": balance.internal if history.parts else None}
     return {name: term for name, term in terms.items() if term is not None}
-
-
-def _momentum(history: History) -> dict[str, Samples]:
-    """Columns of the momentum by which the flight is seen, with its mass: of what flies longest, or the chosen parts.
-
-    Where only the velocity of the model is known, columns of that; nothing where neither is written at the times of the
-    energy.
-    """
-    import numpy as np
-
-    from d2rpick.flight.momentum import all_flights, to_be_asked  # not above: a table has no momenta
-
-    asked = [one for one in to_be_asked(history.momenta) if np.array_equal(one.time, history.time)]
-    if not asked:
-        return {}
-    momenta = next((one for one in asked if all_flights(one, history.balance)), asked[0])
-    flights, members = all_flights(momenta, history.balance), momenta.chosen
-    if flights and momenta.parts:
-        longest = max(flights, key=lambda flight: flight.end - flight.start)
-        members = tuple(momenta.parts.index(part) for part in longest.parts or momenta.parts)
-    mass = momenta.mass(members)
-    name = "velocity" if momenta.velocity else "momentum"
-    columns = {f"{axis}_{name}": column for axis, column in zip("xyz", momenta.of(members).T.copy(), strict=True)}
-    return columns | ({"mass": np.full(history.time.shape, mass)} if mass > 0 else {})

@@ -47,6 +47,12 @@ def _whole(inventory: Inventory, body: tuple[int, ...]) -> bool:
     return alone or frozenset(body) in inventory.ready or pieces_of(inventory, body) == 1
 
 
+def merged(parts: Collection[int], bodies: Iterable[RigidBody]) -> RigidBody:
+    """Give the rigid body that parts become which are merged, whatever ``bodies`` they would be."""
+    whole = len(parts) > 1 or any(body.whole for body in bodies)  # a part alone may be of pieces
+    return RigidBody(tuple(sorted(parts)), whole=whole)
+
+
 def of_another_model(run: Run, inventory: Inventory) -> Caution | None:
     """Say why a deck is not that of a run; None where nothing shows it.
 

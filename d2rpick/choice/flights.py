@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from d2rpick.choice.question import Settings
-    from d2rpick.histories.history import History
+    from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.span import Fits
 
 
@@ -122,3 +122,27 @@ def _flights_of(history: History, settings: Settings, fits: Fits | None) -> tupl
 def _overlap(earlier: Flight, later: Flight) -> bool:
     """Say whether a flight lasts into a later one: it misses the load before that one, so its end is not known."""
     return earlier.end is None or later.start is None or earlier.end > later.start
+
+
+def momentum_of_flight(history: History) -> dict[str, Samples]:
+    """Columns of the momentum by which the flight is seen, with its mass: of what flies longest, or the chosen parts.
+
+    Where only the velocity of the model is known, columns of that; nothing where neither is written at the times of the
+    energy.
+    """
+    import numpy as np
+
+    from d2rpick.flight.momentum import all_flights, to_be_asked  # not above: most evidence is found without
+
+    asked = [one for one in to_be_asked(history.momenta) if np.array_equal(one.time, history.time)]
+    if not asked:
+        return {}
+    momenta = next((one for one in asked if all_flights(one, history.balance)), asked[0])
+    flights, members = all_flights(momenta, history.balance), momenta.chosen
+    if flights and momenta.parts:
+        longest = max(flights, key=lambda flight: flight.end - flight.start)
+        members = tuple(momenta.parts.index(part) for part in longest.parts or momenta.parts)
+    mass = momenta.mass(members)
+    name = "velocity" if momenta.velocity else "momentum"
+    columns = {f"{axis}_{name}": column for axis, column in zip("xyz", momenta.of(members).T.copy(), strict=True)}
+    return columns | ({"mass": np.full(history.time.shape, mass)} if mass > 0 else {})

@@ -26,9 +26,9 @@ from d2rpick.choice.question import Reference
 from d2rpick.choice.switchable_parts import PartRow, RunFacts, facts_of, rows_of, step_growth
 from d2rpick.choice.warnings import out_of_place
 from d2rpick.deck.geometry import Placement
-from d2rpick.flight.momentum import asks_for_recommended, with_parts_by_number
+from d2rpick.flight.momentum import with_parts_by_number
 from d2rpick.histories.listings import printed_steps
-from d2rpick.histories.names import Part, Selection, select_parts
+from d2rpick.histories.names import Part, Selection, asks_for_recommended, select_parts
 from d2rpick.vibration.measures import run_time_share
 
 if TYPE_CHECKING:
@@ -176,7 +176,7 @@ def given_parts(run: Run, names: Sequence[str]) -> tuple[int, ...]:
     """
     if not names:
         return ()
-    if asks_for_recommended(names, run):
+    if asks_for_recommended(names, run.parts):
         what = "name a set that it is compared with, by numbers or titles of parts, 'flying' or 'all'"
         raise FormatError(f"{run.name}: the recommended set is what is looked for here; {what}")
     numbers = with_parts_by_number(run, Selection(parts=tuple(names))).parts

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from d2rpick.flight.window import FreeFlight
     from d2rpick.histories.history import Balance, History, Momenta, Samples
     from d2rpick.histories.names import Part
-    from d2rpick.vibration.span import Span
 
 # Where a flight may be known from, best first.
 SOURCES: Final = ("given", "momentum", "contact-energy", "energy-balance", "oscillator", "energy", None)
@@ -145,11 +144,13 @@ def landed(flight: Flight, landing: float | None) -> Flight:
     return flight if known else flight._replace(end=landing)
 
 
-def find_flight(history: History, td: float, after: float | None, seen: Seen, span: Span | None) -> Flight:
+def find_flight(
+    history: History, td: float, after: float | None, seen: Seen, span: tuple[float, float] | None
+) -> Flight:
     """Choose the best answer to when the load is over: given, seen, by the oscillator, by the energy.
 
     ``after`` is given as the end of the load [time]; ``seen`` what the evidence shows; ``span`` the window that an
-    oscillator describes.
+    oscillator describes, from its first sample to its last.
     """
     if seen.held:
         return Flight(refusal=seen.refusal)
@@ -165,22 +166,22 @@ def find_flight(history: History, td: float, after: float | None, seen: Seen, sp
             start, end, source, parts, damping, seen.refusal, seen.doubts, gravity=gravity, described=span is not None
         )
     if after is not None:
-        end = landing_after(history, after) if span is None else span.end if span.end < history.time[-1] else None
+        end = landing_after(history, after) if span is None else span[1] if span[1] < history.time[-1] else None
         return Flight(after, None if seen.refusal else end, "given", refusal=seen.refusal, doubts=seen.doubts)
     if seen.refusal:
         return Flight(refusal=seen.refusal, doubts=seen.doubts)
-    quiet = None if span else quiet_time(history, td)
-    found = span or quiet
-    if found is None:
-        return Flight()
-    end = found.end if found.end is not None and found.end < history.time[-1] else None
-    refusal = _fed(history, found.start, td if quiet else found.end or td)
-    if refusal:
-        return Flight(refusal=refusal)
     if span:
-        return Flight(found.start, end, "oscillator", described=True)
+        refusal = _fed(history, *span)
+        end = span[1] if span[1] < history.time[-1] else None
+        return Flight(refusal=refusal) if refusal else Flight(span[0], end, "oscillator", described=True)
+    quiet = quiet_time(history, td)
+    if quiet is None:
+        return Flight()
+    if refusal := _fed(history, quiet.start, td):
+        return Flight(refusal=refusal)
+    end = quiet.end if quiet.end is not None and quiet.end < history.time[-1] else None
     known = history.balance is not None and history.balance.kinetic_and_internal is not None
-    return Flight(found.start, end, "energy", settled=quiet.settled if quiet else None, gravity=nan if known else 0.0)
+    return Flight(quiet.start, end, "energy", settled=quiet.settled, gravity=nan if known else 0.0)
 
 
 def _fed(history: History, start: float, end: float) -> str | None:

@@ -257,7 +257,6 @@ def _polished(rests: Samples, members: set[int], chosen: Sequence[int], moving: 
 
 FLYING: Final = "flying"
 ALL: Final = "all"
-RECOMMENDED: Final = "recommended"
 
 
 def with_parts_by_number(run: Run, selection: Selection) -> Selection:
@@ -348,12 +347,6 @@ def _heaviest(
     mass = dict(zip(run.parts, masses.tolist(), strict=True))
     best = max(found, key=lambda one: (one.end - one.start) * sum(mass[part] for part in one.parts or ()))
     return tuple(part for part in deformable if part in (best.parts or ()))
-
-
-def asks_for_recommended(parts: Sequence[str], run: Run) -> bool:
-    """Whether the parts hold the word "recommended", and no part of the run has it for its title."""
-    titles = {part.title.strip().casefold() for part in run.parts}
-    return RECOMMENDED in {text.strip().casefold() for text in parts} - titles
 
 
 def believed(momenta: Momenta, whole: Momenta | None) -> tuple[slice, ...]:

@@ -340,3 +340,9 @@ def _only(titled: Sequence[Part], text: str, where: str) -> Part:
 def menu(parts: Sequence[Part]) -> str:
     """Parts for a message: number and title."""
     return listing([f"{part.id} {part.title!r}" if part.title else str(part.id) for part in parts])
+
+
+def asks_for_recommended(texts: Sequence[str], parts: Iterable[Part]) -> bool:
+    """Whether texts hold the word "recommended", and no part has it for its title."""
+    titles = {part.title.strip().casefold() for part in parts}
+    return "recommended" in {text.strip().casefold() for text in texts} - titles
