@@ -104,6 +104,11 @@ def test_a_module_imports_only_from_its_folder_and_from_lower_layers() -> None:
     assert not [module for module in INNER if "d2rpick" in imports(module)]  # the public face stands above all
 
 
+def test_the_command_line_knows_the_library_results_and_base_alone() -> None:
+    known = {folder(name) for module in INNER if folder(module) == "cli" for name in imports(module) & {*INNER}}
+    assert known == {"cli", "api", "report", "base"}
+
+
 def test_no_modules_import_each_other_in_a_circle() -> None:
     graph = {module: (imports(module) & {*INNER}) - {module} for module in INNER}
     TopologicalSorter(graph).prepare()  # raises CycleError, which names the circle
