@@ -231,7 +231,8 @@ def _attached(momenta: Momenta, chosen: Sequence[int], td: float) -> tuple[int, 
     moving = [i for i in momenta.moving if sizes[i] > 0]
     if not set(chosen) & set(moving):
         return ()
-    left, values, _ = np.linalg.svd(rests[moving] / sizes[moving, np.newaxis], full_matrices=True)
+    wider = len(moving) > rests.shape[1]  # else all of the left is there, and the right is large
+    left, values, _ = np.linalg.svd(rests[moving] / sizes[moving, np.newaxis], full_matrices=wider)
     values = np.append(values, np.zeros(len(moving) - values.size))
     null = left[:, values <= _CANCELS * values[0]]
     shares = (null @ null.T) / np.outer(sizes[moving], sizes[moving])
