@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from inspect import signature
 from pathlib import Path
@@ -43,20 +43,19 @@ def run(
 ) -> Result:
     """Call ``d2rpick`` with these arguments; whatever it raises but the exit itself is raised here.
 
-    What was asked before is not computed again, where it wrote no file and none has changed since.
+    What was asked before of files of the clone alone is not computed again.
     """
     given = {**_ENVIRONMENT, **(env or {})}
     around = frozenset((name, value) for name, value in os.environ.items() if name != "PYTEST_CURRENT_TEST")
-    files = _files(args)
-    asked = (args, stdin, color, *given.items(), around, Path.cwd(), files)
-    if asked not in _ANSWERED:
-        result = CliRunner(**_APART).invoke(d2rpick, args, input=stdin, color=color, env=given)
-        if result.exception and not isinstance(result.exception, SystemExit):
-            raise result.exception
-        if _files(args) != files:
-            return result
+    asked = (args, stdin, color, *given.items(), around, Path.cwd())
+    if asked in _ANSWERED:
+        return _ANSWERED[asked]
+    result = CliRunner(**_APART).invoke(d2rpick, args, input=stdin, color=color, env=given)
+    if result.exception and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    if not any(_changes(folder) for folder in (Path.cwd(), *(Path(arg).absolute() for arg in args if "/" in arg))):
         _ANSWERED[asked] = result
-    return _ANSWERED[asked]
+    return result
 
 
 def put(path: Path, content: str | bytes) -> Path:
@@ -74,17 +73,10 @@ def refused(*args: str) -> str:
     return result.stderr.removeprefix("d2rpick: ").rstrip("\n")
 
 
-def _files(args: Sequence[str]) -> frozenset[tuple[str, int, int, int]]:
-    """Temporary files that may be read or written, and their state; those of the clone stay as they are."""
-    named = (Path(os.path.abspath(arg)).parent for arg in args if "/" in arg and "\0" not in arg)  # noqa: PTH100
-    found = set()
-    for folder in {Path.cwd(), *named}:
-        changes = _TEMPORARY in folder.parents and not folder.is_relative_to(ROOT)  # the clone may be temporary, too
-        for place, _, names in os.walk(folder) if changes else ():
-            for path in (os.path.join(place, name) for name in names):  # noqa: PTH118  fast
-                state = os.lstat(path)
-                found.add((path, state.st_ino, state.st_size, state.st_mtime_ns))
-    return frozenset(found)
+def _changes(path: Path) -> bool:
+    """Whether a file is temporary, or of a temporary folder; those of the clone stay as they are."""
+    path = Path(os.path.normpath(path))
+    return not path.is_relative_to(ROOT) and (path == _TEMPORARY or _TEMPORARY in path.parents)
 
 
 def unwrapped(text: str) -> str:

@@ -35,7 +35,7 @@ _NAMED: Final = {".json": "json", ".ndjson": "ndjson", ".csv": "csv", ".md": "ma
 # What a report is often expected to be, and is not.
 _PRINTED: Final = (".pdf", ".doc", ".docx")
 # Lines of a result that stand out: what is recommended or judged, and what a deck is to be changed for.
-_ANSWER: Final = r"\* |(recommended|best of|make rigid|verdict|common tr) |  .*:\d+:\d+: (error|warning) D2R"
+_ANSWER: Final = r"(?m)^(\* |(recommended|best of|make rigid|verdict|common tr) |  .*:\d+:\d+: (error|warning) D2R).*"
 
 
 # Arguments that messages name in backticks, and which options set them where these have other names.
@@ -170,8 +170,8 @@ class Output:
             return
         text = content.decode()
         colour = False if os.environ.get("NO_COLOR") else True if os.environ.get("FORCE_COLOR") else None
-        lines = (click.style(line, bold=True) if re.match(_ANSWER, line) else line for line in text.split("\n"))
-        click.echo("\n".join(lines), nl=False, color=colour)
+        bold = re.sub(_ANSWER, lambda line: click.style(line[0], bold=True), text)
+        click.echo(bold, nl=False, color=colour)
 
     def content(self, content: bytes) -> None:
         """Give out a result that is the content of a file."""

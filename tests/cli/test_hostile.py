@@ -106,8 +106,8 @@ def test_a_study_without_a_finished_run_leaves_no_ledger(tmp_path: Path, args: t
 
 
 def test_what_is_packed_beyond_the_memory_ends_in_one_line(tmp_path: Path) -> None:
-    packed = put(tmp_path / "zeros.gz", 24 * gzip.compress(bytes(1 << 24)))
-    message = one_line(child('ulimit -v 350000; D2RPICK_MAX_RATIO=2e3 d2rpick info "$1"', packed))
+    packed = put(tmp_path / "zeros.gz", 17 * gzip.compress(bytes(1 << 24)))
+    message = one_line(child('ulimit -v 260000; D2RPICK_MAX_RATIO=2e3 d2rpick info "$1"', packed))
     assert "zeros.gz: its unpacked data do not fit into memory" in message
 
 

@@ -52,7 +52,9 @@ class Rolled(NamedTuple):
     scope="module",
     params=[
         Parameters(mesh=6, speed=7.4, stiffness=6e6, damping=1.0),
-        Parameters(mesh=5, speed=6.7, stiffness=3.5e6, yield_strain=6e-3, damping=0.0),
+        pytest.param(
+            Parameters(mesh=5, speed=6.7, stiffness=3.5e6, yield_strain=6e-3, damping=0.0), marks=pytest.mark.slow
+        ),
     ],
     ids=["fast", "slow"],
 )
