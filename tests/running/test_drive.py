@@ -204,6 +204,13 @@ def test_a_disk_that_is_full_is_told_with_what_to_do(tmp_path: Path) -> None:
             raise OSError(wrong, os.strerror(wrong))
 
 
+def test_how_far_a_run_is_can_be_told_at_any_time(tmp_path: Path) -> None:
+    with Driving(asked(tmp_path)[1], tmp_path / "run", print, wait=WAIT).driver(resume=False) as driver:
+        assert driver.progress(3.4) == "starting ... 3 s"
+        driver.at = Order(RIGID, 2, 0.05, 0.2), 0.1234567
+        assert driver.progress(9.0) == f"leg 2, rigid: 0.123457 of {END:g}"
+
+
 def test_a_history_that_is_cut_in_a_record_ends_with_a_whole_state(tmp_path: Path) -> None:
     made = headed([MadePart(1, "strip of shells", (1, 6))], globals_=6)
     for time_ in (0.0, 1.0, 2.0):
