@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
-from d2rpick.deck.parts import read_parts
+from d2rpick.deck.ls_dyna_parts import read_parts
 from d2rpick.deck.reader import Deck, read_deck
 from d2rpick.deck.switching import Windows, find_windows, read_switching
 from d2rpick.rules import check_deck

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import Record, RigidWindow, simulate
-from d2rpick.report import histories
+from d2rpick.report import history_files
 
 MESH = 6  # coarse, for speed
 T_END = 1.2
@@ -24,6 +24,6 @@ def written(record: Record, folder: Path) -> list[str]:
     names = []
     for form in ("matsum", "glstat"):
         path = folder / form
-        path.write_bytes(histories.BOX_WRITERS[form](record))
+        path.write_bytes(history_files.BOX_WRITERS[form](record))
         names.append(str(path))
     return names

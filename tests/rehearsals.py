@@ -7,7 +7,7 @@ import numpy as np
 
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import BOX, Outcome, Record, RigidWindow, scan, scan_times, simulate
-from d2rpick.report import histories
+from d2rpick.report import history_files
 from tests.command import answer
 
 T_END = 0.55
@@ -81,7 +81,7 @@ def rehearse(parameters: Parameters, folder: Path, *, every: int = 1, interval: 
     shown = reference.time <= reference.landed + 0.04
     td = round(reference.landed - BEFORE_LANDING, 3)
     file = folder / "reference.matsum"
-    file.write_bytes(histories.BOX_WRITERS["matsum"](_until(reference, int(shown.sum()))))
+    file.write_bytes(history_files.BOX_WRITERS["matsum"](_until(reference, int(shown.sum()))))
     found = answer("suggest", "--td", str(td), "--part", "box", str(file))
     tr = found["recommended"]["tr"] if found["recommended"] else None
     flight = found["flight"]

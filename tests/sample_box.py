@@ -14,7 +14,7 @@ import numpy as np
 from d2rpick.histories.history import Samples
 from d2rpick.models.box_model import Parameters, build
 from d2rpick.models.box_run import PARTS, Record, simulate
-from d2rpick.report.histories import BOX_WRITERS
+from d2rpick.report.history_files import BOX_WRITERS
 from tests.command import ROOT
 from tests.made_binout import LsdaWriter
 from tests.made_t01 import T01Writer

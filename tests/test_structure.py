@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 from d2rpick.api import models, request
-from d2rpick.choice.ranking import GRADES
+from d2rpick.choice.quality import GRADES
 from d2rpick.cli import output
 from d2rpick.histories.opening import READERS
-from d2rpick.report.histories import OSCILLATOR_WRITERS
+from d2rpick.report.history_files import OSCILLATOR_WRITERS
 from tests.command import DECK, ENERGY, GLSTAT, ROOT, TIME_LIMIT
 
 PACKAGE = ROOT / "d2rpick"

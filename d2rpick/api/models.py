@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from d2rpick.vibration.oscillator import Oscillator, Replay, State, Trajectory
 
 MOST_REPLAYED = 10_000_000  # their text takes some gigabytes
-HISTORIES = ("csv", "hdf5", "glstat", "matsum")  # of d2rpick.report.histories, which --help does without
+HISTORIES = ("csv", "hdf5", "glstat", "matsum")  # of d2rpick.report.history_files, which --help does without
 
 
 def _same(name: str, **changes: Any) -> Any:

@@ -184,7 +184,9 @@ def write_whole(path: Path, content: bytes) -> None:
     try:
         path = path.resolve()
     except RuntimeError:  # a loop of links, before Python 3.13
-        raise OSError(ELOOP, os.strerror(ELOOP), str(path)) from None
+        path = path.absolute()
+    if path.is_symlink():  # what is left of it
+        raise OSError(ELOOP, os.strerror(ELOOP), str(path))
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     scratch = path.parent / temporary
     try:

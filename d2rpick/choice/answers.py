@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from d2rpick.base.errors import Caution, RangeError
 from d2rpick.choice.candidates import Candidate, Candidates, Pair, find_candidates, judge
 from d2rpick.choice.expectation import Expectation, against_td, expectation, most_energy
-from d2rpick.choice.ranking import EQUALLY_GOOD, Quality, over_limits, quality_of, rank
+from d2rpick.choice.quality import Quality, quality_of
+from d2rpick.choice.ranking import EQUALLY_GOOD, over_limits, rank
 from d2rpick.choice.situation import OfTd, Situation, examine
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, cautions_of, out_of_place
 from d2rpick.flight.internal_energy import round_off

@@ -20,8 +20,8 @@ import numpy as np
 
 from d2rpick.base.errors import Caution, ConfigurationError, DeckError, FormatError
 from d2rpick.choice.cost import ELEMENT_SHARE, MEASURED, POINT, RIGID_NODE, Weights
-from d2rpick.deck import ls_dyna, main_decks, radioss
-from d2rpick.deck.parts import read_parts
+from d2rpick.deck import ls_dyna_inventory, main_decks, radioss_inventory
+from d2rpick.deck.ls_dyna_parts import read_parts
 from d2rpick.deck.radioss_files import run_files
 from d2rpick.deck.radioss_run import find_run_windows, read_run
 from d2rpick.deck.reader import Deck, read_deck
@@ -203,7 +203,7 @@ def observations_of(folder: str) -> tuple[Observation, ...]:
 
 def _of_radioss(deck: str) -> Iterator[Observation]:
     run = read_run(deck)
-    inventory = radioss.read(run)
+    inventory = radioss_inventory.read(run)
     windows = find_run_windows(run).windows.windows
     rigid = [_Rigid(one.unit.id, one.tr, one.td or np.inf) for one in windows if not one.unit.is_body]
     start = 0.0
@@ -217,7 +217,7 @@ def _of_radioss(deck: str) -> Iterator[Observation]:
 
 def _of_ls_dyna(deck: str) -> Iterator[Observation]:
     read = read_deck(deck)
-    inventory = ls_dyna.read(read)
+    inventory = ls_dyna_inventory.read(read)
     windows = find_windows(read_switching(read), read_parts(read)).windows
     rigid = [_Rigid(one.part, one.tr, one.td or np.inf) for one in windows if one.part is not None]
     for name in sorted(one.name for one in Path(deck).parent.iterdir() if one.is_file()):

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.answers import Suggestion
     from d2rpick.choice.candidates import Candidate
+    from d2rpick.choice.quality import Quality
     from d2rpick.choice.question import Reference, Settings
-    from d2rpick.choice.ranking import Quality
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History
 

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.candidates import Candidate, Candidates, Pair
     from d2rpick.choice.plan import Plan
+    from d2rpick.choice.quality import Quality
     from d2rpick.choice.question import Reference, Settings
-    from d2rpick.choice.ranking import Quality
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,7 +41,7 @@ def replay(motion: Motion, output: Output) -> None:
         --t-end 0.15 --dt 1e-4 -o switched.csv
     d2rpick replay --stiffness 660e3 --mass 31.4 --beta 2 --y0 0.02 --vy0 -1.5 --t-end 0.01 --dt 0.001
     """
-    from d2rpick.report.histories import OSCILLATOR_WRITERS, format_of
+    from d2rpick.report.history_files import OSCILLATOR_WRITERS, format_of
 
     form = motion.write_as or format_of(output.output_file, HISTORIES)
     output = output.beside()
@@ -86,7 +86,7 @@ def rollover(box: Box, output: Output) -> None:
 
 def _run(box: Box, output: Output) -> None:
     """One run; for a plot also the one without switching."""
-    from d2rpick.report.histories import BOX_WRITERS, format_of
+    from d2rpick.report.history_files import BOX_WRITERS, format_of
 
     form = box.write_as or format_of(output.output_file, HISTORIES)
     output = output.beside()

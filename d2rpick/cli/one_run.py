@@ -69,7 +69,7 @@ def extract(write_as: str | None, request: Request, output: Output) -> None:
     d2rpick extract --energy boxIE_J sample_data/rollover.csv -o box.h5
     """
     from d2rpick.api.runs import extracted
-    from d2rpick.report.histories import TABLES, format_of, write_table
+    from d2rpick.report.history_files import TABLES, format_of, write_table
 
     form = write_as or format_of(output.output_file, TABLES)
     selection = request.selection()

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 OBJECTION = 1
-GRADES: Final = ("poor", "fair", "good")  # of d2rpick.choice.ranking; a test holds them together
+GRADES: Final = ("poor", "fair", "good")  # of d2rpick.choice.quality; a test holds them together
 # A terminal of fewer columns is none that tables are read on.
 _NARROWEST: Final = 40
 # Formats that names of files promise.

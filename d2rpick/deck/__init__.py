@@ -29,10 +29,12 @@ def read_inventory(path: str) -> Inventory:
     DeckError
         If the deck cannot be read, or has no parts.
     """
-    from d2rpick.deck import ls_dyna, radioss, radioss_files, radioss_run, reader  # not above: they load numpy
+    from d2rpick.deck import ls_dyna_inventory, radioss_files, radioss_inventory  # not above: they load numpy
+    from d2rpick.deck.radioss_run import read_run
+    from d2rpick.deck.reader import read_deck
 
     is_run = radioss_files.run_files(path)
-    found = radioss.read(radioss_run.read_run(path)) if is_run else ls_dyna.read(reader.read_deck(path))
+    found = radioss_inventory.read(read_run(path)) if is_run else ls_dyna_inventory.read(read_deck(path))
     if not found.parts:
         why = f" ({found.notes[0]})" if found.notes else ""
         raise DeckError(f"{path}: no parts were found{why}; name the main deck of the run")

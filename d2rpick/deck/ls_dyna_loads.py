@@ -15,14 +15,15 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.deck.ls_dyna_parts import Parts, material_of, node_sets, read_constraints, read_welds, rigid_materials
 from d2rpick.deck.mesh import layout, lines_of
 from d2rpick.deck.model import Boundary, Gravity, Hold, Joint, Joints, ids, plateaus
-from d2rpick.deck.parts import Parts, material_of, node_sets, read_constraints, read_welds, rigid_materials
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
-    from d2rpick.deck.card import Card, Row
+    from d2rpick.deck.card import Card
+    from d2rpick.deck.fields import Row
     from d2rpick.deck.mesh import Reals
     from d2rpick.deck.model import Places
     from d2rpick.deck.reader import Deck

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import DeckError, are, name_units
-from d2rpick.deck import radioss
+from d2rpick.deck import radioss_inventory
 from d2rpick.deck.geometry import Placement, masses_and_steps
 from d2rpick.deck.mesh import nodes_of
 from d2rpick.deck.model import DISCRETE, Inventory
@@ -69,7 +69,7 @@ def bodies_for(path: str, parts: Collection[int]) -> Bodies:
     """
     run = read_run(path)
     starter = _whole(run)
-    inventory = radioss.read(run)
+    inventory = radioss_inventory.read(run)
     groups = NodeGroups(starter)
     if unknown := sorted(part for part in parts if not _nodes([part], groups)):
         raise DeckError(f"{path}: {name_units(unknown)} {are(unknown)} without nodes that are followed; name others")

@@ -15,7 +15,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.base.errors import DeckError, are, in_rows, name_units
-from d2rpick.deck.card import Card, Field, Value
+from d2rpick.deck.fields import Field, Value
 from d2rpick.deck.radioss_deck import Body, Leg, Starter, blocks, card_of, kept_off, keyword, read_legs
 from d2rpick.deck.radioss_files import ENGINE, HEAD, STARTER, recognises, run_files
 from d2rpick.deck.reader import Deck, Unread, why_unread
@@ -24,6 +24,8 @@ from d2rpick.deck.switching import Event, Switched, SwitchSet, Unit, Window, Win
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
+
+    from d2rpick.deck.card import Card
 
 
 @dataclass(eq=False, repr=False)

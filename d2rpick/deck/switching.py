@@ -1,4 +1,4 @@
-"""Switching cards field by field, and the windows in which they make parts rigid.
+"""Switching cards of LS-DYNA field by field, and the windows in which cards of any solver make parts rigid.
 
 The cards are *DEFORMABLE_TO_RIGID and its variants, and their restart relatives.
 
@@ -15,13 +15,14 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.deck.card import Card, Field, Row, Value
+from d2rpick.deck.card import Card
+from d2rpick.deck.fields import Field, Row, Value
 from d2rpick.deck.reader import SWITCHING, Deck
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from d2rpick.deck.parts import Parts
+    from d2rpick.deck.ls_dyna_parts import Parts
 
 Kind = Literal["automatic", "plain", "inertia", "restart"]
 

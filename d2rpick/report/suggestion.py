@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.answers import AcceptableWindow, Suggestion
     from d2rpick.choice.candidates import Pair
-    from d2rpick.choice.ranking import Quality
+    from d2rpick.choice.quality import Quality
     from d2rpick.report.formats import Shown
 
 # Windows of acceptable tr that a line names.

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, one_line
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.deck.parts import Constraint, Parts, read_constraints, read_parts, read_sections
+from d2rpick.deck.ls_dyna_parts import Constraint, Parts, read_constraints, read_parts, read_sections
 from d2rpick.deck.switching import Event, Header, SwitchSet, Window, Windows, find_windows, read_switching
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
-    from d2rpick.deck.card import Card, Field, Value
+    from d2rpick.deck.card import Card
+    from d2rpick.deck.fields import Field, Value
     from d2rpick.deck.radioss_files import Flaw
     from d2rpick.deck.radioss_run import Run, RunWindows
     from d2rpick.deck.reader import Deck, Unread

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.files import STDIN
-from d2rpick.deck.card import Card, Field, Problem
-from d2rpick.deck.parts import element_cards
+from d2rpick.deck.fields import Field, Problem
+from d2rpick.deck.ls_dyna_parts import element_cards
 from d2rpick.deck.reader import UNKNOWN_KIND, cure, cuts
 from d2rpick.deck.switching import SwitchSet, misspelt
 from d2rpick.rules.base import BOTH, ERROR, INFO, LS_DYNA, WARNING, Case, Example, Objection, rule
@@ -15,6 +15,7 @@ from d2rpick.rules.examples import BACK, END, GOOD, HEAD, PARTS, PASSES, THERE, 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from d2rpick.deck.card import Card
 
 _CURES: Final = {"no such file": "add the file or its *INCLUDE_PATH", UNKNOWN_KIND: "check that file separately"}
 _INNER = THERE + BACK + END

@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Final, Literal
 
 from d2rpick.base.errors import listing
-from d2rpick.deck.parts import Entities, read_entities
+from d2rpick.deck.ls_dyna_parts import Entities, read_entities
 from d2rpick.deck.switching import BY_TIME, Header, SwitchSet, Unit
 from d2rpick.rules.base import ERROR, WARNING, Case, Example, Objection, rule
 from d2rpick.rules.examples import BACK, PASSES, THERE, automatic, deck

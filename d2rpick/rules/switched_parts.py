@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import name_units
 from d2rpick.base.graph import reached
-from d2rpick.deck.parts import Parts, element_cards
+from d2rpick.deck.ls_dyna_parts import Parts, element_cards
 from d2rpick.rules.base import BOTH, ERROR, INFO, WARNING, Case, Example, Objection, grouped, rule
 from d2rpick.rules.examples import BACK, PASSES, THERE, automatic, deck
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
-    from d2rpick.deck.card import Field
+    from d2rpick.deck.fields import Field
     from d2rpick.deck.switching import Event, Header, Switched, SwitchSet, Unit
 
 _NEAREST = 3  # ids that are named in place of one that the deck does not have
@@ -204,7 +204,7 @@ def _torn(case: Case) -> Iterator[Objection]:
     cards = element_cards(case.deck, searched=True)
     if len(set(bodies.values())) < 2 or not cards:
         return
-    from d2rpick.deck.ls_dyna import first_shared_nodes  # loads numpy
+    from d2rpick.deck.ls_dyna_inventory import first_shared_nodes  # loads numpy
 
     for (low, high), node in first_shared_nodes(cards, bodies).items():
         if _together(case, first[low].unit, first[high].unit):
@@ -249,7 +249,7 @@ def _owners(case: Case, parts: Collection[int]) -> dict[int, int]:
     cards = element_cards(case.deck, searched=True)
     if not cards:
         return {}
-    from d2rpick.deck.ls_dyna import first_parts  # loads numpy
+    from d2rpick.deck.ls_dyna_inventory import first_parts  # loads numpy
 
     return first_parts(cards, parts)
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import ArgumentError, DeckError, name_units
 from d2rpick.deck import read_inventory
-from d2rpick.deck.parts import read_entities
+from d2rpick.deck.ls_dyna_parts import read_entities
 from d2rpick.deck.pieces import inner_period, supports_of
 from d2rpick.deck.printed_card import PHYSICS, PrintedCard, Printing, check_ids, comments, shortest
 from d2rpick.deck.printing import Waiting, capped, header, listed, off, to_deformable, to_rigid

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from d2rpick.api.checking import check as checked
-from d2rpick.deck.parts import read_parts
+from d2rpick.deck.ls_dyna_parts import read_parts
 from d2rpick.deck.reader import read_deck
 from d2rpick.deck.switching import find_windows, read_switching
 from d2rpick.rules import check_deck

@@ -9,7 +9,7 @@ import pytest
 from d2rpick.base.errors import ConfigurationError, DeckError, FormatError
 from d2rpick.choice.calibration import Observation, calibrate, observations_of, observations_of_runs
 from d2rpick.choice.cost import MEASURED
-from tests.deck.test_radioss import BEGIN, PROPS, nodes
+from tests.deck.test_radioss_inventory import BEGIN, PROPS, nodes
 from tests.decks import wide
 
 TRUE = {"QBAT": 2.0, "BT": 0.9, "solid": 1.5}

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from d2rpick.report.histories import write_table
+from d2rpick.report.history_files import write_table
 from tests.command import BOX, ENERGY, GLSTAT, ROLLOVER, ROOT, answer, put, replayed, run, unwrapped
 from tests.json_schemas import check_by_schema
 from tests.made_t01 import t01

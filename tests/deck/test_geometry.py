@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from d2rpick.deck import ls_dyna, radioss, read_inventory
+from d2rpick.deck import ls_dyna_inventory, radioss_inventory, read_inventory
 from d2rpick.deck.geometry import Placement, masses_and_steps
 from d2rpick.deck.mesh import Elements
 from d2rpick.deck.model import Inventory
 from d2rpick.deck.radioss_run import read_run
 from tests.command import put
 from tests.computed import starter, stored
-from tests.deck import test_ls_dyna as dyna
-from tests.deck import test_radioss as rad
+from tests.deck import test_ls_dyna_inventory as dyna
+from tests.deck import test_radioss_inventory as rad
 from tests.decks import read, row, wide
 
 RHO, E, NU = 8000.0, 2.0e11, 0.25
@@ -45,7 +45,7 @@ IN_SOLIDS = SPEED * math.sqrt((1 - NU) / ((1 + NU) * (1 - 2 * NU)))
 )  # fmt: skip
 def test_by_hand(tmp_path: Path, section: str, elements: str, mass: float, step: float) -> None:
     part = "*KEYWORD\n*PART\na\n" + row(7, 1, 1, width=10)
-    found = masses_and_steps(ls_dyna.read(read(tmp_path, f"{part}{section}{CARDS}{NODES}{elements}*END\n")))
+    found = masses_and_steps(ls_dyna_inventory.read(read(tmp_path, f"{part}{section}{CARDS}{NODES}{elements}*END\n")))
     assert list(found[7]) == pytest.approx([mass, step])
 
 
@@ -53,19 +53,19 @@ def test_by_hand(tmp_path: Path, section: str, elements: str, mass: float, step:
 def test_what_is_not_in_the_deck_is_not_guessed(tmp_path: Path, lost: str) -> None:
     part = "*KEYWORD\n*PART\na\n" + row(7, 1, 1, width=10)
     text = f"{part}{SHELL}{CARDS}{NODES}*ELEMENT_SHELL\n{row(1, 7, 1, 2, 3, 4)}*END\n".replace(lost, "*OTHER")
-    mass, step = masses_and_steps(ls_dyna.read(read(tmp_path, text)))[7]
+    mass, step = masses_and_steps(ls_dyna_inventory.read(read(tmp_path, text)))[7]
     assert mass is None
     assert (step is None) == (lost != "*SECTION")
 
 
 def test_cards_without_a_usable_element_have_no_mass(tmp_path: Path) -> None:
     part = "*KEYWORD\n*PART\na\n" + row(7, 1, 1, width=10)
-    assert masses_and_steps(ls_dyna.read(read(tmp_path, f"{part}*ELEMENT_SHELL\n{row(1, 7, 1)}*END\n"))) == {}
+    assert masses_and_steps(ls_dyna_inventory.read(read(tmp_path, f"{part}*ELEMENT_SHELL\n{row(1, 7, 1)}*END\n"))) == {}
 
 
 def test_masses_of_the_car_are_those_that_the_solver_printed(tmp_path: Path) -> None:
     (tmp_path / "CAR_0000.rad").write_bytes(starter("CAR"))
-    found = masses_and_steps(radioss.read(read_run(str(tmp_path / "CAR_0000.rad"))))
+    found = masses_and_steps(radioss_inventory.read(read_run(str(tmp_path / "CAR_0000.rad"))))
     lines = Path(stored("car_parts.csv")).read_text("ascii").splitlines()
     head, *rows = (line.split(",") for line in lines)
     for cells in rows:

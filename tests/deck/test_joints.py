@@ -7,8 +7,8 @@ import pytest
 from d2rpick.choice.deck_of_run import bodies_of
 from d2rpick.deck.model import Inventory
 from d2rpick.flight.bodies import RigidBody
-from tests.deck import test_radioss as rad
-from tests.deck.test_ls_dyna import inventory, nodes
+from tests.deck import test_radioss_inventory as rad
+from tests.deck.test_ls_dyna_inventory import inventory, nodes
 from tests.decks import row, wide
 
 # Parts 7, 9 and 11, a shell each, without a node in common: 1 to 4, 5 to 8, 9 to 12.

@@ -10,9 +10,9 @@ from d2rpick.deck.model import Inventory
 from d2rpick.deck.pieces import pieces_of
 from d2rpick.flight.bodies import RigidBody
 from tests import made_car
-from tests.deck import test_radioss as rad
+from tests.deck import test_radioss_inventory as rad
 from tests.deck.test_joints import MESH
-from tests.deck.test_ls_dyna import inventory
+from tests.deck.test_ls_dyna_inventory import inventory
 from tests.decks import row, wide
 
 # Part 1 is a row of shells on the nodes 1 to 40, parts 2 and 3 are one shell each: 41 to 44, 45 to 48.

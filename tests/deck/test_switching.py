@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from d2rpick.deck.ls_dyna import first_shared_nodes
-from d2rpick.deck.parts import element_cards, read_parts
+from d2rpick.deck.ls_dyna_inventory import first_shared_nodes
+from d2rpick.deck.ls_dyna_parts import element_cards, read_parts
 from d2rpick.rules.examples import PARTS, automatic
 from tests.decks import read, spans, wide, windows
 

@@ -21,7 +21,7 @@ from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import Record, simulate
-from d2rpick.report.histories import BOX_WRITERS
+from d2rpick.report.history_files import BOX_WRITERS
 from tests.command import BOX, ENERGY, ROLLOVER, answer, codes, put, run
 from tests.computed import columns, stored
 from tests.json_schemas import check_by_schema

@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 
 from d2rpick.base.errors import DeckError
-from d2rpick.deck import ls_dyna, read_inventory
+from d2rpick.deck import ls_dyna_inventory, read_inventory
 from d2rpick.deck.reader import read_deck
 from d2rpick.rules import Checked, check_deck
-from tests.deck.test_ls_dyna import counted
+from tests.deck.test_ls_dyna_inventory import counted
 from tests.real.files import real
 
 FOUND: dict[str, dict[str, int]] = {
@@ -124,7 +124,7 @@ def test_real_decks_hold_what_a_plain_count_finds() -> None:
         reading = line.upper().startswith(("*ELEMENT_SHELL", "*ELEMENT_BEAM")) if line.startswith("*") else reading
         if reading and line[:1] not in "*$" and line.strip():
             plain[int(line[8:16])] += 1
-    found = ls_dyna.read(read_deck(real("decks/nodes.k")))
+    found = ls_dyna_inventory.read(read_deck(real("decks/nodes.k")))
     assert {part: counts.total() for part, counts in found.counts.items()} == plain
 
 

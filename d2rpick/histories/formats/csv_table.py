@@ -9,7 +9,7 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.database import Database
-from d2rpick.histories.formats import printed
+from d2rpick.histories.formats import printed_numbers
 from d2rpick.histories.formats.curves import Curves, find_curves
 from d2rpick.histories.formats.layout import Layout, find_layout, is_skipped, split, unique
 from d2rpick.histories.formats.table_values import columns_of, line_of
@@ -147,7 +147,7 @@ class Table(Database):
     def time(self) -> Samples:
         """Times as they stand in the file, shape (n,) [time]; FormatError where they are not those of one run."""
         place = partial(line_of, self._text, self._begin, self._layout, self._time)
-        return printed.of_one_run(self._values(self._time), lambda state: f"{self.source}:{place(state)}")
+        return printed_numbers.of_one_run(self._values(self._time), lambda state: f"{self.source}:{place(state)}")
 
     def channel(self, name: str) -> Samples:
         """One column, shape (n,); FormatError with the line of a value that is no number."""
@@ -166,7 +166,7 @@ class Table(Database):
         """How finely the times and these columns were printed."""
         times = [row[self._time] for row in self._printed]
         energies = [row[self._columns[name]] for row in self._printed for name in names]
-        return printed.precisions(times, energies, self.time)
+        return printed_numbers.precisions(times, energies, self.time)
 
     @cached_property
     def _printed(self) -> list[list[str]]:
@@ -216,7 +216,7 @@ def _is_whole(line: str, sample: Sequence[Sequence[str]], layout: Layout, used: 
     last = len(cells) - 1
     if len(cells) < layout.columns or last not in used:
         return len(cells) >= layout.columns
-    return printed.is_whole(cells[last].replace(layout.decimal, "."), [row[last] for row in sample])
+    return printed_numbers.is_whole(cells[last].replace(layout.decimal, "."), [row[last] for row in sample])
 
 
 def write(columns: Mapping[str, Samples]) -> bytes:

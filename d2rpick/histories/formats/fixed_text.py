@@ -19,7 +19,7 @@ from d2rpick.base.errors import FormatError
 from d2rpick.histories.content import content_of, line_at
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, Stretch, head, like_example
-from d2rpick.histories.formats.printed import decode
+from d2rpick.histories.formats.printed_numbers import decode
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Iterator, Sequence

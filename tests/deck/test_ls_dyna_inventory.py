@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from d2rpick.base.errors import DeckError
-from d2rpick.deck import ls_dyna, read_inventory
+from d2rpick.deck import ls_dyna_inventory, read_inventory
 from d2rpick.deck.model import Inventory
 from d2rpick.deck.pieces import pieces_of
 from d2rpick.deck.reader import read_deck
@@ -28,7 +28,7 @@ def nodes(width: int = 8, real: int = 16, count: int = 24) -> str:
 
 
 def inventory(folder: Path, text: str, **files: str) -> Inventory:
-    return ls_dyna.read(read(folder, text, {f"{name}.k": content for name, content in files.items()}))
+    return ls_dyna_inventory.read(read(folder, text, {f"{name}.k": content for name, content in files.items()}))
 
 
 def counted(found: Inventory) -> dict[int, dict[str, int]]:
@@ -194,7 +194,7 @@ def test_counts_and_nodes_agree_with_a_plain_count(
     lines = [(n, part, node, node + 1, node + 2, node + 3) for n, (part, node) in enumerate(shells, start=1)]
     parts = "".join(f"*PART\np\n{part:10d}\n" for part in (1, 2, 3))
     text = f"*KEYWORD\n{parts}*NODE\n{nodes(count=44)}*ELEMENT_SHELL\n{''.join(row(*line) for line in lines)}*END\n"
-    found = ls_dyna.read(read_deck(write(folder, text)))
+    found = ls_dyna_inventory.read(read_deck(write(folder, text)))
     assert {part: counts["shell"] for part, counts in found.counts.items()} == Counter(part for part, _ in shells)
     own = {part: {n for p, node in shells if p == part for n in range(node, node + 4)} for part, _ in shells}
     assert all(found.rigid_nodes([part]) == len(used) for part, used in own.items())

@@ -1,4 +1,4 @@
-"""Parts, sections, sets, rigid materials and constraints of a deck: what the ids on switching cards refer to.
+"""Parts, sections, sets, rigid materials and constraints of an LS-DYNA deck: what ids on switching cards refer to.
 
 Columns: the vendor's keyword data as published in its Python library.
 """
@@ -14,7 +14,8 @@ from d2rpick.base.tuples import NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
 
-    from d2rpick.deck.card import Card, Field, Problem, Row, Value
+    from d2rpick.deck.card import Card
+    from d2rpick.deck.fields import Field, Problem, Row, Value
     from d2rpick.deck.reader import Deck
 
 

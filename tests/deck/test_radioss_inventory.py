@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from d2rpick.deck import radioss, read_inventory
+from d2rpick.deck import radioss_inventory, read_inventory
 from d2rpick.deck.model import Inventory
 from d2rpick.deck.radioss_run import read_run
 from d2rpick.rules import check_deck
 from tests.computed import starter, stored
-from tests.deck.test_ls_dyna import counted
+from tests.deck.test_ls_dyna_inventory import counted
 from tests.decks import wide
 
 BEGIN = "#RADIOSS STARTER\n/BEGIN\nTEST\n      2022         0\n                  kg\n                  kg\n"
@@ -25,7 +25,7 @@ PROPS = (
 
 def inventory(folder: Path, text: str) -> Inventory:
     (folder / "TEST_0000.rad").write_text(BEGIN + text + "/END\n")
-    return radioss.read(read_run(str(folder / "TEST_0000.rad")))
+    return radioss_inventory.read(read_run(str(folder / "TEST_0000.rad")))
 
 
 def nodes(count: int) -> str:
@@ -107,11 +107,11 @@ def test_a_starter_deck_that_ends_within_its_mesh_is_doubted(tmp_path: Path) -> 
     deck = tmp_path / "TEST_0000.rad"
     for end in range(text.rindex("/SHELL/1") + 9, len(text) + 1):
         deck.write_text(text[:end])
-        found = radioss.read(read_run(str(deck)))
+        found = radioss_inventory.read(read_run(str(deck)))
         assert (sum("is it cut" in note for note in found.notes), found.complete) == (1, False)
         assert [finding.rule for finding in check_deck(str(deck)).findings] == ["D2R011"]
     deck.write_text(f"{text}/END\n")
-    assert radioss.read(read_run(str(deck))).complete
+    assert radioss_inventory.read(read_run(str(deck))).complete
 
 
 def test_titles_may_be_empty(tmp_path: Path) -> None:

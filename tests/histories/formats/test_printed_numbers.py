@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from d2rpick.histories.formats.printed import decode
+from d2rpick.histories.formats.printed_numbers import decode
 
 
 @given(st.lists(st.floats(-1e308, 1e308), min_size=1, max_size=50), st.integers(1, 9))

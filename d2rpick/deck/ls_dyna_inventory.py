@@ -11,15 +11,16 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.deck import formulations, ls_dyna_loads
-from d2rpick.deck.card import LONG, Card
+from d2rpick.deck.fields import LONG
+from d2rpick.deck.ls_dyna_parts import Parts, SectionCard, material_of, read_parts, read_sections
 from d2rpick.deck.mesh import Mesh, layout, lines_of
 from d2rpick.deck.model import Formulation, Inventory, Material, PartData, Section, placed
-from d2rpick.deck.parts import Parts, SectionCard, material_of, read_parts, read_sections
 from d2rpick.deck.reader import Deck, cuts, holds_mesh
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
 
+    from d2rpick.deck.card import Card
     from d2rpick.deck.mesh import Integers, Layout, Lines, Reals
 
 
