@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 from hypothesis import strategies as st
@@ -15,7 +14,6 @@ from tests import paper
 
 # y - z = -V0 exp(-alpha t/2) sin(omega t)/omega, eq. (7), with V0 = 6 m/s and k = 660e3 N/m
 MODE = Mode(paper.OMEGA_2, 50.0, 0.0, -6.0 / paper.OMEGA_2 * (660e3 / 2) ** 0.5, 0.0)
-Found = TypeVar("Found")
 MODES = st.builds(
     Mode,
     omega=st.floats(1, 50),
@@ -33,12 +31,6 @@ def vibration(parameters: Samples) -> Mode:
     """Mode without plastic work and preload, from omega, alpha, cosine and sine."""
     omega, alpha, cosine, sine = parameters.tolist()
     return Mode(omega, alpha, cosine, sine, 0.0)
-
-
-def known(found: Found | None) -> Found:
-    """What must have been found."""
-    assert found is not None
-    return found
 
 
 def table(time: Samples, energy: Samples, *momenta: Momenta, balance: Balance | None = None) -> History:

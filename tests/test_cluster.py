@@ -72,10 +72,7 @@ def test_a_study_on_a_cluster_outlives_the_death_of_a_worker(tmp_path: Path) -> 
     expected = json.loads(run(*variants.STUDY, "-f", "json", *sources, sources[0]).stdout)
     slow, ledger = tmp_path / "slow.csv", tmp_path / "ledger.ndjson"
     os.mkfifo(slow)  # whoever reads it waits
-    with (
-        cluster(tmp_path, ("one", "two")) as (address, workers),
-        Client(address, set_as_default=False) as client,
-    ):
+    with cluster(tmp_path, ("one", "two")) as (address, workers), Client(address, set_as_default=False) as client:
         client.wait_for_workers(2, timeout=PATIENCE)
         args = ("study", "--td", str(variants.TD), "--scheduler", address, "-f", "json", "--resume", str(ledger))
         names = [os.path.relpath(name, ROOT) for name in (*sources, str(slow))]

@@ -17,17 +17,7 @@ from d2rpick.cli import COMMANDS
 from d2rpick.histories.opening import READERS
 from d2rpick.rules import RULES, read_configuration
 from tests.command import DECK, ENERGY, GLSTAT, ROOT, run
-from tests.examples import (
-    PAGES,
-    blocks,
-    folder_of_a_reader,
-    languages,
-    printed,
-    prose,
-    rounded,
-    sessions,
-    text_of,
-)
+from tests.examples import PAGES, blocks, folder_of_a_reader, languages, printed, prose, rounded, sessions, text_of
 
 README = text_of("README.md")
 ALL = "\n".join(text_of(page) for page in PAGES)

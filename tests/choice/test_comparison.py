@@ -276,8 +276,7 @@ def test_csv_and_markdown_hold_the_comparison_too(replayed: Callable[..., str]) 
 
 
 @pytest.mark.parametrize(
-    ("content", "says"),
-    [("", "the file is empty"), ("time,energy\n0,1\n0.01,1\n", "energy"), ("a,b\n1,x\n", "number")],
+    ("content", "says"), [("", "the file is empty"), ("time,energy\n0,1\n0.01,1\n", "energy"), ("a,b\n1,x\n", "number")]
 )
 def test_what_is_wrong_with_the_switched_file_names_it(
     content: str, says: str, tmp_path: Path, replayed: Callable[..., str]

@@ -26,10 +26,7 @@ from tests.command import ROOT
 from tests.energies import sure
 from tests.reading import read
 
-SAMPLES = {
-    "energy.csv": Selection(),
-    "rollover_box.matsum": Selection(parts=("box",)),
-}
+SAMPLES = {"energy.csv": Selection(), "rollover_box.matsum": Selection(parts=("box",))}
 
 
 def reference(history: History) -> Reference:

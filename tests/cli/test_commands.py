@@ -341,8 +341,7 @@ def examples(command: str) -> list[list[str]]:
 
 @pytest.mark.usefixtures("by_level")
 @pytest.mark.parametrize(
-    "command",
-    [pytest.param(one, marks=pytest.mark.slow) if one in SLOW else one for one in ("", *COMMANDS)],
+    "command", [pytest.param(one, marks=pytest.mark.slow) if one in SLOW else one for one in ("", *COMMANDS)]
 )
 @pytest.mark.usefixtures("here")
 def test_every_help_ends_with_examples_that_run(command: str, monkeypatch: pytest.MonkeyPatch) -> None:

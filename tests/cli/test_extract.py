@@ -55,8 +55,7 @@ def test_from_csv_to_hdf5_and_back_the_file_is_the_same(tmp_path: Path) -> None:
 @pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(
-    times=st.lists(NUMBERS, min_size=2, max_size=20, unique=True),
-    energy=st.lists(NUMBERS, min_size=20, max_size=20),
+    times=st.lists(NUMBERS, min_size=2, max_size=20, unique=True), energy=st.lists(NUMBERS, min_size=20, max_size=20)
 )
 def test_any_numbers_read_back_bit_for_bit(
     tmp_path_factory: pytest.TempPathFactory, times: list[float], energy: list[float]

@@ -152,9 +152,9 @@ def test_what_is_beyond_a_bound_is_told_unless_the_environment_raises_it(name: s
     make, bound, said = BEYOND[name]
     (tmp_path / name).write_bytes(make())
     command = "check" if name.endswith(".k") else "info"
-    said = refused(command, str(tmp_path / name))
-    assert said in said
-    assert f"set D2RPICK_MAX_{bound} higher" in said
+    told = refused(command, str(tmp_path / name))
+    assert said in told
+    assert f"set D2RPICK_MAX_{bound} higher" in told
     raised = run(command, str(tmp_path / name), env={f"D2RPICK_MAX_{bound}": "1e9"})
     assert "D2RPICK_MAX" not in raised.stderr
 

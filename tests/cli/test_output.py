@@ -210,10 +210,7 @@ def test_colour_is_for_terminals_unless_asked_for(env: dict[str, str], coloured:
 
 @pytest.mark.parametrize(
     ("args", "line"),
-    [
-        ((*VERIFY, "--no-verify", ENERGY), "verdict  "),
-        (("check", DECK, "--history", ENERGY), r"  \S+:43:21: error"),
-    ],
+    [((*VERIFY, "--no-verify", ENERGY), "verdict  "), (("check", DECK, "--history", ENERGY), r"  \S+:43:21: error")],
 )
 def test_what_is_judged_stands_out_too(args: tuple[str, ...], line: str) -> None:
     assert re.search(rf"\x1b\[1m{line}", run(*args, env={"FORCE_COLOR": "1"}).stdout)

@@ -14,8 +14,8 @@ from d2rpick.flight.position_error import MOST_OF_PATH, Drift
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Part
 from tests.computed import results
+from tests.energies import sure
 from tests.reading import solved
-from tests.records import known
 
 TIME = np.linspace(0.0, 1.0, 11)
 
@@ -35,7 +35,7 @@ def test_the_largest_error_counts_with_its_part_and_its_body(rates: list[float],
     found = Bodies([drift(i, rate) for i, rate in enumerate(rates)], told(*((i, i + 10) for i in range(len(rates)))))
     errors = [rate * (0.95 - tr) for rate in rates]
     assert found.errors(np.array([tr]), 0.95)[0] == pytest.approx(max(errors))
-    worst = known(found.worst(tr, 0.95))
+    worst = sure(found.worst(tr, 0.95))
     assert worst.error == pytest.approx(max(errors))
     assert not worst.assumed
     if worst.error:
@@ -56,7 +56,7 @@ def test_one_body_that_is_not_known_leaves_all_open() -> None:
 
 
 def test_without_a_deck_one_body_is_assumed() -> None:
-    worst = known(Bodies([drift(1, 1.0)], None).worst(0.1, 0.9))
+    worst = sure(Bodies([drift(1, 1.0)], None).worst(0.1, 0.9))
     assert (worst.assumed, worst.body) == (True, None)
 
 
@@ -94,7 +94,7 @@ def test_of_the_bodies_of_the_car_that_of_many_parts_is_off() -> None:
     alone = bodies_in_flight(*car("1-11,13"), told(frame))
     tr = np.array([0.04, 0.0496, 0.09])
     np.testing.assert_allclose(found.errors(tr, 0.1464), alone.errors(tr, 0.1464))
-    worst = known(found.worst(0.0496, 0.1464))
+    worst = sure(found.worst(0.0496, 0.1464))
     assert worst.body == RigidBody(frame)
     assert worst.error < 1e-3  # without engine and wheels; with them 2.2 mm
 

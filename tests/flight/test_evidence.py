@@ -24,8 +24,9 @@ from d2rpick.models.box_run import Record, simulate
 from d2rpick.report.history_files import BOX_WRITERS
 from tests.command import BOX, ENERGY, ROLLOVER, answer, codes, put, run
 from tests.computed import columns, stored
+from tests.energies import sure
 from tests.json_schemas import check_by_schema
-from tests.records import known, table
+from tests.records import table
 from tests.sample_box import t01
 
 MILLISECOND = 1e-3
@@ -147,11 +148,11 @@ def test_the_energy_balance_tells_the_flight_where_there_is_neither(rolled: Roll
     whole = history_of(rolled.file("glstat"))
     time, energy = whole.time[::2], whole.energy[::2]
     written = {name: getattr(whole.balance, name)[::2] for name in ("internal", "kinetic", "external_work")}
-    history = table(time, energy, balance=Balance(time, **written, precision=known(whole.balance).precision))
+    history = table(time, energy, balance=Balance(time, **written, precision=sure(whole.balance).precision))
     flight = examine(history, (rolled.start + rolled.end) / 2, Settings(replay=False)).flight
     assert flight.source == "energy-balance"
     # damping bends the parabola of the work of gravity: less than the flight is found then, never more
-    start, end = known(flight.start), known(flight.end)
+    start, end = sure(flight.start), sure(flight.end)
     assert rolled.start - 4 * MILLISECOND <= start < end <= rolled.end + 4 * MILLISECOND
     assert seen_flight(history, rolled.end + 0.02).refusal
 
@@ -190,19 +191,19 @@ def test_all_flights_of_runs_of_a_solver_are_found(
 
 def test_the_last_weak_pushes_of_a_load_belong_to_it() -> None:
     history = history_of(CAR)
-    assert 0.0385 <= known(examine(history, 0.146, Settings(replay=False)).flight.start) <= 0.0390
+    assert 0.0385 <= sure(examine(history, 0.146, Settings(replay=False)).flight.start) <= 0.0390
 
 
 @pytest.mark.slow
 def test_in_a_free_fall_there_is_nothing_to_match() -> None:
     history = history_of(DROP)
     found = suggest(history, 0.2838, Settings())
-    assert (known(found.recommended).tr, found.candidates[0].kind) == (0.0, "start")
+    assert (sure(found.recommended).tr, found.candidates[0].kind) == (0.0, "start")
     assert "at-rest" in {caution.code for caution in found.cautions}
-    assert known(found.windows)[0][:2] == pytest.approx((0.0, 0.2838), abs=1e-4)
+    assert sure(found.windows)[0][:2] == pytest.approx((0.0, 0.2838), abs=1e-4)
     assert all(verify_at(found.situation, tr).verified for tr in (0.0, 0.1, 0.28))
     alone = suggest(table(history.time, history.energy), 0.2838, Settings())
-    assert known(alone.recommended).tr == 0.0
+    assert sure(alone.recommended).tr == 0.0
 
 
 @pytest.mark.parametrize(
@@ -237,7 +238,7 @@ def test_a_contact_between_two_flights_on_one_level_ends_the_first() -> None:
     load = 400 * np.exp(-(((time - 0.2) / 0.05) ** 2))
     contact = 80 * np.exp(-(((time - 0.8) / 0.01) ** 2))  # brief, in the last quarter before td
     energy = 190 + 5 * np.sin(250 * time) + load + contact
-    quiet = known(quiet_time(table(time, np.where(time < 0.1, 0, energy)), 0.95))
+    quiet = sure(quiet_time(table(time, np.where(time < 0.1, 0, energy)), 0.95))
     assert quiet.start > 0.81
 
 

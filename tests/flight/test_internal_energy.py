@@ -17,7 +17,8 @@ from d2rpick.histories.history import EXACT, Balance, History, Momenta, Precisio
 from d2rpick.histories.names import Part
 from d2rpick.histories.samples import integral
 from tests.benchmarks import flights as campaign
-from tests.records import known, printed, table
+from tests.energies import sure
+from tests.records import printed, table
 
 PLAIN = Settings(replay=False)
 TIME = np.linspace(0.0, 1.0, 1001)
@@ -52,7 +53,7 @@ def test_under_random_loads_no_flight_is_claimed_in_which_the_momentum_still_cha
 def test_the_flight_behind_a_load_that_fades_is_found(gravity: float, fade: np.ufunc) -> None:
     force = 1e4 * (gravity or 1.0) * fade(TIME)
     impulse = np.concatenate([[0.0], np.cumsum((force[1:] + force[:-1]) / 2) * np.diff(TIME)])
-    found = known(flight_around(momenta(impulse - 10.0 * gravity * TIME), 0.9))
+    found = sure(flight_around(momenta(impulse - 10.0 * gravity * TIME), 0.9))
     start = int(np.searchsorted(TIME, found.start))
     assert impulse[-1] - impulse[start] < 0.01 * np.abs(impulse).max()
     assert found.start < 0.6
@@ -96,7 +97,7 @@ def aslant(along_x: Samples, along_z: Samples) -> Momenta:
 @pytest.mark.parametrize("gravity", [0.0, 9.81])
 def test_behind_a_power_law_little_may_still_change_and_gravity_shows_across_it(gravity: float) -> None:
     impulse = impulse_of(5e3 * (1 + TIME / 0.1) ** -3.1)
-    found = known(flight_around(aslant(0.8 * impulse, 0.6 * impulse - 10 * gravity * TIME), 0.95))
+    found = sure(flight_around(aslant(0.8 * impulse, 0.6 * impulse - 10 * gravity * TIME), 0.95))
     assert found.gravity == pytest.approx(gravity, rel=1e-3)
     left = impulse[-1] - impulse[int(np.searchsorted(TIME, found.start))]
     assert 0.001 * impulse[-1] < left < 0.01 * impulse[-1]
@@ -105,7 +106,7 @@ def test_behind_a_power_law_little_may_still_change_and_gravity_shows_across_it(
 def test_a_push_that_balances_the_weight_for_a_moment_is_no_flight() -> None:
     push = 3e2 * np.sin(np.pi * np.minimum(TIME / 0.6, 1))
     body = aslant(0.8 * impulse_of(push), 0.6 * impulse_of(push) - 98.1 * TIME)
-    found = known(flight_around(body, 0.9))
+    found = sure(flight_around(body, 0.9))
     assert found.start == pytest.approx(0.6, abs=0.02)
     assert not [td for td in np.linspace(0.02, 0.58, 29) if flight_around(body, td)]
 
@@ -129,7 +130,7 @@ def test_what_is_carried_does_not_fly_and_does_not_hide_what_falls() -> None:
     carried = 30 + 20 * np.sin(np.minimum(TIME, 0.3) * 40)
     both = momenta(carried, falling, masses=(10.0, 40.0))
     assert flight_around(both.choosing((0,)), 0.6) is None
-    found = known(flight_around(both.choosing((1,)), 0.6))
+    found = sure(flight_around(both.choosing((1,)), 0.6))
     assert found.gravity == pytest.approx(9.81, rel=1e-3)
 
 
@@ -137,7 +138,7 @@ def test_bodies_that_hit_each_other_fly_each_for_itself() -> None:
     hit = np.clip((TIME - 0.3) / 0.1, 0, 1)
     body = momenta(50 - 60 * hit, 60 * hit - 10, axis=0)
     assert bodies_apart(body, (0, 1)) == (0, 1)
-    found = known(flight_around(body, 0.7))
+    found = sure(flight_around(body, 0.7))
     assert found.start == pytest.approx(0.4, abs=0.01)
     assert flight_around(body, 0.35) is None
 
@@ -164,7 +165,7 @@ def test_a_spring_to_ground_does_not_fly(kept: float) -> None:
     """All of its kinetic energy is that of the vibration; what flies keeps some where the deformation turns."""
     internal = 100 * np.sin(60 * TIME) ** 2
     history = totals(internal, 100 - internal + kept - 10 * np.maximum(0.05 - TIME, 0))
-    balance = known(history.balance)
+    balance = sure(history.balance)
     assert moves_as_a_whole(balance, 0.1, 1.0) is (kept > 0)
     assert bool(flights_of(history, PLAIN)) is (kept > 0)
 
@@ -215,14 +216,14 @@ def test_a_momentum_that_stays_while_a_load_works_is_prescribed() -> None:
     stored = np.exp(-(((TIME - 0.2) / 0.05) ** 2))  # by a contact for a while
     fallen = replace(energies, kinetic=8e3 * (1.5 - wound - 0.2 * stored))
     (flight,) = flights_of(table(TIME, 8e3 * wound, whole, balance=fallen), PLAIN)
-    assert known(flight.start) == pytest.approx(0.4, abs=0.02)  # two bodies have hit each other
+    assert sure(flight.start) == pytest.approx(0.4, abs=0.02)  # two bodies have hit each other
 
 
 def test_what_loses_more_energy_than_its_vibration_has_is_not_damped() -> None:
     """A stiff body that a constant force slows down rings as one oscillator, and it pushes a weak vibration on."""
     ringing = 1e-6 * np.sin(300 * TIME) ** 2
     found = suggest(totals(ringing, 50 - 10 * TIME + 2 * TIME**2), 0.8, PLAIN)
-    assert known(found.quality).grade == "poor"
+    assert sure(found.quality).grade == "poor"
     assert found.situation.flight.unknown_load
 
 

@@ -28,8 +28,9 @@ from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Run, Selection
 from tests.command import BOX, ENERGY, GLSTAT, answer, refused, run
 from tests.computed import stored
+from tests.energies import sure
 from tests.reading import read, solved
-from tests.records import known, printed
+from tests.records import printed
 
 PARTS = (Part(1, "box"), Part(2, "step"), Part(3, "sled"))
 MASSES = np.array([300.0, 78.0])
@@ -153,7 +154,7 @@ def test_the_flight_of_two_bodies_is_found_to_a_few_states_whatever_they_exchang
     momenta = flown(
         trip(start, end), alpha=alpha, frequency=frequency, share=share, states=states, digits=digits
     )  # fmt: skip
-    found = known(flight_around(momenta, td))
+    found = sure(flight_around(momenta, td))
     assert found.parts == PARTS[:2]
     # In these times the forces change the momentum by two thousandths of its range.
     load, contact = 5e-3 * start, 5e-4
@@ -197,7 +198,7 @@ def test_a_driven_sled_that_stops_is_not_counted_with_the_parts_that_fly(sled: f
 
 def test_the_set_that_flies_together_can_be_named() -> None:
     named = replace(flown(trip(), sled=1e3), flying=(0, 1))
-    found = known(flight_around(named, TD))
+    found = sure(flight_around(named, TD))
     assert found.parts == PARTS[:2]
     assert flight_around(replace(named, flying=(0,)), TD) is None
     assert flight_around(replace(named, flying=(0, 1, 2)), TD) is None  # what stands does not fall with the others
@@ -210,7 +211,7 @@ def test_attached_parts_are_found_among_many() -> None:
     values = np.concatenate([others[:, :15], pair.values, others[:, 15:]], axis=1)
     parts = tuple(Part(number, f"part {number}") for number in range(1, 33))
     masses = np.array([*np.ones(15), *MASSES, *np.ones(15)])
-    found = known(flight_around(Momenta(pair.time, values, parts, EXACT, chosen=(15,), masses=masses), TD))
+    found = sure(flight_around(Momenta(pair.time, values, parts, EXACT, chosen=(15,), masses=masses), TD))
     assert found.parts == (parts[15], parts[16])
 
 
@@ -230,7 +231,7 @@ def test_all_flights_of_a_run_are_listed_and_the_one_around_td_is_taken() -> Non
     assert [f.end_seen for f in flights] == [True, True, False]
     assert all(one.end <= next_one.start for one, next_one in pairwise(flights))
     for flight in flights:
-        around = known(flight_around(momenta, (flight.start + flight.end) / 2))
+        around = sure(flight_around(momenta, (flight.start + flight.end) / 2))
         assert (around.start, around.end) == pytest.approx((flight.start, flight.end), abs=1e-3)
 
 
@@ -298,7 +299,7 @@ def test_a_flight_after_a_computed_load_begins_when_the_load_is_over(run: str, s
     table = np.genfromtxt(stored(f"load_{run}_ref.csv.gz"), delimiter=",", names=True)
     values = np.zeros((table.size, 1, 3))
     values[:, 0, 0] = table["momentum_x_solver"]
-    found = known(flight_around(Momenta(table["time_s"], values, None, Precision(7), chosen=(0,)), 0.1))
+    found = sure(flight_around(Momenta(table["time_s"], values, None, Precision(7), chosen=(0,)), 0.1))
     assert found.start == pytest.approx(start, abs=1e-4)
     assert not found.end_seen
 

@@ -14,8 +14,8 @@ from d2rpick.flight.turning import Flying
 from d2rpick.histories.history import EXACT, Momenta, Samples
 from d2rpick.histories.names import Part
 from tests.computed import results
+from tests.energies import sure
 from tests.reading import solved
-from tests.records import known
 
 TIME = np.linspace(0.0, 0.1, 401)
 FLIGHT = (0.0, 0.1)
@@ -54,7 +54,7 @@ def sliding(way: Samples, part: int = ENGINE) -> Samples:
 
 
 def drift(found: Momenta, masses: Samples = MASSES) -> Drift:
-    return known(drift_of(Flying(found, masses, range(masses.size), *FLIGHT)))
+    return sure(drift_of(Flying(found, masses, range(masses.size), *FLIGHT)))
 
 
 @pytest.mark.slow
@@ -96,7 +96,7 @@ def test_a_rigid_body_is_where_it_should_be() -> None:
 
 
 def test_beyond_the_flight_nothing_is_known() -> None:
-    found = known(drift_of(Flying(momenta(np.zeros(3), sliding(np.ones(3) / 100)), MASSES, range(5), 0.02, 0.08)))
+    found = sure(drift_of(Flying(momenta(np.zeros(3), sliding(np.ones(3) / 100)), MASSES, range(5), 0.02, 0.08)))
     assert np.isnan(found.errors(np.array([0.01, 0.05]), 0.07)).tolist() == [True, False]
     assert np.isnan(found.errors(np.array([0.05]), 0.09)).all()
 
@@ -143,7 +143,7 @@ def test_without_rotation_a_slow_swing_passes_for_nothing() -> None:
 def computed_drift(name: str, parts: str, flight: tuple[float, float]) -> Drift:
     """By the momenta of a run that a solver computed."""
     history = solved(name, parts).history
-    return known(drift_of(Flying(history.momenta[0], known(history.masses), history.momenta[0].chosen, *flight)))
+    return sure(drift_of(Flying(history.momenta[0], sure(history.masses), history.momenta[0].chosen, *flight)))
 
 
 def errors(name: str, parts: str, flight: tuple[float, float], tr: list[float], td: float) -> Samples:
@@ -203,7 +203,7 @@ def test_a_set_that_leaves_the_first_landing_part_out_is_off_as_far() -> None:
 def test_the_parts_to_be_switched_count_and_only_in_a_flight_that_momenta_show() -> None:
     history = solved("carT01.gz", "1-17").history
     flight = find_flight(history, 0.14, None, seen_flight(history, 0.14), None)
-    found = known(drift_in_flight(history, flight))
+    found = sure(drift_in_flight(history, flight))
     assert found.part.title == "engine"
     assert found.errors(np.array([0.0496]), 0.1464)[0] == pytest.approx(2.2e-3, abs=1e-3)
     assert drift_in_flight(history, flight, [found.part]) is None

@@ -21,8 +21,8 @@ from d2rpick.histories.history import EXACT, Momenta, Samples
 from d2rpick.histories.names import Part
 from tests.command import put
 from tests.computed import results, starter
+from tests.energies import sure
 from tests.reading import solved
-from tests.records import known
 
 TIME = np.linspace(0.0, 0.1, 401)
 PLACES = np.array([[1.5, 0.7, 0.1], [1.4, -0.7, 0.0], [-1.5, 0.6, 0.2], [-1.3, -0.7, 0.6], [0.9, 0.1, 0.3]])
@@ -126,12 +126,12 @@ def still() -> Samples:
 
 
 def test_without_a_deck_the_angle_is_not_known() -> None:
-    found = known(drift(still(), None))
+    found = sure(drift(still(), None))
     assert np.isnan(found.angles(TIME[80:120], 0.09)).all()
 
 
 def test_beyond_the_flight_no_angle_is_known() -> None:
-    found = known(drift(still(), placement()))
+    found = sure(drift(still(), placement()))
     assert np.isnan(found.angles(np.array([0.005, 0.05]), 0.09)).tolist() == [True, False]
     assert np.isnan(found.angles(np.array([0.05]), 0.11)).all()
 
@@ -139,7 +139,7 @@ def test_beyond_the_flight_no_angle_is_known() -> None:
 def test_a_deck_with_the_parts_in_other_places_or_without_one_tells_no_angle() -> None:
     other, without = placement(places=PLACES[[1, 2, 3, 0, 4]]), placement()
     without.parts.pop(2)  # type: ignore[attr-defined]
-    assert [known(drift(still(), deck)).turning for deck in (other, without)] == [None, None]
+    assert [sure(drift(still(), deck)).turning for deck in (other, without)] == [None, None]
 
 
 def test_what_flies_with_a_body_holds_it() -> None:
@@ -149,7 +149,7 @@ def test_what_flies_with_a_body_holds_it() -> None:
     inside = PLACES + slides
     where = inside - np.einsum("p,npi->ni", MASSES / MASSES.sum(), inside)[:, np.newaxis]
     where += np.outer(TIME, [4.0, -2.5, -1.0])[:, np.newaxis]
-    without = known(drift(where, None, members=(0, 1, 2, 4)))
+    without = sure(drift(where, None, members=(0, 1, 2, 4)))
     expected = MASSES[ENGINE] / MASSES.sum() * 0.5 * 0.03
     assert without.errors(np.array([0.05]), 0.08)[0] == pytest.approx(expected, rel=1e-3)
 
@@ -161,7 +161,7 @@ def test_a_body_that_bends_more_than_it_is_said_to_turn_makes_the_angle_a_lower_
 ) -> None:
     where = still().copy()
     where[:, :ENGINE, 2] += bends * np.outer(np.sin(40.0 * TIME), [1.0, -1.0, 1.0, -1.0])  # it is twisted
-    found = known(drift(where, placement()))
+    found = sure(drift(where, placement()))
     assert found.at_least is bound
 
 

@@ -14,8 +14,9 @@ from d2rpick.running.drive import Looks
 from d2rpick.running.sequence import Window
 from d2rpick.running.swing import swing_in
 from tests.command import ENERGY, ROOT, run
+from tests.energies import sure
 from tests.reading import read_history, solved
-from tests.records import known, table
+from tests.records import table
 
 CAR = ROOT / "tests" / "data" / "carT01.gz"
 FREE, TD = 0.0385, 0.1464
@@ -26,15 +27,15 @@ def car() -> tuple[History, Drift]:
     """A computed run, and how its bodies drift in its flight."""
     history = solved("carT01.gz").history
     (momenta,) = (one for one in history.momenta if one.parts is not None)
-    moving = tuple(known(momenta.parts)[i] for i in momenta.moving)
-    return history, known(drift_in_flight(history, Flight(FREE, TD, "momentum", moving)))
+    moving = tuple(sure(momenta.parts)[i] for i in momenta.moving)
+    return history, sure(drift_in_flight(history, Flight(FREE, TD, "momentum", moving)))
 
 
 @pytest.mark.parametrize("tr", [0.0605, 0.0676, 0.075, 0.09])
 def test_what_a_flight_shows_up_to_tr_is_about_the_error_at_td(tr: float) -> None:
     history, whole = car()
     error = float(whole.errors(np.array([tr]), float(whole.time[-1]))[0])
-    found = known(swing_in(history, FREE, tr))
+    found = sure(swing_in(history, FREE, tr))
     assert found.name == "engine"
     assert error <= found.error <= 1.3 * error
     # a flight of that length has a path of a hundred times the error, at the speed so far
@@ -51,7 +52,7 @@ def test_of_two_parts_the_most_that_the_heavy_one_may_be_off_is_told(swings: flo
     swing = 30.0 * swings * 50 * np.pi * np.sin(50 * np.pi * time)
     values[:, 0, 0], values[:, 1, 0] = swing, -swing
     momenta = Momenta(time, values, (Part(1, "shell"), Part(2, "block")), EXACT, (0, 1), masses=masses)
-    found = known(swing_in(table(time, np.zeros(time.size), momenta), 0.0, 0.06))
+    found = sure(swing_in(table(time, np.zeros(time.size), momenta), 0.0, 0.06))
     assert found.name == "block"
     assert found.error == pytest.approx(2 * swings, abs=1e-5)
     assert "at most" in found.told

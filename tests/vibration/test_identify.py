@@ -107,9 +107,7 @@ def test_two_modes_are_taken_for_one_in_at_most_5_percent() -> None:
 
 
 @given(
-    st.floats(-1e3, 1e3),
-    st.floats(-6, 6).map(lambda power: 10**power),
-    st.floats(-6, 6).map(lambda power: 10**power),
+    st.floats(-1e3, 1e3), st.floats(-6, 6).map(lambda power: 10**power), st.floats(-6, 6).map(lambda power: 10**power)
 )
 def test_shifting_and_scaling_the_record_shifts_and_scales_the_mode(shift: float, slower: float, larger: float) -> None:
     time = (TIME[:600] + shift / 1e3) * slower

@@ -21,8 +21,9 @@ from d2rpick.vibration.part_signs import MOST_UNSIGNED, PartMotion, SignedParts
 from d2rpick.vibration.waves import Waves
 from tests import chain
 from tests.command import BOX
+from tests.energies import sure
 from tests.reading import solved
-from tests.records import known, printed
+from tests.records import printed
 
 PLAIN = Settings()
 NAMES = ("IE_spring1_J", "IE_spring2_J")
@@ -155,7 +156,7 @@ def test_the_residual_of_switched_runs_is_predicted(estimated: bool) -> None:
 
 def test_parts_that_vibrate_no_more_than_a_solver_errs_have_no_residual() -> None:
     situation = seen(chain.TD_LATE)
-    parts = known(situation.evidence.parts)
+    parts = sure(situation.evidence.parts)
     started = Waves(
         np.array([-300 + 900j]), np.array([101 * np.sqrt(parts.vibration_energy(chain.TD_LATE))]), parts.time[0]
     )
@@ -171,7 +172,7 @@ def test_parts_that_vibrate_no_more_than_a_solver_errs_have_no_residual() -> Non
 
 
 def test_the_signs_of_both_springs_are_right_in_every_switched_run() -> None:
-    parts = known(seen(chain.TD_LATE).evidence.parts)
+    parts = sure(seen(chain.TD_LATE).evidence.parts)
     for run in chain.scan():
         product = np.prod(deformations(parts, np.array([run["tr_s"], run["td_s"]])), axis=1)
         assert (product > 0).tolist() == [run["sign1"] > 0, run["sign2"] > 0]

@@ -11,7 +11,8 @@ from d2rpick.vibration.measures import kinetic_share, lock_in_error
 from d2rpick.vibration.part_signs import SignedParts, all_zeros, by_own_modes, followed
 from d2rpick.vibration.waves import Waves
 from tests.benchmarks.promise_parts import Motion, history
-from tests.records import known, noisy
+from tests.energies import sure
+from tests.records import noisy
 
 TIME = np.arange(0, 0.4, 4e-4)
 NAMES = ("A", "B")
@@ -57,7 +58,7 @@ def test_minima_that_stay_above_zero_prove_no_sign() -> None:
     (zeros,) = all_zeros(TIME, np.sqrt(energy)[np.newaxis])
     tracked = np.where(np.searchsorted(zeros.sure, TIME) % 2, -1, 1) * np.sqrt(energy)
     assert followed(TIME, tracked, zeros) is None
-    own = known(by_own_modes(TIME, energy, None))
+    own = sure(by_own_modes(TIME, energy, None))
     assert len(own.model.amplitudes(TIME)) == 2
 
 

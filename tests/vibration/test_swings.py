@@ -10,7 +10,8 @@ from d2rpick.choice.answers import suggest
 from d2rpick.choice.question import Settings
 from d2rpick.histories.history import Samples
 from d2rpick.vibration.swings import count_swings
-from tests.records import known, table
+from tests.energies import sure
+from tests.records import table
 
 TIME: Samples = np.linspace(0.0, 30.0, 1201)
 
@@ -29,7 +30,7 @@ def stiffening(by: float, alpha: float) -> tuple[Samples, Samples]:
 @pytest.mark.parametrize("lifted", [0.0 * TIME, 40.0 + 0.0 * TIME, 0.02 * TIME, -0.02 * TIME])
 def test_every_minimum_on_the_floor_is_a_passage_through_zero(by: float, alpha: float, lifted: Samples) -> None:
     x, energy = stiffening(by, alpha)
-    found = known(count_swings(TIME, energy + lifted))
+    found = sure(count_swings(TIME, energy + lifted))
     counted = found.amplitudes(TIME)[0]
     unclear = found.unclear
     assert np.all((unclear == TIME[1]) | (unclear > TIME[-1] - np.pi))

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from d2rpick.vibration.waves import Waves, fit_waves
-from tests.records import known
+from tests.energies import sure
 
 MADE = Waves(np.array([-0.1 + 5j, -0.1 + 8j, -0.1 + 13j]), np.array([1 + 0.3j, -0.6j, 0.2]), 0.0)
 TIME = np.linspace(0, 9, 700)
@@ -17,7 +17,7 @@ def test_waves_are_found_again(rate: float, ratio: float, damping: float, phase:
     rates = -damping + 1j * rate * np.array([1.0, ratio, 1.6 * ratio])
     made = Waves(rates, np.exp(1j * phase * np.arange(3)), 0.0)
     time = TIME if even else TIME + 0.001 * np.sin(40 * TIME)
-    found = known(fit_waves(time, made.deformation(time)))
+    found = sure(fit_waves(time, made.deformation(time)))
     room = (1e-6 if even else 0.02) * made.vibration_energy(time)
     assert np.all(np.abs(found.energy(time) - made.energy(time)) < room + 1e-9)
     assert np.all(np.abs(found.kinetic_energy(time) - made.kinetic_energy(time)) < 2 * room + 1e-9)
@@ -33,7 +33,7 @@ def test_one_wave_is_an_oscillator() -> None:
 
 def test_the_fewest_waves_that_do_are_taken() -> None:
     noise = 1e-3 * np.random.default_rng(1).standard_normal(TIME.size)
-    found = known(fit_waves(TIME, MADE.deformation(TIME) + noise))
+    found = sure(fit_waves(TIME, MADE.deformation(TIME) + noise))
     assert np.sort(found.rates.imag) == pytest.approx([5, 8, 13], abs=0.01)
     assert np.all(found.rates.real <= 0)
 

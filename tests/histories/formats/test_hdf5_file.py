@@ -100,9 +100,7 @@ def test_matrix_of_another_shape_is_refused() -> None:
 
 
 def test_several_candidates_are_listed() -> None:
-    two = of(
-        {"a/time": TIME, "a/internal_energy": ENERGY, "b/time": TIME[:3], "b/internal_energy": ENERGY[:3]},
-    )
+    two = of({"a/time": TIME, "a/internal_energy": ENERGY, "b/time": TIME[:3], "b/internal_energy": ENERGY[:3]})
     with pytest.raises(FormatError, match=r"2 columns .* a/internal_energy \(4\), b/internal_energy \(3\)"):
         read(two)
     assert read(two, "/b/internal_energy").time.tolist() == TIME[:3].tolist()
