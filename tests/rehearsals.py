@@ -9,6 +9,7 @@ from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import BOX, Outcome, Record, RigidWindow, scan, scan_times, simulate
 from d2rpick.report import history_files
 from tests.command import answer
+from tests.energies import sure
 
 T_END = 0.55
 # td is this long before the ground comes [s], to the millisecond; as in the published study.
@@ -76,16 +77,14 @@ class Rehearsal:
 def rehearse(parameters: Parameters, folder: Path, *, every: int = 1, interval: float = 1e-4) -> Rehearsal:
     """Run one set; of the times of a scan take one in ``every``."""
     reference = simulate(parameters, T_END, interval=interval)
-    assert reference.landed is not None
-    assert reference.released is not None
-    shown = reference.time <= reference.landed + 0.04
-    td = round(reference.landed - BEFORE_LANDING, 3)
+    shown = reference.time <= sure(reference.landed) + 0.04
+    td = round(sure(reference.landed) - BEFORE_LANDING, 3)
     file = folder / "reference.matsum"
     file.write_bytes(history_files.BOX_WRITERS["matsum"](_until(reference, int(shown.sum()))))
     found = answer("suggest", "--td", str(td), "--part", "box", str(file))
     tr = found["recommended"]["tr"] if found["recommended"] else None
     flight = found["flight"]
-    times = sorted({*scan_times(reference.released, td)[::every], *([tr] if tr else [])})
+    times = sorted({*scan_times(sure(reference.released), td)[::every], *([tr] if tr else [])})
     outcomes = tuple(scan(parameters, reference, times, td, jobs=1))
     chosen = next((one for one in outcomes if one.tr == tr), None)
     return Rehearsal(

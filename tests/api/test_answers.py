@@ -20,6 +20,7 @@ from d2rpick.report.keys import MEASURES
 from d2rpick.report.plan import sentence as plan_sentence
 from tests.command import BOX, DECK, ENERGY, GLSTAT, MATSUM, ROLLOVER, ROOT, answer, put, run
 from tests.command import run as run_command
+from tests.energies import sure
 from tests.sample_deck import DECK as SAMPLE_DECK
 
 TD = "0.0687534"
@@ -217,9 +218,7 @@ def test_numbers_of_rows_are_no_time(name: str | None) -> None:
 def test_the_recommended_pair_is_no_better_pair() -> None:
     chosen, bad = (d2.suggest(d2.read(ENERGY), **asked) for asked in ({"td_window": (0.06, 0.07)}, {"td": 0.064}))
     assert chosen.better_pair is None
-    assert chosen.recommended is not None
-    assert bad.better_pair is not None
-    assert bad.better_pair.td == pytest.approx(chosen.recommended.td)
+    assert sure(bad.better_pair).td == pytest.approx(sure(chosen.recommended).td)
     assert "no-better-td" not in [warning.code for warning in chosen.warnings]
 
 
@@ -236,8 +235,7 @@ def test_pictures_and_pages(tmp_path: Path) -> None:
     page = found.report(tmp_path / "choice.html").read_text("utf-8")
     assert '"command":["d2rpick suggest --td "' in page  # what can be explored
     assert "d2rpick suggest --td 0.0687534" in page
-    assert found.recommended is not None
-    verdict = d2.verify(d2.read(ENERGY), tr=found.recommended.tr, td=float(TD))
+    verdict = d2.verify(d2.read(ENERGY), tr=sure(found.recommended).tr, td=float(TD))
     assert verdict.plot().axes
     assert "Verified" in verdict.report(str(tmp_path / "verdict.html")).read_text("utf-8")
 
@@ -309,8 +307,7 @@ def test_a_notebook_shows_a_sentence_a_small_table_and_the_picture() -> None:
         assert "\n" not in repr(one)
     assert repr(plan) == f"Plan({plan_sentence(plan)})"
     assert plan_sentence(plan) in plan._repr_html_()
-    assert chosen.recommended is not None
-    assert f"tr = {chosen.recommended.tr:.6g}" in repr(chosen)
+    assert f"tr = {sure(chosen.recommended).tr:.6g}" in repr(chosen)
     assert "... and 9 more" in study._repr_html_()
     assert verdict.reasons[0] in verdict._repr_html_().replace("&gt;", ">")
 
@@ -332,8 +329,7 @@ def test_cards_are_those_of_the_command_line() -> None:
     for one in (chosen, plan):
         found, (name, *words) = one.card(**ids), one.command
         assert str(found) == run_command(name, *words[:-1], *options).stdout
-        assert found is not None
-        assert found.verified
+        assert sure(found).verified
     times = ["--tr", "0.1", "--td", "0.37", "--part", "box"]
     alone = d2.card([(0.1, 0.37)], run=run, parts="box", margin=0.001)
     assert str(alone) == run_command("card", *times, "--margin", "0.001", "--history", MATSUM).stdout

@@ -20,11 +20,9 @@ PLAIN = Settings()
 def test_the_health_of_the_run_comes_with_every_answer() -> None:
     whole = read([T01], BOX)
     answer, in_window = suggest_of(whole, 0.37, PLAIN), suggest_of(whole, (0.3, 0.38), PLAIN)
-    assert answer.recommended is not None
-    verdict = verify_of(whole, answer.recommended.tr, 0.37, PLAIN)
-    assert answer.health is not None
-    assert answer.health == verdict.health
-    assert answer.health.window == (answer.recommended.tr, 0.37)
+    verdict = verify_of(whole, sure(answer.recommended).tr, 0.37, PLAIN)
+    assert sure(answer.health) == verdict.health
+    assert sure(answer.health).window == (sure(answer.recommended).tr, 0.37)
     assert in_window.health is not None
     assert suggest_of(read([ENERGY]), 0.064, PLAIN).health is None  # a table of two columns tells nothing of it
 
@@ -34,9 +32,8 @@ def test_the_momenta_come_with_every_history_and_know_the_chosen_part() -> None:
     whole, box = (Reference.of(opened, selection).history for selection in (Selection(), BOX))
     (of_whole, *_), (of_box, *_) = whole.momenta, box.momenta
     assert of_whole.parts == of_box.parts
-    assert of_whole.parts is not None
-    assert of_whole.chosen == tuple(range(len(of_whole.parts)))
-    assert [of_whole.parts[i].title for i in of_box.chosen] == ["box"]
+    assert of_whole.chosen == tuple(range(len(sure(of_whole.parts))))
+    assert [sure(of_whole.parts)[i].title for i in of_box.chosen] == ["box"]
     assert of_whole.values is of_box.values  # read once
 
 

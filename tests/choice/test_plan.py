@@ -58,16 +58,14 @@ def test_the_first_fall_is_rigid_from_the_start_and_the_first_that_locks_in_ener
     assert others[0].status == "supported"
     assert others[0].locks_in
     assert {row.status for row in others[1:]} == {"re-plan"}
-    assert others[0].window is not None
     for row in others[1:]:
-        assert f"{others[0].window[0]:.6g} to {others[0].window[1]:.6g}" in (row.reason or "")
+        assert f"{sure(others[0].window)[0]:.6g} to {sure(others[0].window)[1]:.6g}" in (row.reason or "")
 
 
 def test_each_window_is_what_suggest_says_for_its_td(reference: Reference, plan: Plan) -> None:
     for tr, td in plan.all_windows:
         found = suggest_of(reference, td, PLAIN)
-        assert found.recommended is not None
-        assert (found.recommended.tr, found.recommended.td) == (tr, td)
+        assert (sure(found.recommended).tr, sure(found.recommended).td) == (tr, td)
 
 
 def test_windows_keep_their_margin_and_follow_each_other(plan: Plan) -> None:
@@ -270,8 +268,7 @@ def test_no_other_td_of_a_flight_reaches_back_beyond_a_landing(seed: int, tmp_pa
     landings = {row.number: row.end for row in plan.flights}
     rows = [row for row in plan.flights if row.window]
     for row, found in zip(rows, explored_flights(reference, plan), strict=True):
-        assert found.asked is not None
-        assert (found.asked.tr, found.asked.td) == row.window
+        assert (sure(found.asked).tr, sure(found.asked).td) == row.window
         assert all(one.tr is None or one.tr >= landings.get(row.number - 1, 0.0) for one in found.offers)
 
 

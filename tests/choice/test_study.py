@@ -100,10 +100,8 @@ def test_another_version_gives_no_answer() -> None:
 def test_one_tr_for_all_verifies_in_each_run_and_so_do_the_ends_of_its_window(tmp_path: Path) -> None:
     names = variants.variants(tmp_path)
     answer = summarise(variants.TD, [ask(ASKED, name) for name in names])
-    assert answer.common.tr is not None
-    assert answer.common.window is not None
     for name in names:
-        for tr in (answer.common.tr, *answer.common.window):
+        for tr in (sure(answer.common.tr), *sure(answer.common.window)):
             assert verify(read_history([name]), tr, variants.TD, Settings()).verified
     assert answer.spread is not None
     assert answer.spread.min < answer.spread.median < answer.spread.max

@@ -49,41 +49,36 @@ def test_of_equally_good_peaks_the_longest_rigid_window_wins() -> None:
     time = np.arange(0, 4, 0.01)
     history = History(time, np.sin(2 * np.pi * time) ** 2, source=("test",), format="csv", channel="E")
     found = suggest_in_window(history, (2.1, 3.6), PLAIN)
-    assert found.recommended is not None
     # peaks at 2.25, 2.75, 3.25; the first with the sign of each at 0.25, 0.75, 0.25
-    assert (found.recommended.tr, found.recommended.td) == pytest.approx((0.25, 3.25), abs=1e-6)
+    assert (sure(found.recommended).tr, sure(found.recommended).td) == pytest.approx((0.25, 3.25), abs=1e-6)
 
 
 def test_without_a_peak_in_the_window_one_of_its_ends_is_taken() -> None:
     found = suggest_in_window(paper.history(), (0.0635, 0.066), PLAIN)
     ends = [suggest(paper.history(), td, PLAIN).recommended for td in (0.0635, 0.066)]
-    assert found.recommended is not None
-    assert found.recommended.td == 0.066
-    assert found.recommended.residual == min(end.residual or 1 for end in ends if end)
+    assert sure(found.recommended).td == 0.066
+    assert sure(found.recommended).residual == min(end.residual or 1 for end in ends if end)
 
 
 def test_on_energy_alone_of_levels_alike_the_longest_rigid_window_wins() -> None:
     history = rollover()
     found = suggest_in_window(history, (0.13, 0.38), PLAIN)
-    assert found.recommended is not None
-    assert found.expected is not None
-    mean = found.expected.mean_energy
+    mean = sure(found.expected).mean_energy
     assert mean == pytest.approx(1.885, abs=0.005)
-    assert found.recommended.rigid_time > 0.27
+    assert sure(found.recommended).rigid_time > 0.27
     assert found.longer is None
     situation = found.situation
     falls = {td: float(shortfall(np.array(history.energy_at(td)), mean)) for td in situation.peaks(0.13, 0.38)}
-    level = falls[found.recommended.td]
+    level = falls[sure(found.recommended).td]
     assert level <= min(falls.values()) + PLAIN.tolerance
-    assert found.expected.kinetic_share == pytest.approx(1 - situation.energy_td / (2 * mean))
+    assert sure(found.expected).kinetic_share == pytest.approx(1 - situation.energy_td / (2 * mean))
 
 
 @pytest.mark.slow
 def test_td_is_not_taken_early_for_a_level_that_is_hardly_better() -> None:
     """The planar box, whose highest peak in flight is the third: 0.0989 to 0.1478 would be rigid for 0.049 s."""
     found = suggest_in_window(history_of(simulate(Parameters(), 0.42)), (0.09, 0.379), PLAIN)
-    assert found.recommended is not None
-    assert (found.recommended.tr, found.recommended.td) == pytest.approx((0.097, 0.3697), abs=1e-3)
+    assert (sure(found.recommended).tr, sure(found.recommended).td) == pytest.approx((0.097, 0.3697), abs=1e-3)
 
 
 def test_what_is_given_up_for_a_higher_level_is_told() -> None:
@@ -129,8 +124,7 @@ def test_peaks_above_all_vibration_energy_are_not_locked_in() -> None:
     energy = np.asarray(energy) + 30 * np.exp(-(((time - 8.5) / 0.1) ** 2))  # a burst that is no vibration
     history = History(time, energy, source=("test",), format="csv", channel="E")
     found = suggest_in_window(history, (8.0, 9.0), Settings(after=0.5))
-    assert found.recommended is not None
-    for t in (found.recommended.tr, found.recommended.td):
+    for t in (sure(found.recommended).tr, sure(found.recommended).td):
         assert history.energy_at(t) <= 2 * sure(found.expected).mean_energy
 
 

@@ -114,9 +114,8 @@ def test_no_td_beats_the_one_that_is_chosen_by_the_level_alone(seed: int, tmp_pa
     file = tmp_path / "modes.csv"
     np.savetxt(file, np.column_stack([time, energy]), delimiter=",", header="time,internal_energy", comments="")
     found = explore_of(read([str(file)]), Settings(), None, steps=40)
-    assert found.recommended is not None
-    assert (found.recommended.basis, found.suggestion.situation.flight.source) == ("energy", "energy")
-    assert found.recommended.unbeaten
+    assert (sure(found.recommended).basis, found.suggestion.situation.flight.source) == ("energy", "energy")
+    assert sure(found.recommended).unbeaten
 
 
 def test_equal_pairs_do_not_beat_each_other_by_rounding() -> None:
@@ -137,9 +136,8 @@ def test_every_td_of_any_record_is_answered_as_suggest_answers_it(
 ) -> None:
     asked = Settings(after=after)
     found = explore_of(reference(history), asked, (td - 0.15, td + 0.15), td=td, steps=6)
-    assert found.asked is not None
-    assert found.asked.td == td
-    check(found, history, asked, [found.asked, *found.offers[::6]])
+    assert sure(found.asked).td == td
+    check(found, history, asked, [sure(found.asked), *found.offers[::6]])
 
 
 @pytest.mark.slow

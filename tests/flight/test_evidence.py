@@ -62,9 +62,7 @@ class Rolled(NamedTuple):
 def rolled(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Rolled:
     """Runs that no threshold was set by."""
     record = simulate(request.param, 0.5, interval=2e-4)
-    assert record.released is not None
-    assert record.landed is not None
-    return Rolled(record, tmp_path_factory.mktemp("rolled"), record.released, record.landed)
+    return Rolled(record, tmp_path_factory.mktemp("rolled"), sure(record.released), sure(record.landed))
 
 
 @pytest.mark.slow

@@ -18,6 +18,7 @@ from d2rpick.vibration.oscillator import to_mode
 from d2rpick.vibration.span import Span, described_span
 from tests import paper
 from tests.computed import columns, stored
+from tests.energies import sure
 from tests.records import noisy, table
 
 PERIOD = 2 * np.pi / paper.OMEGA_2
@@ -113,8 +114,7 @@ def test_a_start_that_is_given_replaces_the_start_only() -> None:
 def test_a_given_start_does_not_stretch_what_the_oscillator_describes() -> None:
     situation = examine(loaded(), 0.064, Settings(after=0.005))
     assert situation.flight.start == 0.005
-    assert situation.evidence.span is not None
-    assert situation.evidence.span.start == pytest.approx(0.020, abs=PERIOD / 10)
+    assert sure(situation.evidence.span).start == pytest.approx(0.020, abs=PERIOD / 10)
     assert situation.vibration.whole.energy(0.01) == pytest.approx(loaded().energy_at(0.01))
 
 
@@ -137,8 +137,7 @@ def test_where_no_oscillator_tells_the_sign_it_is_said_why(
 
 def test_a_fit_window_is_where_the_oscillator_comes_from() -> None:
     situation = examine(loaded(), 0.064, Settings(fit_window=(0.03, 0.12)))
-    assert situation.evidence.fit is not None
-    assert (situation.evidence.fit.start, situation.evidence.fit.end) == pytest.approx((0.03, 0.12))
+    assert (sure(situation.evidence.fit).start, sure(situation.evidence.fit).end) == pytest.approx((0.03, 0.12))
     assert situation.flight.start == pytest.approx(0.020 + PERIOD / 4, abs=PERIOD / 10)
 
 
@@ -220,6 +219,5 @@ def test_a_level_that_has_sunk_into_noise_recommends_nothing_but_a_td_where_it_h
     record = paper.history()
     answer = suggest(table(record.time, noisy(record.energy, 0.01, 3)), 0.1, Settings())
     assert answer.recommended is None
-    assert answer.better_pair is not None
-    assert float(min(abs(answer.better_pair.td - peak / 1e3) for peak, _ in paper.PEAKS)) < 1e-4
-    assert answer.better_pair.residual == pytest.approx(0.0, abs=1e-6)
+    assert float(min(abs(sure(answer.better_pair).td - peak / 1e3) for peak, _ in paper.PEAKS)) < 1e-4
+    assert sure(answer.better_pair).residual == pytest.approx(0.0, abs=1e-6)

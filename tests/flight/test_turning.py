@@ -189,6 +189,5 @@ def test_every_switched_run_of_the_car_is_as_far_off_and_turned_as_computed(tmp_
 @cache
 def of_the_car(parts: tuple[str, ...], where: Placement) -> Drift:
     history = solved("carT01.gz", *parts).history
-    found = drift_in_flight(history, find_flight(history, 0.14, None, seen_flight(history, 0.14), None), None, where)
-    assert found is not None
-    return found
+    flight = find_flight(history, 0.14, None, seen_flight(history, 0.14), None)
+    return sure(drift_in_flight(history, flight, None, where))

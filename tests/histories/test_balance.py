@@ -12,6 +12,7 @@ from d2rpick.histories.history import Samples
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run
 from tests.computed import stored
+from tests.energies import sure
 from tests.reading import read
 
 TIME = np.linspace(0.0, 1.0, 50)
@@ -68,12 +69,10 @@ def test_the_springs_of_the_car_are_known_and_left_out_of_the_level() -> None:
     assert whole.channel == "internal_energy - spring_energy"
     np.testing.assert_allclose(parts.energy, body.energy)
     np.testing.assert_allclose(whole.energy, body.energy, rtol=1e-5, atol=1e-3)
-    assert parts.parts is not None
-    assert len(parts.parts) == 17  # they are switched all the same
+    assert len(sure(parts.parts)) == 17  # they are switched all the same
     assert [note for note in parts.notes if "mounts, suspension, latches was left out" in note]
     answer = suggest(parts, 0.1464, Settings())
-    assert answer.recommended is not None
-    assert answer.recommended.tr == pytest.approx(0.0386, abs=5e-4)  # with them, 0.0496 or, at another td, 0.0824
+    assert sure(answer.recommended).tr == pytest.approx(0.0386, abs=5e-4)  # with them, 0.0496 or, at another td, 0.0824
 
 
 def test_what_is_asked_for_by_name_is_taken_as_it_is() -> None:

@@ -22,6 +22,7 @@ from d2rpick.models.box_run import (
     scan_times,
     simulate,
 )
+from tests.energies import sure
 
 COARSE = Parameters(mesh=4, damping=1.0)
 INTERVAL = 5e-4
@@ -141,10 +142,9 @@ def test_the_switch_back_keeps_both_momenta_and_the_frozen_energy_comes_back(tr:
     motion = at(tr)
     motion.make_rigid()
     frozen, pulls = motion.box.internal_energy(motion.places), motion.box.forces(motion.places)
-    assert motion.body is not None
-    turned = motion.body.arms[0]
+    turned = sure(motion.body).arms[0]
     run_to(motion, tr + rigid)
-    turned = motion.body.arms[0] / turned
+    turned = sure(motion.body).arms[0] / turned
     before = momenta(motion)
     motion.make_deformable()
     assert momenta(motion) == before
@@ -258,8 +258,7 @@ def test_floor_and_ground_push_up_with_coulomb_friction_against_the_sliding() ->
     for depth, level in ((0.001, 0.0), (0.002, -p.ground - 5.0)):
         contact = Contact(structure, Parameters(tilt=0.0, mesh=4, ground=p.ground + 5.0))
         places = structure.places + 1j * (level - depth)
-        push = contact.push(1.0, places - 1.0 + p.speed * p.braking / 2, np.full(places.size, 2.0 + 0j))
-        assert push is not None
+        push = sure(contact.push(1.0, places - 1.0 + p.speed * p.braking / 2, np.full(places.size, 2.0 + 0j)))
         normal = push.forces.imag
         assert normal.min() >= 0
         np.testing.assert_allclose(push.forces.real, -p.friction * normal * 2.0 / np.hypot(2.0, SLIP))
@@ -333,8 +332,7 @@ def test_what_is_no_model_or_no_window_is_refused() -> None:
 def test_the_strength_of_the_roof_acts_after_the_landing_alone() -> None:
     """It yields when it hits the ground; up to there the run is the same to the last digit."""
     base, weak = (simulate(Parameters(mesh=8, roof_strength=share), 0.42) for share in (1.0, 0.7))
-    assert base.landed is not None
-    before = base.time < base.landed
+    before = base.time < sure(base.landed)
     np.testing.assert_array_equal(weak.internal_energy[before], base.internal_energy[before])
     assert np.abs(weak.internal_energy - base.internal_energy).max() > 1.0
     with pytest.raises(RangeError, match="roof_strength is 0"):

@@ -8,6 +8,7 @@ import pytest
 from d2rpick.choice.answers import suggest
 from d2rpick.choice.question import Settings
 from d2rpick.models.box_run import history_of
+from tests.energies import sure
 from tests.faults import some
 from tests.rehearsals import SETS, rehearse
 
@@ -22,13 +23,10 @@ def test_the_recommended_tr_rolls_right_and_brings_the_energy_back_that_is_annou
 ) -> None:
     coarse = replace(SETS[number], mesh=MESH)
     found = rehearse(coarse, tmp_path, every=EVERY, interval=INTERVAL)
-    assert found.tr is not None
     assert found.flight[2] == "momentum"
     assert found.roll_share < 0.1
     assert abs(found.energy_off) < 0.25
-    pair = suggest(history_of(found.reference), found.td, Settings()).recommended
-    assert pair is not None
+    pair = sure(suggest(history_of(found.reference), found.td, Settings()).recommended)
     # where the printed digits of a matsum leave its start open by a millisecond, another crossing may come first
-    released = found.reference.released
-    assert released is not None
-    assert min(pair.tr, found.tr) >= released - INTERVAL
+    released = sure(found.reference.released)
+    assert min(pair.tr, sure(found.tr)) >= released - INTERVAL

@@ -15,6 +15,7 @@ from d2rpick.histories.history import History
 from d2rpick.report.figures_choice import draw_study, draw_suggestion, draw_trade_off
 from d2rpick.report.study import short_names
 from tests.command import BOX, ENERGY, ROOT
+from tests.energies import sure
 
 
 def texts(axes: Axes) -> list[str]:
@@ -41,19 +42,17 @@ def test_many_candidates_become_a_band_and_the_landing_is_cut_with_a_mark() -> N
     assert axes.get_xlim() == pytest.approx((0.0736, 0.3989), abs=1e-3)
     assert "landing, up to 1248 \u2191" in texts(axes)
     assert marks(axes) == [1]  # the recommended one alone
-    assert answer.windows is not None
     bands = [one for one in axes.patches if isinstance(one, Rectangle) and one.get_height() < 0.1]
     drawn = sum(one.get_width() for one in bands)
-    assert drawn == pytest.approx(sum(one.end - one.start for one in answer.windows), rel=0.03)
-    assert len(bands) < len(answer.windows)  # gaps that nobody sees are closed
+    assert drawn == pytest.approx(sum(one.end - one.start for one in sure(answer.windows)), rel=0.03)
+    assert len(bands) < len(sure(answer.windows))  # gaps that nobody sees are closed
 
 
 @pytest.mark.parametrize("replay", [True, False])
 def test_the_band_is_known_on_every_basis(replay: bool) -> None:
     answer = d2.suggest(d2.read(ENERGY), td=0.0687534, replay=replay)
-    assert answer.recommended is not None
     windows = answer.acceptable_windows
-    assert any(start <= answer.recommended.tr <= end for start, end in windows)
+    assert any(start <= sure(answer.recommended).tr <= end for start, end in windows)
     assert all(start <= end < answer.situation.td for start, end in windows)
 
 
@@ -67,8 +66,7 @@ def test_few_candidates_are_marks_acceptable_or_not() -> None:
 
 def test_the_figure_of_a_page_holds_the_better_pair_in_a_look_of_its_own() -> None:
     answer = d2.suggest(d2.read(ENERGY), td=0.064)
-    better = answer.clearly_better
-    assert better is not None
+    better = sure(answer.clearly_better)
     figure = draw_suggestion(answer, page=True)
     energy, motion = figure.axes
     lines = [line for line in (*energy.lines, *motion.lines) if line.get_label() == "better pair"]
@@ -103,8 +101,7 @@ def test_what_rests_is_drawn_flat_beside_what_the_run_has() -> None:
         axes = draw_suggestion(answer, page=page).axes[0]
         assert axes.get_yscale() == "linear"
         assert axes.get_ylim() == pytest.approx((-3.2, 43.2))
-    best = answer.chosen
-    assert best is not None
+    best = sure(answer.chosen)
     assert (best.level_error, best.energy_ratio) == (0.0, None)
     resting = replace(row("run", 0.01), curve=np.stack([time, energy]), energy_td=1e-21, warnings=("at-rest",))
     assert draw_study(study(resting)).axes[0].get_ylim()[1] == pytest.approx(43.2)

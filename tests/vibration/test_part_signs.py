@@ -134,8 +134,7 @@ def test_where_a_sign_may_turn_or_not_nothing_is_compared_across_it() -> None:
 
 def predicted(situation: Situation, tr: float) -> float:
     (candidate,) = judge(situation, [tr])
-    assert candidate.residual is not None
-    return candidate.residual
+    return sure(candidate.residual)
 
 
 @pytest.mark.slow
@@ -186,8 +185,7 @@ def read_t01() -> History:
 @pytest.mark.parametrize("source", ["csv", "T01"])
 def test_the_closest_match_is_recommended_although_the_total_energy_is_off(source: str) -> None:
     answer = suggest(chain.history() if source == "csv" else read_t01(), chain.TD_PEAK, PLAIN)
-    assert answer.recommended is not None
-    assert answer.recommended.tr == pytest.approx(0.08084, abs=1e-4)
+    assert sure(answer.recommended).tr == pytest.approx(0.08084, abs=1e-4)
     best = answer.candidates[0]
     assert (best.kind, best.sign_match, best.recommended) == ("match", True, True)
     assert best.residual == pytest.approx(0.065, abs=0.005)
@@ -200,8 +198,7 @@ def test_the_closest_match_is_recommended_although_the_total_energy_is_off(sourc
 @pytest.mark.parametrize("source", ["csv", "T01"])
 def test_the_recommended_run_is_among_the_best_of_the_scan(source: str) -> None:
     answer = suggest(chain.history() if source == "csv" else read_t01(), chain.TD_LATE, PLAIN)
-    assert answer.recommended is not None
-    tr = answer.recommended.tr
+    tr = sure(answer.recommended).tr
     runs = [run for run in chain.scan() if run["td_s"] > 0.2]
     nearest = min(runs, key=lambda run: abs(run["tr_s"] - tr))
     assert nearest["R_sim"] <= min(run["R_sim"] for run in runs) + 0.05
@@ -210,13 +207,12 @@ def test_the_recommended_run_is_among_the_best_of_the_scan(source: str) -> None:
 def test_the_parts_that_contribute_most_are_named() -> None:
     situation = seen(chain.TD_PEAK)
     (candidate,) = judge(situation, [0.1])
-    assert candidate.part_mismatch is not None
     shares = [part.share for part in candidate.parts]
     assert sum(share or 0 for share in shares) == pytest.approx(1)
     assert shares == sorted(shares, key=lambda share: -(share or 0))
     assert any(note.startswith(f"mismatch of {candidate.parts[0].name}") for note in candidate.notes)
-    assert situation.kinetic_share is not None
-    assert candidate.lock_in_error == pytest.approx(np.sqrt(1 - situation.kinetic_share) * candidate.part_mismatch)
+    still = 1 - sure(situation.kinetic_share)
+    assert candidate.lock_in_error == pytest.approx(np.sqrt(still) * sure(candidate.part_mismatch))
 
 
 def test_the_rollover_has_no_signs_and_says_why() -> None:
@@ -236,8 +232,7 @@ def test_several_energies_are_carried_but_for_those_that_are_always_zero() -> No
     selection = Selection(energy=(*NAMES, "x3_m"))
     assert chain.history(*selection.energy).part_names == selection.energy
     table = chain.history()
-    assert table.part_energies is not None
-    np.testing.assert_array_equal(table.part_energies.sum(axis=1), table.energy)
+    np.testing.assert_array_equal(sure(table.part_energies).sum(axis=1), table.energy)
 
 
 def test_between_the_states_the_model_tells_the_deformation_and_what_is_kinetic() -> None:

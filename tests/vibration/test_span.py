@@ -83,9 +83,7 @@ def test_what_was_fitted_before_changes_no_answer() -> None:
     for td in (0.05, paper.TD, 0.1):
         anew, again = (examine(paper.history(), td, Settings(), known) for known in (None, fits))
         assert again.evidence.span == anew.evidence.span
-        assert again.evidence.fit is not None
-        assert anew.evidence.fit is not None
-        assert again.evidence.fit.mode == anew.evidence.fit.mode
+        assert sure(again.evidence.fit).mode == sure(anew.evidence.fit).mode
 
 
 def test_a_window_that_shows_too_little_of_a_vibration_grows_until_it_shows_enough() -> None:

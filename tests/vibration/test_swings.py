@@ -70,7 +70,6 @@ def test_the_pair_of_a_spring_that_stiffens_has_the_sign_of_td(lifted: Samples) 
     for td in (20.0, 27.5):
         answer = suggest(record, td, Settings(after=2.0))
         assert answer.situation.basis == "swings"
-        assert answer.chosen is not None
-        at_tr, at_td = np.interp([answer.chosen.tr, td], TIME, x)
+        at_tr, at_td = np.interp([sure(answer.chosen).tr, td], TIME, x)
         assert at_tr == pytest.approx(at_td, abs=0.2 * np.abs(x[td < TIME]).max())
         assert not any(one.acceptable and np.interp(one.tr, TIME, x) * at_td < -1e-3 for one in answer.candidates)
