@@ -8,7 +8,6 @@ from bisect import bisect_right
 from collections import defaultdict
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import chain
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import DeckError
@@ -130,15 +129,15 @@ class Deck:
     def named(self, *names: str) -> list[Card]:
         """Cards of a deck that was read whose keyword is one of ``names``, or one with an option behind ``_``."""
         wanted = tuple(f"{name}_" for name in names)
-        found = [places for name, places in self._places.items() if f"{name}_".startswith(wanted)]
-        return [self.cards[place] for place in (found[0] if len(found) == 1 else sorted(chain(*found)))]
+        found = [place for name, places in self._places.items() if name.startswith(wanted) for place in places]
+        return [self.cards[place] for place in sorted(found)]
 
     @cached_property
     def _places(self) -> Mapping[str, Sequence[int]]:
-        """Places of the cards by their names: every rule asks for some."""
+        """Places of the cards by their names, with an ``_`` behind: every rule asks for some."""
         found: defaultdict[str, list[int]] = defaultdict(list)
         for place, card in enumerate(self.cards):
-            found[card.name].append(place)
+            found[f"{card.name}_"].append(place)
         return found
 
     def silences(self, rule: str, file: str, line: int) -> bool:
