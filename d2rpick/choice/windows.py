@@ -1,4 +1,4 @@
-"""Windows of time: the flights, in which td may lie, and those in which a tr is acceptable, of one run and of many."""
+"""Windows of time in which a tr is acceptable, of one run and of many."""
 
 from __future__ import annotations
 

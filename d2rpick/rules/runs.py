@@ -1,4 +1,4 @@
-"""D2R307, D2R401-408: the legs of a Radioss run, and its rigid bodies.
+"""D2R307, D2R401-409, D2R411: the legs of a Radioss run, and its rigid bodies.
 
 Bodies may go through walls, begin at rest, or be rigid all along.
 """

@@ -1,1 +1,1 @@
-"""One module per format that recognises, reads and writes it; opening.READERS lists them."""
+"""A module for each format of `d2rpick.histories.opening.READERS`, and what several of them share."""
