@@ -8,7 +8,7 @@ import numpy as np
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import BOX, Outcome, Record, RigidWindow, scan, scan_times, simulate
 from d2rpick.report import history_files
-from tests.command import answer
+from tests.command import answer, put
 from tests.energies import sure
 
 T_END = 0.55
@@ -79,8 +79,7 @@ def rehearse(parameters: Parameters, folder: Path, *, every: int = 1, interval: 
     reference = simulate(parameters, T_END, interval=interval)
     shown = reference.time <= sure(reference.landed) + 0.04
     td = round(sure(reference.landed) - BEFORE_LANDING, 3)
-    file = folder / "reference.matsum"
-    file.write_bytes(history_files.BOX_WRITERS["matsum"](_until(reference, int(shown.sum()))))
+    file = put(folder / "reference.matsum", history_files.BOX_WRITERS["matsum"](_until(reference, int(shown.sum()))))
     found = answer("suggest", "--td", str(td), "--part", "box", str(file))
     tr = found["recommended"]["tr"] if found["recommended"] else None
     flight = found["flight"]

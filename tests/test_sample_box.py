@@ -11,7 +11,7 @@ from d2rpick.histories.opening import READERS, Selection, open_run
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import Record, simulate
 from tests import sample_box
-from tests.command import ROOT, answer
+from tests.command import ROOT, answer, put
 from tests.energies import sure
 
 KEPT = ROOT / "sample_data"
@@ -51,8 +51,7 @@ def test_every_format_has_its_sample(fresh: Mapping[str, bytes]) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_sample_is_what_the_model_gives(name: str, fresh: Mapping[str, bytes], tmp_path: Path) -> None:
-    (tmp_path / name).write_bytes(fresh[name])
-    kept, now = history(KEPT / name), history(tmp_path / name)
+    kept, now = history(KEPT / name), history(put(tmp_path / name, fresh[name]))
     np.testing.assert_allclose(kept.time, now.time, rtol=1e-6)
     np.testing.assert_allclose(kept.energy, now.energy, rtol=1e-3, atol=1e-2)  # rounding grows with every contact
     assert (KEPT / name).stat().st_size < LARGEST

@@ -23,7 +23,7 @@ from d2rpick.histories.surroundings import Support, Surroundings
 from d2rpick.rules import RULES, check_deck
 from d2rpick.rules.base import Example
 from tests import made_car
-from tests.command import ENERGY, OSCILLATOR, ROOT, answer, codes, refused, run
+from tests.command import ENERGY, OSCILLATOR, ROOT, answer, codes, put, refused, run
 from tests.decks import write
 from tests.histories.test_listings import listing
 from tests.sample_deck import DECK
@@ -146,8 +146,7 @@ OTHER = {
 
 @pytest.fixture(params=OTHER)
 def foreign(request: pytest.FixtureRequest, tmp_path: Path) -> str:
-    (tmp_path / "main.k").write_text(OTHER[request.param], "utf-8")
-    return str(tmp_path / "main.k")
+    return str(put(tmp_path / "main.k", OTHER[request.param]))
 
 
 def told(found: dict[str, Any]) -> dict[str, Any]:

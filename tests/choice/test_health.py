@@ -13,7 +13,7 @@ from d2rpick.histories.history import Balance, Given, History, Precision, Sample
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import open_run
 from d2rpick.report.situation import measures_of
-from tests.command import ENERGY, GLSTAT, ROOT, answer, codes, run
+from tests.command import ENERGY, GLSTAT, ROOT, answer, codes, put, run
 from tests.computed import stored
 from tests.energies import sure
 from tests.made_t01 import t01, value
@@ -95,8 +95,7 @@ def test_a_window_of_too_few_states_is_not_judged() -> None:
 def test_a_term_with_a_state_that_is_no_number_is_unknown(tmp_path: Path) -> None:
     written, nan = np.array(value(3, 0, 12), ">f4").tobytes(), np.array(np.nan, ">f4").tobytes()
     for name, content in (("whole", bytes(t01(8).data)), ("damaged", bytes(t01(8).data).replace(written, nan))):
-        (tmp_path / f"{name}T01").write_bytes(content)
-        run_of = open_run([str(tmp_path / f"{name}T01")])
+        run_of = open_run([str(put(tmp_path / f"{name}T01", content))])
         balance = sure(balance_of(run_of.databases, run_of.parts))
         assert (balance.hourglass is None, balance.kinetic is None) == (name == "damaged", False)
 

@@ -132,8 +132,7 @@ def test_none_is_recommended_of_a_table_which_says_what_to_give_instead() -> Non
 
 
 def test_parts_of_a_run_in_which_nothing_deforms_are_listed(tmp_path: Path) -> None:
-    (tmp_path / "matsum").write_bytes(matsum_text([0.0], [1, 2, 3], np.zeros((1, 3))))
-    found = asked(str(tmp_path / "matsum"))
+    found = asked(str(put(tmp_path / "matsum", matsum_text([0.0], [1, 2, 3], np.zeros((1, 3))))))
     assert len(found.rows) == 3
     assert {row.verdict for row in found.rows} == {"keep"}
     assert found.facts.reason

@@ -13,7 +13,7 @@ from d2rpick.base import __version__
 from d2rpick.cli import COMMANDS, d2rpick
 from d2rpick.cli.manual import manual
 from d2rpick.rules import RULES
-from tests.command import ENERGY, GLSTAT, ROLLOVER, ROOT, TIME_LIMIT, answer, refused, run
+from tests.command import ENERGY, GLSTAT, ROLLOVER, ROOT, TIME_LIMIT, answer, put, refused, run
 
 MATSUM = str(ROOT / "sample_data" / "rollover_box.matsum")
 
@@ -122,8 +122,7 @@ def in_ms(tmp_path: Path) -> str:
     """The record of the oscillator with its times in ms, which no header names."""
     rows = [line.split(",") for line in Path(ENERGY).read_text().splitlines()[1:]]
     lines = ["time,internal_energy", *(f"{1000 * float(row[0]):.10g},{row[5]}" for row in rows)]
-    (tmp_path / "ms.csv").write_text("\n".join(lines) + "\n")
-    return str(tmp_path / "ms.csv")
+    return str(put(tmp_path / "ms.csv", "\n".join(lines) + "\n"))
 
 
 @pytest.mark.parametrize(

@@ -288,8 +288,7 @@ ODD = {
 
 @pytest.mark.parametrize("name", ODD)
 def test_odd_numbers_reach_no_warning_of_the_machine(name: str, tmp_path: Path) -> None:
-    (tmp_path / name).write_bytes(ODD[name])
-    result = run("info", str(tmp_path / name))
+    result = run("info", str(put(tmp_path / name, ODD[name])))
     assert "RuntimeWarning" not in result.stderr
     assert "internal error" not in result.stderr
     assert result.exit_code in (0, 2)

@@ -69,8 +69,7 @@ def test_bytes_on_a_disk_are_those_in_memory(
 
 def test_threads_that_read_one_file_together_get_each_what_it_asks_for(tmp_path: Path) -> None:
     data = np.random.default_rng(5).bytes(2000)
-    (tmp_path / "bytes").write_bytes(data)
-    there = on_disk(tmp_path / "bytes")
+    there = on_disk(put(tmp_path / "bytes", data))
     places = np.arange(0, 1960, 40)
 
     def wrong(step: int) -> int:

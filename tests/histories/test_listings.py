@@ -7,7 +7,7 @@ import pytest
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.listings import printed_steps, read_timing, read_zone_times, wrong_energies
 from d2rpick.histories.opening import open_run
-from tests.command import GLSTAT
+from tests.command import GLSTAT, put
 from tests.text_files import glstat_text
 
 BAR = "*" * 72
@@ -109,8 +109,7 @@ def test_a_d3hsp_is_read_by_the_clock_where_processor_times_are_rounded_to_nothi
     tmp_path: Path, elements: str, total: str, found: tuple[float, float]
 ) -> None:
     """What came before the run does not count."""
-    (tmp_path / "d3hsp").write_text(D3HSP.format(elements, total))
-    timing = read_timing(str(tmp_path / "d3hsp"))
+    timing = read_timing(str(put(tmp_path / "d3hsp", D3HSP.format(elements, total))))
     assert timing.cycles == 640
     assert (timing.total, timing.elements) == pytest.approx(found)
 
@@ -128,8 +127,7 @@ def test_the_part_that_controls_the_step_is_found_in_a_glstat(tmp_path: Path) ->
 
 def test_times_per_zone_cycle_of_a_glstat(tmp_path: Path) -> None:
     text = glstat_text([0.0, 0.5], [1.0, 2.0]).replace(b"(nanosec)..             0", b"(nanosec)..          5134")
-    (tmp_path / "glstat").write_bytes(text)
-    found = read_zone_times(str(tmp_path / "glstat"))
+    found = read_zone_times(str(put(tmp_path / "glstat", text)))
     assert found.time.tolist() == [0.0, 0.5]
     assert found.per_zone == pytest.approx(5134e-9)
 

@@ -35,7 +35,7 @@ from d2rpick.running.sequence import (
     window_of,
     windows,
 )
-from tests.command import ROOT, refused, run
+from tests.command import ROOT, put, refused, run
 from tests.deck.test_openradioss import ENGINE, starter
 from tests.decks import wide
 from tests.made_t01 import MadePart, headed
@@ -187,8 +187,7 @@ def test_commands_are_split_as_a_shell_does_and_given_to_none() -> None:
 def test_a_restart_that_may_be_cut_is_not_taken(tmp_path: Path) -> None:
     solver = engine.Solver(tmp_path, "strip")
     for name, at in (("strip_0001_0001_I.rst", 10), ("strip_0001_0001_J.rst", 30), ("stripT01", 20)):
-        (tmp_path / name).write_bytes(b"x")
-        os.utime(tmp_path / name, (at, at))
+        os.utime(put(tmp_path / name, b"x"), (at, at))
     assert solver.left(1).restart == "I"
     (tmp_path / "strip_0001.out").write_text(" NORMAL TERMINATION\n")
     assert solver.left(1).restart == "J"
