@@ -8,11 +8,19 @@ from typing import Any
 
 import jsonschema
 
+from tests.command import answer
+
 
 def check_by_schema(found: dict[str, Any]) -> None:
     """Hold an answer against the schema that ships with the package under its name."""
     _, command, version = found["schema"].split("/")
     _holder(f"{command}-{version}").validate(found)
+
+
+def checked(*args: str) -> dict[str, Any]:
+    """Run a command as `answer` does, and hold what it says against its schema."""
+    check_by_schema(found := answer(*args))
+    return found
 
 
 def check_by_definition(found: Any, schema: str, definition: str) -> None:

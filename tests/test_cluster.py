@@ -126,9 +126,8 @@ def test_where_no_scheduler_answers_the_study_ends(tmp_path: Path) -> None:
     told = "no answer from a Dask scheduler ("
     with pytest.raises(D2RPickError, match=f"^tcp://127.0.0.1:9: {re.escape(told)}"):
         Cluster("tcp://127.0.0.1:9", patience=0.3)
-    result = run("study", "--td", str(variants.TD), variants.write(tmp_path / "run.csv"), "--scheduler", "nonsense://x")
-    assert (result.exit_code, result.stdout) == (2, "")
-    assert result.stderr.startswith(f"d2rpick: nonsense://x: {told}")
+    asked = ("study", "--td", str(variants.TD), variants.write(tmp_path / "run.csv"), "--scheduler", "nonsense://x")
+    assert refused(*asked).startswith(f"nonsense://x: {told}")
 
 
 def test_without_the_package_its_name_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from d2rpick.report.history_files import write_table
 from tests.command import BOX, ENERGY, GLSTAT, ROLLOVER, ROOT, answer, put, replayed, run, unwrapped
-from tests.json_schemas import check_by_schema
+from tests.json_schemas import checked
 from tests.made_t01 import t01
 
 FORMATS = ("table", "json", "csv", "markdown")
@@ -19,9 +19,7 @@ FORMATS = ("table", "json", "csv", "markdown")
 
 def info(*args: str) -> dict[str, Any]:
     """Answer of info, held against its schema."""
-    found = answer("info", *args)
-    check_by_schema(found)
-    return found
+    return checked("info", *args)
 
 
 @pytest.fixture

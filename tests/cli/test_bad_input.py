@@ -12,7 +12,7 @@ import pytest
 
 from tests.command import BOX, DECK, ENERGY, GLSTAT, MATSUM, OSCILLATOR, ROLLOVER, answer, codes, put, refused, run
 from tests.computed import stored
-from tests.json_schemas import check_by_schema
+from tests.json_schemas import checked
 from tests.sample_deck import DECK as SAMPLE
 
 HEAD = "time,internal_energy\n"
@@ -297,8 +297,7 @@ OBJECTIONS = {
 def test_a_record_without_an_answer_is_an_objection_and_says_why(case: str) -> None:
     content, args, code = OBJECTIONS[case]
     Path("input").write_bytes(content)
-    found = answer("suggest", "--td", "0.5", *args, "input")
-    check_by_schema(found)
+    found = checked("suggest", "--td", "0.5", *args, "input")
     assert found["recommended"] is None
     assert not any(candidate["acceptable"] for candidate in found["candidates"])
     assert {code, "no-candidate"} <= codes(found)

@@ -16,7 +16,7 @@ import d2rpick as d2
 from d2rpick.rules import RULES
 from d2rpick.rules.examples import END, GOOD, HEAD, PARTS, THERE, automatic
 from tests.command import BOX, DECK, ENERGY, GLSTAT, MATSUM, answer, refused, run
-from tests.json_schemas import check_by_schema, junit_is_valid, sarif_is_valid
+from tests.json_schemas import check_by_schema, checked, junit_is_valid, sarif_is_valid
 
 FORMATS = ("table", "json", "github", "junit", "sarif")
 LATE = HEAD + PARTS + THERE + automatic(2, "0.5", deformable=["1"]) + END
@@ -69,8 +69,7 @@ def test_a_deck_that_looks_right_is_caught_by_the_history() -> None:
 
 
 def test_json_says_where_and_by_what() -> None:
-    found = answer("check", DECK, "--history", ENERGY)
-    check_by_schema(found)
+    found = checked("check", DECK, "--history", ENERGY)
     assert rules(found) == ["D2R202", "D2R203"]
     assert found["history"] == [ENERGY]
     assert found["summary"] == {"errors": 1, "warnings": 1, "infos": 0, "decks": 1}

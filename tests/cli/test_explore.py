@@ -12,7 +12,7 @@ import pytest
 
 import d2rpick as d2
 from tests.command import ENERGY, ROOT, answer, put, run
-from tests.json_schemas import check_by_schema
+from tests.json_schemas import checked
 
 MATSUM = str(ROOT / "sample_data" / "rollover_box.matsum")
 WINDOW = ("--td-window", "0.06", "0.07", "--steps", "10")
@@ -31,8 +31,7 @@ SCHEMA = json.loads((ROOT / "d2rpick/schemas/explore-1.json").read_text("utf-8")
 def test_the_json_keeps_its_schema_and_every_offer_is_what_suggest_says(
     explored: tuple[str, ...], options: tuple[str, ...], source: str
 ) -> None:
-    found = answer("explore", *explored, *options, source)
-    check_by_schema(found)
+    found = checked("explore", *explored, *options, source)
     offers = found["offers"]
     assert offers[0].keys() == SCHEMA["properties"]["offers"]["items"]["properties"].keys()
     assert all(low["td"] < high["td"] for low, high in pairwise(offers))

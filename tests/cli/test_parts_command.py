@@ -12,7 +12,7 @@ from d2rpick.report.formats import Shown
 from d2rpick.report.parts import COLUMNS, SET_COLUMNS
 from tests.choice.test_calibration import run_folder
 from tests.command import ROOT, answer, put, refused, run
-from tests.json_schemas import check_by_schema
+from tests.json_schemas import checked
 from tests.sample_deck import DECK
 
 pytestmark = pytest.mark.usefixtures("by_level")
@@ -24,8 +24,7 @@ WITH_DECK = ("--deck", str(DECK), BOX)
 
 @pytest.mark.parametrize("args", [WITH_DECK, (BOX,), ("--td", "0.37", *WITH_DECK), ("--deck", str(DECK), ENERGY)])
 def test_the_answer_keeps_its_schema(args: tuple[str, ...]) -> None:
-    found = answer("parts", *args)
-    check_by_schema(found)
+    found = checked("parts", *args)
     assert (found["deck"] is None) == ("--deck" not in args)
 
 
@@ -135,8 +134,7 @@ def test_recommended_needs_a_deck_and_stands_alone() -> None:
 
 def test_a_cost_that_is_not_known_is_a_warning(tmp_path: Path) -> None:
     cut = put(tmp_path / "main.k", DECK.read_text("utf-8").replace("*END", "*INCLUDE\nabsent.k\n*END"))
-    found = answer("plan", "--part", "1,2", "--deck", str(cut), BOX)
-    check_by_schema(found)
+    found = checked("plan", "--part", "1,2", "--deck", str(cut), BOX)
     assert found["run_time_share"] is None
     assert "absent.k was not read" in next(one["message"] for one in found["warnings"] if one["code"] == "cost-unknown")
     whole = answer("suggest", "--td", "0.37", *WITH_DECK)
@@ -146,8 +144,7 @@ def test_a_cost_that_is_not_known_is_a_warning(tmp_path: Path) -> None:
 def test_calibrate_writes_what_weights_reads(tmp_path: Path) -> None:
     (tmp_path / "run").mkdir()
     folder = str(run_folder(tmp_path / "run"))
-    found = answer("calibrate", folder)
-    check_by_schema(found)
+    found = checked("calibrate", folder)
     assert found["told"]
     for form in ("table", "markdown", "csv"):
         assert "QEPH" in run("calibrate", "-f", form, folder).stdout

@@ -10,7 +10,7 @@ from d2rpick.report.formats import Shown
 from tests.command import ENERGY, answer, put, refused, run
 from tests.computed import starter, stored
 from tests.drops import drop, written
-from tests.json_schemas import check_by_schema
+from tests.json_schemas import check_by_schema, checked
 
 pytestmark = pytest.mark.slow
 FINE = 4e-4  # [s] between two states, which tells a landing that comes a little later
@@ -124,8 +124,7 @@ def test_the_next_window_is_planned_from_the_switched_run(history: list[str], tm
     windows = [(float(tr), float(td)) for tr, td in map(str.split, done.read_text().splitlines())]
     switched = written(drop(*windows, interval=FINE), tmp_path / "next")
     before = [text for name in history for text in ("--before", name)]
-    found = answer("plan", *PART, "--done", str(done), *before, *switched)
-    check_by_schema(found)
+    found = checked("plan", *PART, "--done", str(done), *before, *switched)
     assert [(row["tr"], row["td"]) for row in found["windows"] if row["status"] == "done"] == windows
     assert all(row["landing"] > row["td"] for row in found["windows"] if row["status"] == "done")
     told = run("plan", "-q", *PART, "--done", str(done), *before, *switched).stdout

@@ -14,7 +14,7 @@ from d2rpick.histories.names import Selection
 from d2rpick.report.formats import Shown
 from tests.command import answer, put, run, unwrapped
 from tests.computed import starter, stored
-from tests.json_schemas import check_by_schema
+from tests.json_schemas import check_by_schema, checked
 from tests.sample_deck import DECK
 
 pytestmark = [pytest.mark.usefixtures("by_level"), pytest.mark.slow]
@@ -59,8 +59,7 @@ def test_suggest_gives_it_for_every_candidate_and_says_it() -> None:
 
 
 def test_verify_warns_where_it_is_large() -> None:
-    found = answer("verify", "--tr", "0.0826", "--td", "0.1464", "--part", "1-17", car())
-    check_by_schema(found)
+    found = checked("verify", "--tr", "0.0826", "--td", "0.1464", "--part", "1-17", car())
     assert found["position_error"] == pytest.approx(7.5e-3, rel=0.3)
     assert found["position_error_part"] == "engine"
     (told,) = [one["message"] for one in found["warnings"] if one["code"] == "out-of-place"]
@@ -72,8 +71,7 @@ def test_verify_warns_where_it_is_large() -> None:
 
 
 def test_plan_gives_it_for_every_window() -> None:
-    found = answer("plan", "--part", "1-17", car())
-    check_by_schema(found)
+    found = checked("plan", "--part", "1-17", car())
     (row,) = [one for one in found["windows"] if one["status"] == "supported"]
     assert row["position_error"] == pytest.approx(2.5e-3, abs=1e-3)
     assert row["position_error_part"] == "engine"

@@ -18,7 +18,7 @@ import pytest
 from d2rpick import __version__
 from tests import variants
 from tests.command import BOX, ENERGY, GLSTAT, ROOT, answer, put, refused, run, started
-from tests.json_schemas import check_by_definition, check_by_schema
+from tests.json_schemas import check_by_definition, check_by_schema, checked
 from tests.variants import STUDY
 
 FORMATS = ("table", "json", "csv", "markdown", "ndjson")
@@ -46,8 +46,7 @@ def lines_of(text: str) -> list[dict[str, Any]]:
 
 @pytest.mark.parametrize("extra", [(), ("absent.csv",), ("--td", "0.064"), ("--max-residual", "0.001")])
 def test_json_follows_the_schema(runs: list[str], extra: tuple[str, ...]) -> None:
-    found = answer(*STUDY, *runs, *extra)
-    check_by_schema(found)
+    found = checked(*STUDY, *runs, *extra)
     assert found["tool_version"] == __version__
     assert found["command"] == [*STUDY, *runs, *extra, "-f", "json"]
     assert [row["source"] for row in found["runs"]][:3] == runs
@@ -77,8 +76,7 @@ def test_every_format_says_the_same(runs: list[str]) -> None:
 
 @pytest.mark.slow
 def test_a_window_for_td_lets_each_run_choose_its_own(runs: list[str]) -> None:
-    found = answer("study", "--td-window", "0.06", "0.07", *runs)
-    check_by_schema(found)
+    found = checked("study", "--td-window", "0.06", "0.07", *runs)
     assert (found["td"], found["td_window"]) == (None, [0.06, 0.07])
     for name, one in zip(runs, found["runs"], strict=True):
         pair = answer("suggest", "--td-window", "0.06", "0.07", name)["recommended"]

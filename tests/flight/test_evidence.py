@@ -25,7 +25,7 @@ from d2rpick.report.history_files import BOX_WRITERS
 from tests.command import BOX, ENERGY, ROLLOVER, answer, codes, put, run
 from tests.computed import columns, stored
 from tests.energies import sure
-from tests.json_schemas import check_by_schema
+from tests.json_schemas import checked
 from tests.records import table
 from tests.sample_box import t01
 
@@ -283,8 +283,7 @@ def test_the_energy_alone_is_said_to_be_uncertain_and_strict_refuses_it() -> Non
 
 
 def test_windows_of_acceptable_tr_hold_the_recommended_one_and_verify_throughout() -> None:
-    found = answer("suggest", *ALONE)
-    check_by_schema(found)
+    found = checked("suggest", *ALONE)
     windows = found["acceptable_windows"]
     (own,) = (window for window in windows if window["recommended"])
     assert own["start"] <= found["recommended"]["tr"] <= own["end"]

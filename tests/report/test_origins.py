@@ -7,7 +7,7 @@ import pytest
 
 import d2rpick as d2
 from tests.command import ROOT, answer, run
-from tests.json_schemas import check_by_schema
+from tests.json_schemas import checked
 from tests.sample_deck import DECK
 
 BOX = str(ROOT / "sample_data" / "rollover_box.matsum")
@@ -41,8 +41,7 @@ def test_a_deck_and_weights_that_took_part_are_named(command: str) -> None:
     args = (command, *ASKED[command], "--deck", "main.k", BOX)
     named = {"source": ["main.k", "note.k"], "sha256": [digest("main.k"), digest("note.k")]}
     by_file = {"source": "our cluster", "file": "site.toml", "sha256": digest("site.toml")}
-    found = answer(*args, "--weights", "site.toml")
-    check_by_schema(found)
+    found = checked(*args, "--weights", "site.toml")
     assert {key: found["deck"][key] for key in named} == named
     assert {key: found["weights"][key] for key in by_file} == by_file
     run(*args, "--weights", "site.toml", "--report", "page.html")

@@ -256,18 +256,7 @@ def test_the_command_for_radioss_names_the_parts(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_command_for_another_td_holds_every_option_that_it_is_judged_by(tmp_path: Path) -> None:
-    choosing = [
-        "--after",
-        "0.001",
-        "--tolerance",
-        "0.1",
-        "--fit-window",
-        "0.01",
-        "0.1",
-        "--max-residual",
-        "2.5",
-        "--strict",
-    ]
+    choosing = shlex.split("--after 0.001 --tolerance 0.1 --fit-window 0.01 0.1 --max-residual 2.5 --strict")
     page = page_of(tmp_path, "--td", "0.064", *choosing, ENERGY)
     before, behind = json.loads(page.data[0])["command"]
     assert (before, sorted(shlex.split(behind))) == ("d2rpick suggest --td ", sorted([*choosing, ENERGY]))
