@@ -13,18 +13,14 @@ if TYPE_CHECKING:
     from d2rpick.api.cards import card as card
     from d2rpick.api.checking import Findings as Findings
     from d2rpick.api.checking import check as check
-    from d2rpick.api.choices import Suggestion as Suggestion
-    from d2rpick.api.choices import Verdict as Verdict
-    from d2rpick.api.choices import suggest as suggest
-    from d2rpick.api.choices import verify as verify
     from d2rpick.api.costs import Calibration as Calibration
     from d2rpick.api.costs import PartTable as PartTable
     from d2rpick.api.costs import calibrate as calibrate
     from d2rpick.api.costs import parts as parts
-    from d2rpick.api.flights import Exploration as Exploration
-    from d2rpick.api.flights import Plan as Plan
-    from d2rpick.api.flights import explore as explore
-    from d2rpick.api.flights import plan as plan
+    from d2rpick.api.plans import Exploration as Exploration
+    from d2rpick.api.plans import Plan as Plan
+    from d2rpick.api.plans import explore as explore
+    from d2rpick.api.plans import plan as plan
     from d2rpick.api.running import FirstRun as FirstRun
     from d2rpick.api.running import first as first
     from d2rpick.api.running import follow as follow
@@ -33,6 +29,10 @@ if TYPE_CHECKING:
     from d2rpick.api.runs import read as read
     from d2rpick.api.studies import Study as Study
     from d2rpick.api.studies import study as study
+    from d2rpick.api.suggestions import Suggestion as Suggestion
+    from d2rpick.api.suggestions import Verdict as Verdict
+    from d2rpick.api.suggestions import suggest as suggest
+    from d2rpick.api.suggestions import verify as verify
     from d2rpick.base.errors import ChangedError as ChangedError
     from d2rpick.base.errors import ConfigurationError as ConfigurationError
     from d2rpick.base.errors import D2RPickError as D2RPickError
@@ -46,11 +46,11 @@ if TYPE_CHECKING:
 
 _NAMES = {
     "base.errors": "ChangedError ConfigurationError D2RPickError DeckError FormatError HistoryError RangeError",
-    "api.choices": "Suggestion Verdict suggest verify",
+    "api.suggestions": "Suggestion Verdict suggest verify",
     "api.cards": "JudgedCard card",
     "api.costs": "Calibration PartTable calibrate parts",
     "api.checking": "Findings check",
-    "api.flights": "Exploration Plan explore plan",
+    "api.plans": "Exploration Plan explore plan",
     "api.running": "FirstRun first follow",
     "api.runs": "Run from_frame read",
     "api.studies": "Study study",

@@ -102,7 +102,7 @@ def suggest(td: float | None, td_window: WINDOW, request: Request, cards: Cards,
     d2rpick suggest --td 0.064 --report report.html sample_data/energy.csv
     """
     from d2rpick.api.asked import ask
-    from d2rpick.api.choices import suggested
+    from d2rpick.api.suggestions import suggested
 
     wanted, card = time_or_window(td, td_window), output.output_format == "card"
     if card:
@@ -154,7 +154,7 @@ def explore(td: float | None, td_window: WINDOW, steps: int, request: Request, c
     d2rpick explore --part box --plot explore.png --report explore.html sample_data/rollover_box.matsum
     """
     from d2rpick.api.asked import ask
-    from d2rpick.api.flights import explored
+    from d2rpick.api.plans import explored
 
     check_window("td_window", td_window)
     output.check(cards)
@@ -198,7 +198,7 @@ def verify(
     d2rpick verify --tr 0.0135867 --td 0.0687534 --report report.html sample_data/energy.csv
     """
     from d2rpick.api.asked import ask, open_run
-    from d2rpick.api.choices import check_pair, judged
+    from d2rpick.api.suggestions import check_pair, judged
 
     check_pair(tr, td, switched)
     output.check(cards)

@@ -16,7 +16,7 @@ from d2rpick.cli.values import CARDS
 from d2rpick.report.formats import FORMATS
 
 if TYPE_CHECKING:
-    from d2rpick.api.flights import Plan
+    from d2rpick.api.plans import Plan
 
 
 @options.command
@@ -69,7 +69,7 @@ def plan(
     d2rpick plan --part box --plot plan.png --report plan.html sample_data/rollover_box.matsum
     """
     from d2rpick.api.asked import ask, open_run
-    from d2rpick.api.flights import planned
+    from d2rpick.api.plans import planned
 
     form = output.output_format
     if every and form not in ("value", "card") and not write_deck:
@@ -115,7 +115,7 @@ def _write_and_check(card: JudgedCard, plan: Plan, folder: str, output: Output) 
     passed : bool
         Whether no finding is an error.
     """
-    from d2rpick.api.flights import written
+    from d2rpick.api.plans import written
 
     names, checked = written(plan, card, folder, overwrite=output.overwrite)
     listed = [f"written  {printable(name)}" for name in names]
