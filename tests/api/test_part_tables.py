@@ -8,14 +8,12 @@ import pytest
 
 import d2rpick as d2
 from d2rpick.choice.cost import Weights
-from tests.command import ROOT, answer, run
+from tests.command import MATSUM, answer, run
 from tests.sample_deck import DECK
-
-BOX = str(ROOT / "sample_data" / "rollover_box.matsum")
 
 
 def test_the_same_as_the_command() -> None:
-    found = d2.parts(d2.read(BOX), deck=DECK, td=0.37, replay=False)
+    found = d2.parts(d2.read(MATSUM), deck=DECK, td=0.37, replay=False)
     assert found.to_dict() == answer(*found.command) | {"command": list(found.command)}
     assert json.loads(found.to_json()) == found.to_dict()
     assert found.recommended is not None
@@ -23,14 +21,14 @@ def test_the_same_as_the_command() -> None:
     sets = found.sets_frame()
     assert sets["recommended"].tolist() == [one.recommended for one in found.sets]
     by_set: Any = {"parts": found.recommended.parts, "cost_share": found.recommended.cost_share}
-    assert d2.plan(d2.read(BOX), replay=False, **by_set).windows
+    assert d2.plan(d2.read(MATSUM), replay=False, **by_set).windows
 
 
 def test_weights_may_be_given_as_they_are(tmp_path: Path) -> None:
     weights = Weights({"BT": 1.0, "QBAT": 1.0}, rigid_node=0.0)
-    found = d2.parts(d2.read(BOX), deck=DECK, weights=weights, step_ratio=2.0, replay=False)
+    found = d2.parts(d2.read(MATSUM), deck=DECK, weights=weights, step_ratio=2.0, replay=False)
     assert found.rows[0].cost_share == pytest.approx(94 / 109)
-    assert d2.parts(d2.read(BOX), deck=DECK, given=2, replay=False).sets[-1].parts == (2,)
+    assert d2.parts(d2.read(MATSUM), deck=DECK, given=2, replay=False).sets[-1].parts == (2,)
     page = found.report(tmp_path / "parts.html").read_text("utf-8")
     assert "all that may" in page
     assert "<h1>Parts to switch: rollover box</h1>" in page
@@ -42,7 +40,7 @@ def test_weights_in_memory_are_not_left_out_of_the_command_line() -> None:
     """Typed without them it would give another run time; as it stands it is refused."""
     weights = Weights({"BT": 1.0, "QBAT": 1.0}, rigid_node=0.0)
     asked: Any = {"parts": "recommended", "deck": DECK, "weights": weights, "replay": False}
-    read = d2.read(BOX)
+    read = d2.read(MATSUM)
     answers: list[Any] = [
         d2.parts(read, deck=DECK, weights=weights, replay=False), d2.plan(read, **asked), d2.suggest(read, **asked),
         d2.verify(read, 0.097, 0.37, **asked), d2.explore(read, td_window=(0.3, 0.37), steps=2, **asked),
@@ -54,7 +52,7 @@ def test_weights_in_memory_are_not_left_out_of_the_command_line() -> None:
 
 @pytest.mark.slow
 def test_explore_takes_a_deck_as_suggest_does() -> None:
-    read = d2.read(BOX)
+    read = d2.read(MATSUM)
     asked: Any = {"td_window": (0.3, 0.37), "parts": "recommended", "deck": DECK, "replay": False}
     found = d2.explore(read, td=0.36, steps=5, **asked)
     assert found.to_dict() == answer(*found.command) | {"command": list(found.command)}

@@ -23,7 +23,7 @@ from d2rpick.histories.surroundings import Support, Surroundings
 from d2rpick.rules import RULES, check_deck
 from d2rpick.rules.base import Example
 from tests import made_car
-from tests.command import ENERGY, OSCILLATOR, ROOT, answer, codes, put, refused, run
+from tests.command import ENERGY, MATSUM, OSCILLATOR, answer, codes, put, refused, run
 from tests.decks import write
 from tests.histories.test_listings import listing
 from tests.sample_deck import DECK
@@ -129,7 +129,6 @@ def test_a_body_that_no_leg_switches_is_judged_by_the_energy_of_its_parts(
     assert [f"{one['rule']} {one['severity']}" for one in listed] == found
 
 
-BOX = str(ROOT / "sample_data" / "rollover_box.matsum")
 ASKED = {
     "suggest": ("--td", "0.37", "--part", "all", "--no-verify"),
     "verify": ("--tr", "0.1", "--td", "0.37", "--part", "all", "--no-verify"),
@@ -156,8 +155,8 @@ def told(found: dict[str, Any]) -> dict[str, Any]:
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ASKED)
 def test_the_answer_is_that_without_a_deck(command: str, foreign: str) -> None:
-    args = command, *ASKED[command], "--deck", foreign, BOX
-    without = command, *ASKED[command], BOX
+    args = command, *ASKED[command], "--deck", foreign, MATSUM
+    without = command, *ASKED[command], MATSUM
     found, plain = answer(*args), answer(*without)
     assert told(found) == told(plain)
     assert codes(found) == codes(plain) | {"deck-of-another-model"}
@@ -165,7 +164,7 @@ def test_the_answer_is_that_without_a_deck(command: str, foreign: str) -> None:
 
 @pytest.mark.slow
 def test_pages_and_cards_are_those_without_a_deck(foreign: str, tmp_path: Path) -> None:
-    asked = ("suggest", *ASKED["suggest"], BOX)
+    asked = ("suggest", *ASKED["suggest"], MATSUM)
     assert run(*asked, "--deck", foreign, "-f", "card").stdout == run(*asked, "-f", "card").stdout
     page = tmp_path / "page.html"
     run(*asked, "--deck", foreign, "--report", str(page))
@@ -175,8 +174,8 @@ def test_pages_and_cards_are_those_without_a_deck(foreign: str, tmp_path: Path) 
 
 def test_what_needs_the_deck_is_refused(foreign: str, tmp_path: Path) -> None:
     for asked in (
-        ("suggest", "--td", "0.37", "--part", "recommended", "--deck", foreign, BOX),
-        ("plan", "--part", "all", "--deck", foreign, "--write-deck", str(tmp_path / "next"), BOX),
+        ("suggest", "--td", "0.37", "--part", "recommended", "--deck", foreign, MATSUM),
+        ("plan", "--part", "all", "--deck", foreign, "--write-deck", str(tmp_path / "next"), MATSUM),
     ):
         assert "nothing of the deck is used" in refused(*asked)
     assert not (tmp_path / "next").exists()
@@ -184,12 +183,12 @@ def test_what_needs_the_deck_is_refused(foreign: str, tmp_path: Path) -> None:
 
 def test_the_library_leaves_it_out_too(foreign: str) -> None:
     asked: dict[str, Any] = {"td": 0.37, "parts": "all", "replay": False}
-    found, without = d2.suggest(d2.read(BOX), **asked, deck=foreign), d2.suggest(d2.read(BOX), **asked)
+    found, without = d2.suggest(d2.read(MATSUM), **asked, deck=foreign), d2.suggest(d2.read(MATSUM), **asked)
     assert told(found.to_dict()) == told(without.to_dict())
 
 
 def test_one_part_with_another_title_is_a_warning_only() -> None:
-    found = answer("suggest", "--td", "0.37", "--part", "box", "--deck", str(DECK), BOX)
+    found = answer("suggest", "--td", "0.37", "--part", "box", "--deck", str(DECK), MATSUM)
     assert "deck-of-another-model" not in codes(found)
     assert found["candidates"][0]["run_time_share"] < 1
 
@@ -202,14 +201,14 @@ def test_a_group_of_elements_that_the_history_lists_is_no_missing_part(
         f"#RADIOSS STARTER\n/BEGIN\nTEST\n/PART/1\nbox\n         1         1\n{group}/END\n"
     )
     asked = ("suggest", "--td", "0.37", "--part", "box", "--deck", str(tmp_path / "TEST_0000.rad"))
-    assert ("deck-of-another-model" in codes(answer(*asked, BOX.replace(".matsum", "T01")))) == foreign
+    assert ("deck-of-another-model" in codes(answer(*asked, MATSUM.replace(".matsum", "T01")))) == foreign
 
 
 def test_titles_are_compared_without_letters_that_files_encode_in_different_ways(tmp_path: Path) -> None:
     text = DECK.read_text("utf-8").replace("\nbox\n", "\nbox \u7bb1\n")
     (tmp_path / "main.k").write_bytes(text.encode("gbk"))
     assert "deck-of-another-model" not in codes(
-        answer("suggest", "--td", "0.37", "--part", "box", "--deck", str(tmp_path / "main.k"), BOX)
+        answer("suggest", "--td", "0.37", "--part", "box", "--deck", str(tmp_path / "main.k"), MATSUM)
     )
 
 

@@ -13,12 +13,11 @@ from d2rpick.histories.history import Balance, Given, History, Precision, Sample
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import open_run
 from d2rpick.report.situation import measures_of
-from tests.command import ENERGY, GLSTAT, ROOT, answer, codes, put, run
+from tests.command import BOX, ENERGY, GLSTAT, answer, codes, put, run
 from tests.computed import stored
 from tests.energies import sure
 from tests.made_t01 import t01, value
 
-ROLLOVER_T01 = str(ROOT / "sample_data" / "rolloverT01.gz")
 TIME: Samples = np.linspace(0.0, 1.0, 201)
 ONES = np.ones_like(TIME)
 # A body that is thrown up and vibrates: internal energy 2 J, the work of gravity a parabola.
@@ -150,7 +149,7 @@ def test_what_printed_digits_leave_open_is_no_work() -> None:
 
 
 def test_up_to_td_the_rollover_is_healthy_and_beyond_it_touches_the_ground() -> None:
-    run_of = open_run([ROLLOVER_T01])
+    run_of = open_run([BOX])
     box = [part for part in run_of.parts if part.title == "box"]
     flight = (0.0886, 0.37)
     before = assess(balance_of(run_of.databases, box, until=0.37) or Balance(TIME), flight, locked=1.75)
@@ -170,17 +169,17 @@ def test_the_damping_of_computed_runs_is_no_load(name: str) -> None:
 
 
 def test_suggest_and_info_tell_the_health() -> None:
-    found = answer("suggest", "--no-verify", "--td", "0.37", "--part", "box", ROLLOVER_T01)
+    found = answer("suggest", "--no-verify", "--td", "0.37", "--part", "box", BOX)
     assert found["health"]["part"] == {"id": 1, "title": "box"}
     assert found["health"]["window"] == [found["recommended"]["tr"], 0.37]
     assert not codes(found) & {"hourglass", "energy-ratio", "sliding", "work-in-window"}
-    about = answer("info", ROLLOVER_T01)
+    about = answer("info", BOX)
     assert about["health"]["sliding_share"] == pytest.approx(0.0523, abs=1e-3)
-    assert "hourglass energy of box" in run("info", ROLLOVER_T01).stdout
+    assert "hourglass energy of box" in run("info", BOX).stdout
 
 
 def test_verify_judges_the_window_between_its_times() -> None:
-    flying = ("verify", "--no-verify", "--td", "0.37", "--part", "box", "--after", "0.05", ROLLOVER_T01)
+    flying = ("verify", "--no-verify", "--td", "0.37", "--part", "box", "--after", "0.05", BOX)
     found = answer(*flying, "--tr", "0.1")
     assert found["health"]["window"] == [0.1, 0.37]
     assert not codes(found) & {"contact-in-window", "work-in-window"}
@@ -188,7 +187,7 @@ def test_verify_judges_the_window_between_its_times() -> None:
 
 
 def test_a_window_that_reaches_into_the_next_contact_is_warned_of() -> None:
-    found = answer("suggest", "--no-verify", "--td", "0.39", "--part", "box", "--after", "0.1", ROLLOVER_T01)
+    found = answer("suggest", "--no-verify", "--td", "0.39", "--part", "box", "--after", "0.1", BOX)
     assert "contact-in-window" in codes(found)
 
 

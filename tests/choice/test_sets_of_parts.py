@@ -19,7 +19,7 @@ from d2rpick.histories.opening import open_run
 from d2rpick.report.formats import Shown
 from d2rpick.vibration.measures import run_time_share
 from tests import made_car
-from tests.command import ENERGY, ROOT, answer, put, run
+from tests.command import ENERGY, MATSUM, answer, put, run
 from tests.computed import starter, stored
 from tests.energies import sure
 from tests.json_schemas import check_by_schema
@@ -27,9 +27,6 @@ from tests.made_t01 import t01
 from tests.reading import run_of
 from tests.sample_deck import DECK
 from tests.text_files import matsum_text
-
-BOX = str(ROOT / "sample_data" / "rollover_box.matsum")
-
 
 opened = cache(lambda history: open_run([history]))
 
@@ -40,7 +37,7 @@ def asked(history: str, deck: str | None = None, **more: object) -> Parts:
 
 
 def test_without_a_deck_no_verdict_is_guessed_and_the_cost_stays_open() -> None:
-    found = asked(BOX)
+    found = asked(MATSUM)
     assert [row.verdict for row in found.rows] == ["unknown", "unknown"]
     assert [row.cost_share for row in found.rows] == [None, None]
     assert found.sets == ()
@@ -50,7 +47,7 @@ def test_without_a_deck_no_verdict_is_guessed_and_the_cost_stays_open() -> None:
 
 
 def test_parts_of_the_box_are_one_body_and_the_sled_is_rigid_already() -> None:
-    found = asked(BOX, str(DECK))
+    found = asked(MATSUM, str(DECK))
     assert [(row.verdict, row.merge_with) for row in found.rows] == [("switch", None), ("merge", 1), ("keep", None)]
     assert found.rows[2].reasons == ("already rigid",)
     best = sure(found.recommended)
@@ -70,7 +67,7 @@ def variant(folder: Path, *changes: tuple[str, str]) -> str:
 
 def changed(folder: Path, *changes: tuple[str, str]) -> Parts:
     """What is found with the deck that was changed so, in a window that is given: none is searched."""
-    return asked(BOX, variant(folder, *changes), times=TIMES)
+    return asked(MATSUM, variant(folder, *changes), times=TIMES)
 
 
 STEP = "step\n         2         2         1"
@@ -123,7 +120,7 @@ def test_a_deck_of_another_run_is_noticed(tmp_path: Path) -> None:
     assert found.rows[1].verdict == "unknown"
     assert found.recommended is None  # elements of a part that no *PART defines: the cost is not known
     with pytest.raises(FormatError, match="no set of parts can be recommended"):
-        recommended_parts(open_run([BOX]), Settings(), CostModel(read_inventory(str(tmp_path / "main.k"))))
+        recommended_parts(open_run([MATSUM]), Settings(), CostModel(read_inventory(str(tmp_path / "main.k"))))
 
 
 def test_none_is_recommended_of_a_table_which_says_what_to_give_instead() -> None:
@@ -235,7 +232,7 @@ def test_which_part_drives_the_landing_alone(rows: list[PartRow], alone: int | N
 
 def test_a_part_that_drives_the_landing_alone_is_kept() -> None:
     model = CostModel(read_inventory(str(DECK)), Weights({"BT": 1.0, "QBAT": 0.1}))
-    facts = facts_of(open_run([BOX]), Settings())
+    facts = facts_of(open_run([MATSUM]), Settings())
 
     def with_landing(part: PartFacts, landing: float) -> PartFacts:
         return part._replace(flights=tuple(one._replace(landing=landing) for one in part.flights))
@@ -261,9 +258,9 @@ def apart(folder: Path, more: str = "") -> str:
 
 
 def test_parts_that_welds_join_are_one_body_and_the_weld_is_named(tmp_path: Path) -> None:
-    found = asked(BOX, apart(tmp_path), times=TIMES)
+    found = asked(MATSUM, apart(tmp_path), times=TIMES)
     assert [(row.verdict, row.shares_nodes) for row in found.rows[:2]] == [("switch", ()), ("switch", ())]
-    welded = asked(BOX, apart(tmp_path, f"*CONSTRAINED_SPOTWELD\n{13:10d}{213:10d}\n"), times=TIMES)
+    welded = asked(MATSUM, apart(tmp_path, f"*CONSTRAINED_SPOTWELD\n{13:10d}{213:10d}\n"), times=TIMES)
     assert [(row.verdict, row.merge_with) for row in welded.rows[:2]] == [("switch", None), ("merge", 1)]
     assert [row.reasons[-1] for row in welded.rows[:2]] == [
         "joined to part 2 (spotweld)", "joined to part 1 (spotweld)"
@@ -273,7 +270,7 @@ def test_parts_that_welds_join_are_one_body_and_the_weld_is_named(tmp_path: Path
 
 def test_ties_that_may_join_parts_are_told_where_these_are_several_bodies(tmp_path: Path) -> None:
     tie = "*CONTACT_TIED_NODES_TO_SURFACE\n         1         2\n"
-    told = {one.code: one.message for one in asked(BOX, apart(tmp_path, tie), times=TIMES).cautions}
+    told = {one.code: one.message for one in asked(MATSUM, apart(tmp_path, tie), times=TIMES).cautions}
     assert "*CONTACT_TIED_NODES_TO_SURFACE" in told["ties-not-followed"]
     whole = changed(tmp_path, ("*END", f"{tie}*END"))
     assert "ties-not-followed" not in [one.code for one in whole.cautions]

@@ -13,9 +13,7 @@ from d2rpick.base import __version__
 from d2rpick.cli import COMMANDS, d2rpick
 from d2rpick.cli.manual import manual
 from d2rpick.rules import RULES
-from tests.command import ENERGY, GLSTAT, ROLLOVER, ROOT, TIME_LIMIT, answer, put, refused, run
-
-MATSUM = str(ROOT / "sample_data" / "rollover_box.matsum")
+from tests.command import ENERGY, GLSTAT, MATSUM, ROLLOVER, ROOT, TIME_LIMIT, answer, put, refused, run
 
 
 def test_settings_are_shown_with_their_sources_and_nothing_is_done(

@@ -11,10 +11,9 @@ import pandas as pd
 import pytest
 
 import d2rpick as d2
-from tests.command import ENERGY, ROOT, answer, put, run
+from tests.command import ENERGY, MATSUM, ROOT, answer, put, run
 from tests.json_schemas import checked
 
-MATSUM = str(ROOT / "sample_data" / "rollover_box.matsum")
 WINDOW = ("--td-window", "0.06", "0.07", "--steps", "10")
 SCHEMA = json.loads((ROOT / "d2rpick/schemas/explore-1.json").read_text("utf-8"))
 

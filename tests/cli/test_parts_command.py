@@ -11,25 +11,23 @@ import d2rpick as d2
 from d2rpick.report.formats import Shown
 from d2rpick.report.parts import COLUMNS, SET_COLUMNS
 from tests.choice.test_calibration import run_folder
-from tests.command import ROOT, answer, put, refused, run
+from tests.command import ENERGY, MATSUM, answer, put, refused, run
 from tests.json_schemas import checked
 from tests.sample_deck import DECK
 
 pytestmark = pytest.mark.usefixtures("by_level")
 
-BOX = str(ROOT / "sample_data" / "rollover_box.matsum")
-ENERGY = str(ROOT / "sample_data" / "energy.csv")
-WITH_DECK = ("--deck", str(DECK), BOX)
+WITH_DECK = ("--deck", str(DECK), MATSUM)
 
 
-@pytest.mark.parametrize("args", [WITH_DECK, (BOX,), ("--td", "0.37", *WITH_DECK), ("--deck", str(DECK), ENERGY)])
+@pytest.mark.parametrize("args", [WITH_DECK, (MATSUM,), ("--td", "0.37", *WITH_DECK), ("--deck", str(DECK), ENERGY)])
 def test_the_answer_keeps_its_schema(args: tuple[str, ...]) -> None:
     found = checked("parts", *args)
     assert (found["deck"] is None) == ("--deck" not in args)
 
 
 def test_all_forms_hold_the_same() -> None:
-    parts = d2.parts(d2.read(BOX), deck=DECK)
+    parts = d2.parts(d2.read(MATSUM), deck=DECK)
     found = parts.to_dict()
     rows = list(csv.DictReader(io.StringIO(parts.text("csv", Shown()))))
     assert [row["verdict"] for row in rows] == [row["verdict"] for row in found["parts"]] == ["switch", "merge", "keep"]
@@ -43,12 +41,12 @@ def test_all_forms_hold_the_same() -> None:
 
 @pytest.mark.parametrize("word", ["flying", "all"])
 def test_a_set_to_compare_may_be_named_by_what_its_parts_do(word: str) -> None:
-    found = answer("parts", "--part", word, BOX)
+    found = answer("parts", "--part", word, MATSUM)
     assert [(one["name"], one["parts"]) for one in found["sets"]] == [("given", [1, 2])]
 
 
 def test_the_tables_fit_a_screen_and_markdown_has_every_column() -> None:
-    for args in (WITH_DECK, (BOX,)):
+    for args in (WITH_DECK, (MATSUM,)):
         table = run("parts", "-q", *args).stdout
         assert max(map(len, table.splitlines()[3:])) <= 110  # below the names of files
     markdown = run("parts", "-q", "-f", "markdown", *WITH_DECK).stdout
@@ -56,9 +54,9 @@ def test_the_tables_fit_a_screen_and_markdown_has_every_column() -> None:
 
 
 def test_without_a_set_to_take_every_form_is_an_objection() -> None:
-    without_deck = run("parts", "-q", "-f", "value", BOX)
+    without_deck = run("parts", "-q", "-f", "value", MATSUM)
     assert (without_deck.exit_code, without_deck.stdout) == (1, "")
-    assert run("parts", "-q", "-f", "json", BOX).exit_code == 1
+    assert run("parts", "-q", "-f", "json", MATSUM).exit_code == 1
     no_parts = run("parts", ENERGY)
     assert no_parts.exit_code == 1
     assert "give the matsum, binout or T01" in no_parts.stderr
@@ -90,12 +88,12 @@ def test_where_nothing_can_be_recommended_the_answer_is_an_objection(tmp_path: P
         tmp_path / "main.k",
         DECK.read_text("utf-8").replace("         1         2       1.0", "         1        99       1.0"),
     )
-    result = run("parts", "--deck", str(other), BOX)
+    result = run("parts", "--deck", str(other), MATSUM)
     assert result.exit_code == 1
     assert "no weight is known for shell (ELFORM 99)" in result.stdout
-    assert run("parts", "--exit-zero", "--deck", str(other), BOX).exit_code == 0
+    assert run("parts", "--exit-zero", "--deck", str(other), MATSUM).exit_code == 0
     weights = put(tmp_path / "site.toml", '[per_element]\n"shell (ELFORM 99)" = 1.0\nQBAT = 1.0\nBT = 1.0\n')
-    assert run("parts", "--deck", str(other), "--weights", str(weights), BOX).exit_code == 0
+    assert run("parts", "--deck", str(other), "--weights", str(weights), MATSUM).exit_code == 0
 
 
 @pytest.mark.slow
@@ -104,7 +102,7 @@ def test_where_nothing_can_be_recommended_the_answer_is_an_objection(tmp_path: P
 )
 def test_a_deck_takes_the_place_of_a_cost_share(command: tuple[str, ...]) -> None:
     def share(*more: str) -> float:
-        text = run(*command, "--no-verify", "-q", "-f", "json", *more, BOX).stdout
+        text = run(*command, "--no-verify", "-q", "-f", "json", *more, MATSUM).stdout
         found = json.loads(text)
         rows = found.get("windows") or found.get("candidates") or [found]
         return float(next(row["run_time_share"] for row in rows if row.get("recommended", True)))
@@ -121,12 +119,13 @@ def test_a_deck_takes_the_place_of_a_cost_share(command: tuple[str, ...]) -> Non
 @pytest.mark.parametrize("command", ["parts", "plan", "suggest"])
 def test_a_deck_is_never_written_over(tmp_path: Path, command: str) -> None:
     own = put(tmp_path / "main.k", DECK.read_bytes())
-    assert "this is an input" in refused(command, "--part", "1", "--deck", str(own), "-o", str(own), "--overwrite", BOX)
+    asked = (command, "--part", "1", "--deck", str(own), MATSUM)
+    assert "this is an input" in refused(*asked, "-o", str(own), "--overwrite")
     assert own.read_bytes() == DECK.read_bytes()
 
 
 def test_recommended_needs_a_deck_and_stands_alone() -> None:
-    result = run("plan", "--part", "recommended", BOX)
+    result = run("plan", "--part", "recommended", MATSUM)
     assert (result.exit_code, "--part recommended needs --deck" in result.stderr) == (2, True)
     result = run("plan", "--part", "recommended", "--part", "3", *WITH_DECK)
     assert (result.exit_code, "stands for a whole set" in result.stderr) == (2, True)
@@ -134,7 +133,7 @@ def test_recommended_needs_a_deck_and_stands_alone() -> None:
 
 def test_a_cost_that_is_not_known_is_a_warning(tmp_path: Path) -> None:
     cut = put(tmp_path / "main.k", DECK.read_text("utf-8").replace("*END", "*INCLUDE\nabsent.k\n*END"))
-    found = checked("plan", "--part", "1,2", "--deck", str(cut), BOX)
+    found = checked("plan", "--part", "1,2", "--deck", str(cut), MATSUM)
     assert found["run_time_share"] is None
     assert "absent.k was not read" in next(one["message"] for one in found["warnings"] if one["code"] == "cost-unknown")
     whole = answer("suggest", "--td", "0.37", *WITH_DECK)
@@ -171,7 +170,7 @@ def test_what_is_doubtful_in_a_deck_is_said_wherever_it_counts(asked: tuple[str,
 
     assert codes(*WITH_DECK) >= {"weights-by-analogy"}
     deck = put(tmp_path / "main.k", DECK.read_text("utf-8").replace("*END", "*ELEMENT_GENERALIZED_SHELL\n*END"))
-    doubts = codes("--deck", str(deck), BOX)
+    doubts = codes("--deck", str(deck), MATSUM)
     assert "deck-not-followed" in doubts
     if asked[0] != "parts":
         assert "cost-unknown" in doubts

@@ -22,16 +22,11 @@ from d2rpick.histories.names import Part
 from tests.command import put
 from tests.computed import results, starter
 from tests.energies import sure
+from tests.flight.test_position_error import ENGINE, MASSES, PLACES, TIME, vectors
 from tests.reading import solved
 
-TIME = np.linspace(0.0, 0.1, 401)
-PLACES = np.array([[1.5, 0.7, 0.1], [1.4, -0.7, 0.0], [-1.5, 0.6, 0.2], [-1.3, -0.7, 0.6], [0.9, 0.1, 0.3]])
-MASSES = np.array([150.0, 160.0, 140.0, 130.0, 200.0])
 SPREAD = np.diag([0.10, 0.06, 0.03])  # second moments of each part over its mass [m2]
-ENGINE = 4
 LOOKED_AT = np.array([0.2, 0.1, 1.2])
-numbers = st.floats(-1.0, 1.0).map(lambda value: round(value, 3))
-vectors = st.tuples(numbers, numbers, numbers).map(np.array)
 
 
 def inertia(places: Samples) -> Samples:

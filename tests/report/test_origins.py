@@ -6,11 +6,10 @@ from pathlib import Path
 import pytest
 
 import d2rpick as d2
-from tests.command import ROOT, answer, run
+from tests.command import MATSUM, answer, run
 from tests.json_schemas import checked
 from tests.sample_deck import DECK
 
-BOX = str(ROOT / "sample_data" / "rollover_box.matsum")
 WEIGHTS = 'source = "our cluster"\n[per_element]\nBT = 1\nQBAT = 2\n'
 ASKED = {
     "suggest": ("--td", "0.37", "--part", "all", "--no-verify"),
@@ -38,7 +37,7 @@ def deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ASKED)
 def test_a_deck_and_weights_that_took_part_are_named(command: str) -> None:
-    args = (command, *ASKED[command], "--deck", "main.k", BOX)
+    args = (command, *ASKED[command], "--deck", "main.k", MATSUM)
     named = {"source": ["main.k", "note.k"], "sha256": [digest("main.k"), digest("note.k")]}
     by_file = {"source": "our cluster", "file": "site.toml", "sha256": digest("site.toml")}
     found = checked(*args, "--weights", "site.toml")
@@ -46,20 +45,20 @@ def test_a_deck_and_weights_that_took_part_are_named(command: str) -> None:
     assert {key: found["weights"][key] for key in by_file} == by_file
     run(*args, "--weights", "site.toml", "--report", "page.html")
     page = Path("page.html").read_text("utf-8")
-    for file in (BOX, "main.k", "note.k", "site.toml"):
+    for file in (MATSUM, "main.k", "note.k", "site.toml"):
         assert page.count(f"{file}: {digest(file)}") == 1
 
 
 @pytest.mark.parametrize("command", ASKED)
 def test_without_a_deck_none_is_named(command: str) -> None:
-    found = answer(command, *ASKED[command], BOX)
+    found = answer(command, *ASKED[command], MATSUM)
     assert (found["deck"], found["weights"]) == (None, None)
 
 
 def test_what_took_no_part_is_not_named() -> None:
-    weights = answer("suggest", *ASKED["suggest"], "--deck", "main.k", BOX)["weights"]
+    weights = answer("suggest", *ASKED["suggest"], "--deck", "main.k", MATSUM)["weights"]
     assert (weights["file"], weights["sha256"]) == (None, None)  # those that ship
-    asked = ("suggest", "--td", "0.37", "--deck", "main.k", BOX)
+    asked = ("suggest", "--td", "0.37", "--deck", "main.k", MATSUM)
     assert answer(*asked)["deck"] is None  # without parts a deck tells nothing
     given = answer(*asked, "--part", "all", "--weights", "site.toml", "--cost-share", "0.5")
     assert given["deck"]["source"] == ["main.k", "note.k"]
@@ -68,7 +67,7 @@ def test_what_took_no_part_is_not_named() -> None:
 
 @pytest.mark.slow
 def test_the_library_names_them_too() -> None:
-    found = d2.suggest(d2.read(BOX), td=0.37, parts="all", replay=False, deck="main.k", weights="site.toml")
+    found = d2.suggest(d2.read(MATSUM), td=0.37, parts="all", replay=False, deck="main.k", weights="site.toml")
     assert found.to_dict()["weights"]["sha256"] == digest("site.toml")
     assert digest("note.k") in found.report("page.html").read_text("utf-8")
 
@@ -80,7 +79,7 @@ def test_of_a_deck_of_many_files_a_page_names_the_first() -> None:
         Path(name).write_text("*TITLE\nnothing\n", "utf-8")
     includes = "".join(f"*INCLUDE\n{name}\n" for name in names)
     Path("main.k").write_text(DECK.read_text("utf-8").replace("*END", f"{includes}*END"), "utf-8")
-    asked = ("suggest", *ASKED["suggest"], "--deck", "main.k", BOX)
+    asked = ("suggest", *ASKED["suggest"], "--deck", "main.k", MATSUM)
     assert answer(*asked, "--report", "page.html")["deck"]["source"] == ["main.k", *names]
     page = Path("page.html").read_text("utf-8")
     assert ("part18.k: " in page, "part19.k: " in page) == (True, False)
