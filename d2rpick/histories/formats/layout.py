@@ -154,6 +154,8 @@ def _find_rows(lines: Sequence[str], first: int, separator: str) -> Layout | Non
     for only_numbers in (False, True):
         best, most = None, 0 if only_numbers else len(sample) // 2
         for sign, decimal in forms:
+            if sign and not any(sign in line for _, line in sample):
+                continue
             cells = [(i, split(line, sign)) for i, line in sample]
             kinds = [(i, row, kind) for i, row in cells if (kind := _kind(row, decimal, only_numbers))]
             if not kinds:
