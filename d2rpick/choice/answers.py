@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Verdict(OfTd):
     """Answer of ``verify``: the measures of one pair, and what is right or wrong with it.
 
@@ -103,7 +103,7 @@ class AcceptableWindow(NamedTuple):
     share: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Suggestion(OfTd):
     """Answer of ``suggest``: ranked candidates, the recommended pair, a better one at another td, warnings.
 

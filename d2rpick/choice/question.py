@@ -51,7 +51,7 @@ def read(names: Sequence[str], selection: Selection = _DEFAULT, input_format: st
     return Reference.of(open_run(names, selection, input_format), selection)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Settings:
     """What the analyst asks for; times in the unit of the history.
 

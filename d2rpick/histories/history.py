@@ -208,7 +208,7 @@ class Balance:
         return None if self.external_work is None or not np.ptp(self.external_work) else self.external_work
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Given:
     """What tells when the parts fly, beside their energy.
 

@@ -22,7 +22,7 @@ class Support(NamedTuple):
     end: float = inf
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Surroundings:
     """What acts on each part from outside, by number; on the whole model by None.
 

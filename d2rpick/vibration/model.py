@@ -59,7 +59,7 @@ class Compared(NamedTuple):
     bound: Bound
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Vibration:
     """A vibration seen from one td.
 

@@ -28,7 +28,7 @@ _EPS = float(np.finfo(np.float64).eps)
 _ZERO = 1e-9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Mode:
     r"""One under-damped vibration and the internal energy it makes.
 
@@ -261,7 +261,7 @@ _OFF_THE_GRID: Final = 1e-4  # of them: modes that begin together stand still to
 _ROUNDING: Final = 1e-6  # of a radian: where an end of a window is itself an extremum, one is found this near to it
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Modes:
     r"""Two or more under-damped vibrations with one damping, and the internal energy they make together.
 

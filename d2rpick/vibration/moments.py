@@ -185,7 +185,7 @@ class ModalEnergy(SampledEnergy):
 _KINDS: Final = ("crossing", "extremum", "match", "start", "given")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Moments:
     """Times that may serve as tr, before anything is measured, as columns of shape (n,).
 
