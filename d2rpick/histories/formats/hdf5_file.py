@@ -16,7 +16,8 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError, listing, printable
 from d2rpick.histories.database import DIGITS, Database
-from d2rpick.histories.formats.hdf5_columns import Column, check_data, check_file, columns_of, finite
+from d2rpick.histories.formats.hdf5_columns import Column, columns_of, finite
+from d2rpick.histories.formats.hdf5_damage import check_data, check_file
 from d2rpick.histories.formats.printed_numbers import of_one_run
 from d2rpick.histories.history import Precision, Samples
 from d2rpick.histories.names import Part, Selection, near_miss, refuse_other_quantity
