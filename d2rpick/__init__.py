@@ -11,9 +11,7 @@ What is named here is imported when it is first used: the package itself imports
 
 from __future__ import annotations
 
-from d2rpick.api import __dir__ as __dir__
-from d2rpick.api import __getattr__ as __getattr__
-from d2rpick.api import names
+from d2rpick.api import __dir__ as __dir__, __getattr__ as __getattr__, names
 from d2rpick.base import __version__ as __version__
 
 TYPE_CHECKING = False  # type checkers take it for theirs; importing typing is left to those who need it

@@ -19,8 +19,8 @@ from hypothesis import settings
 
 from d2rpick.base.workers import cores
 
-# A busy machine is no finding.  Each run asks other examples: an eighth of the usual hundred are as good as all.
-settings.register_profile("d2rpick", deadline=None, max_examples=12)
+# A busy machine is no finding.  Each run asks other examples: a fifth of the usual hundred are as good as all.
+settings.register_profile("d2rpick", deadline=None, max_examples=20)
 settings.load_profile("d2rpick")
 
 # Nor is it that each process of the tests compiles them anew.

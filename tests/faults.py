@@ -8,8 +8,7 @@ import re
 from collections.abc import Sequence
 from typing import TypeVar
 
-from hypothesis import HealthCheck, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, settings, strategies as st
 
 Item = TypeVar("Item")
 _MORE = int(os.environ.get("D2RPICK_THOROUGH", "1"))

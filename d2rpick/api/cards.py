@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.answers import Verdict
     from d2rpick.choice.judged_card import CardRequest
     from d2rpick.choice.switched_run import Times
-    from d2rpick.deck.printed_card import PrintedCard, Printing
-    from d2rpick.deck.printed_card import Solver as Module
+    from d2rpick.deck.printed_card import PrintedCard, Printing, Solver as Module
 
 _RANGE: Final = r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?"  # compiled where it is needed
 _MOST_IDS: Final = 100_000
@@ -307,8 +306,7 @@ def card(
 
 def card_of(windows: Sequence[Times], run: Run | None, request: Request, cards: Cards) -> JudgedCard:
     """Print the card of windows, judged as printed where there is a run."""
-    from d2rpick.deck.printing import DEFAULT, SOLVERS
-    from d2rpick.deck.printing import cards as print_cards
+    from d2rpick.deck.printing import DEFAULT, SOLVERS, cards as print_cards
 
     if run is None:
         request.without_history()

@@ -11,8 +11,7 @@ from d2rpick.api.asked import Asked, ask, request_of
 from d2rpick.api.cards import CardOptions, Cards, JudgedCard, judged
 from d2rpick.api.request import check_window
 from d2rpick.base.errors import ArgumentError
-from d2rpick.choice import plan as planning
-from d2rpick.choice import trade_off
+from d2rpick.choice import plan as planning, trade_off
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Unpack
 from d2rpick.api import arguments
 from d2rpick.api.answer import RunAnswer, frame_of
 from d2rpick.api.asked import Asked, ask, request_of
-from d2rpick.api.cards import CardOptions, Cards, JudgedCard
-from d2rpick.api.cards import judged as card_judged
+from d2rpick.api.cards import CardOptions, Cards, JudgedCard, judged as card_judged
 from d2rpick.api.request import MIN_MEAN_ENERGY, time_or_window
 from d2rpick.base.errors import ArgumentError
 from d2rpick.choice import answers, of_run

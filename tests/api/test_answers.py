@@ -11,15 +11,13 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 
 import d2rpick as d2
 from d2rpick.api.answer import written
 from d2rpick.report.keys import MEASURES
 from d2rpick.report.plan import sentence as plan_sentence
-from tests.command import BOX, DECK, ENERGY, GLSTAT, MATSUM, ROLLOVER, ROOT, answer, put, run
-from tests.command import run as run_command
+from tests.command import BOX, DECK, ENERGY, GLSTAT, MATSUM, ROLLOVER, ROOT, answer, put, run, run as run_command
 from tests.energies import sure
 from tests.sample_deck import DECK as SAMPLE_DECK
 

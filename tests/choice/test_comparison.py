@@ -18,8 +18,7 @@ from d2rpick.choice.question import Settings
 from d2rpick.choice.switched_run import rigid_parts, switched_history
 from d2rpick.histories.history import History, Samples, Track
 from d2rpick.histories.opening import Selection, open_run
-from tests.command import BOX, ENERGY, ROLLOVER, answer, put, refused, run
-from tests.command import replayed as motion
+from tests.command import BOX, ENERGY, ROLLOVER, answer, put, refused, replayed as motion, run
 from tests.computed import results, stored
 from tests.energies import sure
 from tests.json_schemas import check_by_schema, checked

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from d2rpick.base.errors import ConfigurationError
 from d2rpick.choice.cost import CostModel, Weights, read_weights, saved_share, weights_as_toml

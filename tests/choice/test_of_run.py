@@ -8,8 +8,7 @@ from d2rpick.choice.question import Reference, Settings, read
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
 from d2rpick.rules.judgement import faults_of
-from tests.command import BOX as T01
-from tests.command import ENERGY, GLSTAT
+from tests.command import BOX as T01, ENERGY, GLSTAT
 from tests.counted_fits import CountedFits
 from tests.energies import sure
 

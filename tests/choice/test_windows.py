@@ -5,8 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from hypothesis import assume, example, given, settings
-from hypothesis import strategies as st
+from hypothesis import assume, example, given, settings, strategies as st
 
 from d2rpick.choice.answers import Suggestion, suggest, verify, verify_at
 from d2rpick.choice.flights import flights_of

@@ -6,15 +6,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.report.history_files import format_of, write_table
-from tests.command import BOX as ROLLOVER_T01
-from tests.command import ENERGY, GLSTAT, OSCILLATOR, ROLLOVER, ROOT, answer, put, refused, replayed, run
+from tests.command import (
+    BOX as ROLLOVER_T01,
+    ENERGY,
+    GLSTAT,
+    OSCILLATOR,
+    ROLLOVER,
+    ROOT,
+    answer,
+    put,
+    refused,
+    replayed,
+    run,
+)
 from tests.reading import read_history
 
 SUFFIXES = ["csv", "h5", "hdf5"]

@@ -11,8 +11,7 @@ from d2rpick.choice.situation import examine
 from d2rpick.choice.warnings import cautions_of
 from d2rpick.histories.history import EXACT, Given, History, Momenta
 from d2rpick.histories.names import Part
-from tests.command import BOX as ROLLOVER_T01
-from tests.command import answer, codes, put, refused, replayed, run
+from tests.command import BOX as ROLLOVER_T01, answer, codes, put, refused, replayed, run
 from tests.json_schemas import checked
 from tests.records import ENERGY, TIME
 

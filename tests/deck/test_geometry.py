@@ -14,8 +14,7 @@ from d2rpick.deck.model import Inventory
 from d2rpick.deck.radioss_run import read_run
 from tests.command import put
 from tests.computed import starter, stored
-from tests.deck import test_ls_dyna_inventory as dyna
-from tests.deck import test_radioss_inventory as rad
+from tests.deck import test_ls_dyna_inventory as dyna, test_radioss_inventory as rad
 from tests.decks import read, row, wide
 
 RHO, E, NU = 8000.0, 2.0e11, 0.25

@@ -5,8 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from d2rpick.base.errors import DeckError
 from d2rpick.deck import ls_dyna_inventory, read_inventory

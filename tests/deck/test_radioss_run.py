@@ -3,8 +3,7 @@
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from d2rpick.base.errors import DeckError
 from d2rpick.deck.radioss_files import recognises, run_files

@@ -13,8 +13,7 @@ from threading import Event, current_thread, main_thread
 from typing import TYPE_CHECKING
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from d2rpick.base.errors import DeckError
 from d2rpick.base.files import FileState

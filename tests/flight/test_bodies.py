@@ -5,8 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from d2rpick.flight.bodies import Bodies, RigidBody, bodies_in_flight
 from d2rpick.flight.flight import Flight, find_flight, seen_flight

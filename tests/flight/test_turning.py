@@ -9,8 +9,7 @@ from typing import cast
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from d2rpick.deck import read_inventory
 from d2rpick.deck.geometry import Placed, Placement

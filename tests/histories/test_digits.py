@@ -1,7 +1,6 @@
 """Times as they are read and typed again."""
 
-from hypothesis import example, given
-from hypothesis import strategies as st
+from hypothesis import example, given, strategies as st
 
 from d2rpick.histories.digits import above, as_read, not_after, not_before, told_apart, window_as_read
 

@@ -19,8 +19,7 @@ from d2rpick.histories.opening import READERS, Run, Selection, open_run, reader
 from d2rpick.histories.source import Source
 from tests.command import put
 from tests.computed import stored
-from tests.made_binout import binout as made_binout
-from tests.made_binout import values
+from tests.made_binout import binout as made_binout, values
 from tests.made_t01 import MadePart, t01, value
 from tests.reading import history_of, read_history, run_of, states_of
 from tests.text_files import HEAD, glstat_text, matsum_head, matsum_part, matsum_text

@@ -4,8 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from d2rpick.base.errors import RangeError
 from d2rpick.models.box_model import GRAVITY, Bars, Parameters, Truss, build, stiffest_rate

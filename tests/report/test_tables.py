@@ -1,7 +1,6 @@
 """What is narrowed loses no word but columns that may be left out, and is as wide as asked for where words allow it."""
 
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from d2rpick.report.tables import Cell, as_text, wrapped
 

@@ -3,8 +3,7 @@
 from functools import cache
 
 import numpy as np
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from d2rpick.histories.history import EXACT, Balance, History, Momenta
 from d2rpick.running.wait import InnerMotion

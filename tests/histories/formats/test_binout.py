@@ -11,8 +11,7 @@ from d2rpick.histories.formats import binout
 from d2rpick.histories.formats.binout import Binout, recognises
 from d2rpick.histories.opening import Run, Selection
 from d2rpick.histories.source import Source
-from tests.made_binout import GLSTAT, LsdaWriter, Style, values
-from tests.made_binout import binout as made_binout
+from tests.made_binout import GLSTAT, LsdaWriter, Style, binout as made_binout, values
 from tests.reading import run_of
 
 

@@ -9,8 +9,7 @@ from itertools import pairwise
 from random import Random
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from d2rpick.histories.formats.binout import Binout
 from tests.damaged_files import FILES, PARTS, STATES, bounded_memory, true_binout, true_t01

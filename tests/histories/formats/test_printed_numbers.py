@@ -1,8 +1,7 @@
 """Numbers in the fixed columns of Fortran."""
 
 import numpy as np
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from d2rpick.histories.formats.printed_numbers import decode
 
