@@ -104,14 +104,19 @@ class Card:
     def _number(self, row: Row, position: int, default: T, kind: Callable[[float], T]) -> Value[T]:
         text = row.cell(position)
         if not text:
-            return Value(default, row, position=position)
-        names = names_in(text) if "&" in text else ()
+            return Value(default, row, "", (), position)
+        names: tuple[str, ...] = ()
         try:
-            value = kind(exact := float(self.scope.value(text) if "&" in text or text[0] == "<" else number(text)))
+            if "&" in text or text[0] == "<":
+                names = names_in(text)
+                exact = float(self.scope.value(text))
+            else:
+                exact = float(number(text))
+            if (value := kind(exact)) == exact:
+                return Value(value, row, "", names, position)
         except (ExpressionError, OverflowError) as error:
             return Value(default, row, str(error), names, position)
-        problem = "" if value == exact else f"{text!r} is not an integer"
-        return Value(default if problem else value, row, problem, names, position)
+        return Value(default, row, f"{text!r} is not an integer", names, position)
 
     def positive(self, row: Row, position: int) -> float | None:
         """Read a positive number, or None; of an include in other units none is known."""

@@ -8,6 +8,7 @@ from bisect import bisect_right
 from collections import defaultdict
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import chain
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import DeckError
@@ -128,16 +129,18 @@ class Deck:
 
     def named(self, *names: str) -> list[Card]:
         """Cards of a deck that was read whose keyword is one of ``names``, or one with an option behind ``_``."""
-        wanted = tuple(f"{name}_" for name in names)
-        found = [place for name, places in self._places.items() if name.startswith(wanted) for place in places]
-        return [self.cards[place] for place in sorted(found)]
+        found = [self._places[name] for name in names if name in self._places]
+        return [self.cards[place] for place in (found[0] if len(found) == 1 else sorted({*chain(*found)}))]
 
     @cached_property
     def _places(self) -> Mapping[str, Sequence[int]]:
-        """Places of the cards by their names, with an ``_`` behind: every rule asks for some."""
+        """Places of the cards by their names, and by what stands there before an ``_``: every rule asks for some."""
         found: defaultdict[str, list[int]] = defaultdict(list)
         for place, card in enumerate(self.cards):
-            found[f"{card.name}_"].append(place)
+            end = len(name := card.name)
+            while end > 0:
+                found[name[:end]].append(place)
+                end = name.rfind("_", 0, end)
         return found
 
     def silences(self, rule: str, file: str, line: int) -> bool:
