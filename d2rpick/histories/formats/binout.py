@@ -182,8 +182,9 @@ class Branch(Database):
 
     @property
     def time_width(self) -> int:
-        """Bytes per number of the times, the shortest of all states."""
-        return min((held["time"].dtype.itemsize for held in self._variables if "time" in held), default=8)
+        """Bytes per number of the times, the shortest of all states; times of another type are refused when read."""
+        times = (held["time"].dtype for held in self._variables if "time" in held)
+        return min((one.itemsize for one in times if one.kind == "f"), default=8)
 
     @cached_property
     def legend(self) -> dict[int, str]:

@@ -186,6 +186,16 @@ def test_a_variable_that_appears_late_is_no_channel() -> None:
         run.channel("added_mass")
 
 
+@pytest.mark.parametrize("code", [1, 2, 3, 5, 6, 7])  # integers of up to four bytes
+def test_times_of_another_type_are_refused(code: int) -> None:
+    data = bytes(made_binout(range(1, 4)).data)
+    whole = b"\x09\x04time"  # type, length of the name, name
+    assert whole in data
+    run = opened(data.replace(whole, bytes([code]) + whole[1:]))
+    with pytest.raises(FormatError, match=r"time is stored as u?int"):
+        run.branch("glstat").channel("time")
+
+
 def test_no_states_is_a_legal_file() -> None:
     run = opened(made_binout([]))
     assert run.time.size == run.part_time.size == 0
