@@ -46,26 +46,26 @@ def longest_rigid_times(situation: Situation, times: Samples) -> Samples:
     start = max(start, float(history.time[0]))
     if situation.evidence.has_model or start >= history.time[-1]:
         return np.maximum(times - start, 0.0)
-    later = history.time > start
-    time = np.append(start, history.time[later])
-    energy = np.append(history.energy_at(start), history.energy[later])
+    time, energy = history.between(np.nextafter(start, np.inf), np.inf)
+    time, energy = np.append(start, time), np.append(history.energy_at(start), energy)
+    extremes = np.minimum.accumulate(energy), np.maximum.accumulate(energy)
     level, tolerance = history.energies_at(times), situation.settings.tolerance
-    passed = time[np.minimum(_reached(energy, level, np.full(times.shape, -ROUNDING)), time.size - 1)]
+    passed = time[np.minimum(_reached(*extremes, level, np.full(times.shape, -ROUNDING)), time.size - 1)]
     turns = np.searchsorted(history.turns, times) - np.searchsorted(history.turns, passed, side="right")
     passes = (turns >= 2) & (level > ROUNDING * np.abs(history.energy).max())
     near = np.where(passes, min(tolerance, LIKE_LEVELS), tolerance) + ROUNDING
-    entered = time[np.maximum(_reached(energy, level, near) - 1, 0)]  # or since, but after the state before
+    entered = time[np.maximum(_reached(*extremes, level, near) - 1, 0)]  # or since, but after the state before
     return np.asarray(np.maximum(times - np.where(level <= round_off(history), start, entered), 0.0))
 
 
-def _reached(energy: Samples, level: Samples, near: Samples) -> Samples:
+def _reached(lowest: Samples, highest: Samples, level: Samples, near: Samples) -> Samples:
     """Index of the first state by which the energy has been in the band about each level; their number where none is.
 
-    The band holds the level errors up to ``near``; of a negative one both sides of the level have been met.
+    ``lowest`` and ``highest`` are its extremes up to each state.  The band holds the level errors up to ``near``; of a
+    negative one both sides of the level have been met.
     """
     low, high = (np.maximum(level, 0.0) * np.maximum(1 + sign * near, 0.0) ** 2 for sign in (-1, 1))
-    lowest, highest = np.minimum.accumulate(energy), np.maximum.accumulate(energy)
-    fallen = energy.size - np.searchsorted(lowest[::-1], high, side="right")
+    fallen = lowest.size - np.searchsorted(lowest[::-1], high, side="right")
     return np.asarray(np.maximum(fallen, np.searchsorted(highest, low, side="left")))
 
 

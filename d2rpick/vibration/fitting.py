@@ -51,13 +51,18 @@ CERTAIN: Final = 0.01  # of the variance unexplained: no second start need be tr
 _MAX_STEPS: Final = 40  # a good start needs 4 to 8
 
 
-def fit(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int, worst: float = np.inf) -> Samples | None:
-    """Return the least-squares parameters with the first ``size`` of them free, the others zero.
+def fit_few(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int, worst: float) -> Samples | None:
+    """Return the least-squares parameters for a few of the samples, the first ``size`` of them free, the others zero.
 
-    None where on a few of the samples the fit leaves more than ``worst`` of the variance or, where that is finite, on
-    these or some more of them a structure that is too large.
+    None where the fit leaves more than ``worst`` of their variance.
     """
-    best = best_of_starts(partial(_starts, poles, size=size), partial(energy_and_jacobian, size=size), s, e, worst)
+    few = _few(s, e)
+    return refine(_starts(poles, *few, size=size), partial(energy_and_jacobian, size=size), *few, worst)
+
+
+def fit(few: Samples | None, s: Samples, e: Samples, size: int, worst: float = np.inf) -> Samples | None:
+    """Return the parameters for all samples from those of `fit_few`; None without, and as for `fit_all`."""
+    best = fit_all(few, partial(energy_and_jacobian, size=size), s, e, worst)
     if best is None:
         return None
     if best[5] < 0:  # q and -q make the same energy; the preload is taken positive
@@ -67,23 +72,14 @@ def fit(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int, worst:
     return best
 
 
-def hopeless(poles: NDArray[np.complex128], s: Samples, e: Samples, worst: float) -> bool:
-    """Whether the richest model leaves more than ``worst`` of the variance of a few samples: the others leave more."""
-    few, model = _few(s, e), partial(energy_and_jacobian, size=WITH_PRELOAD)
-    return refine(_starts(poles, *few, size=WITH_PRELOAD), model, *few, worst) is None
+def fit_all(best: Samples | None, model: Model, s: Samples, e: Samples, worst: float) -> Samples | None:
+    """Return the best fit to all samples from the ``best`` one to a few of them.
 
-
-def best_of_starts(
-    starts: Callable[[Samples, Samples], Sequence[Samples]], model: Model, s: Samples, e: Samples, worst: float
-) -> Samples | None:
-    """Return the best fit to all samples from what ``starts`` gives for a few of them; None as for `fit`.
-
-    One that leaves far too much of some of the samples is not brought to its best for all of them: it is refused, and
-    would crawl.
+    None without that, or where ``worst`` is finite and these or some more of the samples are left with a structure that
+    is too large.  A fit that leaves far too much of some of the samples is not brought to its best for all of them: it
+    is refused, and would crawl.
     """
-    few = _few(s, e)
-    best = refine(starts(*few), model, *few, worst)
-    quick = np.isfinite(worst)
+    quick, few = np.isfinite(worst), _few(s, e)
     if best is None or (quick and _structured(best, model, *few)):
         return None
     if few[0].size == s.size:
@@ -284,7 +280,9 @@ def fit_several(pencil: Pencil, s: Samples, e: Samples, count: int, worst: float
     3 count exponentials leave room for what is none.  For known rates E is linear in the rest, which ranks the
     rates and gives the parameters.  None also where a few of the samples refuse the fit, as for one mode.
     """
-    return best_of_starts(partial(_starts_of_several, pencil, count), sum_and_jacobian, s, e, worst)
+    few = _few(s, e)
+    best = refine(_starts_of_several(pencil, count, *few), sum_and_jacobian, *few, worst)
+    return fit_all(best, sum_and_jacobian, s, e, worst)
 
 
 def _starts_of_several(pencil: Pencil, count: int, s: Samples, e: Samples) -> list[Samples]:

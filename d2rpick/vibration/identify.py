@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import partial
+from functools import cache, partial
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -143,10 +143,11 @@ def identify(time: Samples, energy: Samples, *, quick: bool = False, memory: Mem
     poles = record.pencil(memory).rates()
     if poles.size == 0:
         return _nothing(time, "the energy does not oscillate: nothing vibrates, or it is overdamped")
-    if quick and fitting.hopeless(poles, record.s, record.e, HOPELESS):
-        return _out_of_reach(time)
     worst = HOPELESS if quick else np.inf
-    fits = ((fitting.fit(poles, record.s, record.e, size, worst), size, periods) for size, periods in _MODELS)
+    few = cache(lambda size: fitting.fit_few(poles, record.s, record.e, size, worst))
+    if quick and few(fitting.WITH_PRELOAD) is None:  # others leave more than the richest model
+        return _out_of_reach(time)
+    fits = ((fitting.fit(few(size), record.s, record.e, size, worst), size, periods) for size, periods in _MODELS)
     attempts = ((_one(found, size, record), most) for found, size, most in fits if found is not None)
     return _first_to_follow(attempts, record)
 

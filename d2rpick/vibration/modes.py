@@ -373,15 +373,18 @@ def _turns(modes: Modes, block: int) -> tuple[float, ...]:
 
 def sum_and_jacobian(parameters: Samples, s: Samples) -> tuple[Samples, Samples]:
     """Return E(s), shape (n,), and its derivatives by the parameters of `Modes.of` with its origin at 0, (p, n)."""
-    alpha, *rest = parameters.tolist()
-    energy, jacobian = np.zeros(s.size), np.zeros((parameters.size, s.size))
-    for i, (omega, cosine, sine) in enumerate(zip(rest[::3], rest[1::3], rest[2::3], strict=True)):
-        own, by = energy_and_jacobian(np.array([omega, alpha, cosine, sine, 0.0, 0.0]), s, 4)
-        energy += own
-        jacobian[0] += by[1]
-        jacobian[3 * i + 1] = by[0]
-        jacobian[3 * i + 2 : 3 * i + 4] = by[2:]
-    return energy, jacobian
+    omega, cosine, sine = parameters[1:].reshape(-1, 3).T[..., np.newaxis]
+    angle, decay = omega * s, np.exp(-float(parameters[0]) / 2 * s)
+    cos, sin = decay * np.cos(angle), decay * np.sin(angle)
+    q = cosine * cos + sine * sin
+    twice = q + q
+    by_rate = twice * s
+    jacobian = np.empty((parameters.size, s.size))
+    np.sum(by_rate * q * -0.5, axis=0, out=jacobian[0])
+    jacobian[1::3] = by_rate * (sine * cos - cosine * sin)
+    jacobian[2::3] = twice * cos
+    jacobian[3::3] = twice * sin
+    return np.sum(q * q, axis=0), jacobian
 
 
 def _roots(

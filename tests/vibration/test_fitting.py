@@ -6,10 +6,11 @@ import pytest
 from d2rpick.vibration.fitting import (
     MAX_STRUCTURE,
     VIBRATION,
+    WITH_PRELOAD,
     Pencil,
-    best_of_starts,
     fit,
-    hopeless,
+    fit_all,
+    fit_few,
     structure_of,
     surely_structured,
 )
@@ -52,7 +53,7 @@ def test_a_part_of_the_samples_refuses_only_what_all_of_them_refuse(scatter: flo
 def test_no_single_oscillator_is_hopeless_and_five_modes_are(preload: float, plastic: float, scatter: float) -> None:
     def gives_up(energy: np.ndarray) -> bool:
         noisy = energy / np.ptp(energy) + scatter * float(np.std(energy / np.ptp(energy))) * noise(S.size)
-        return hopeless(Pencil.of(S, noisy).rates(), S, noisy, HOPELESS)
+        return fit_few(Pencil.of(S, noisy).rates(), S, noisy, WITH_PRELOAD, HOPELESS) is None
 
     assert not any(
         gives_up(plastic + (preload + np.exp(-S / 2) * np.sin(rate * S + phase)) ** 2)
@@ -68,8 +69,9 @@ def test_a_fit_that_leaves_another_mode_fails_early() -> None:
     for share, follows in ((0.0, True), (0.05, False), (0.1, False)):  # of the last four hundred samples show enough
         two = one + share * np.exp(-S) * np.sin(33 * S) ** 2
         poles = Pencil.of(S, two).rates()
-        assert (fit(poles, S, two, VIBRATION, HOPELESS) is not None) == follows
-        assert fit(poles, S[:1500], two[:1500], VIBRATION) is not None  # asked for its misfit, none is held back
+        few = fit_few(poles, S, two, VIBRATION, HOPELESS)
+        assert (fit(few, S, two, VIBRATION, HOPELESS) is not None) == follows
+        assert fit(few, S[:1500], two[:1500], VIBRATION) is not None  # asked for its misfit, none is held back
 
 
 def test_a_fit_that_leaves_far_too_much_is_not_brought_to_its_best_for_all_samples() -> None:
@@ -82,5 +84,5 @@ def test_a_fit_that_leaves_far_too_much_is_not_brought_to_its_best_for_all_sampl
     start = np.array([20.0, 1.0, 0.7, 0.7, 0.0, 0.0])
     for energy, all_of_them in ((noise(S.size), False), (energy_and_jacobian(start, S, VIBRATION)[0], True)):
         asked.clear()
-        best_of_starts(lambda *_: [start], model, S, energy, np.inf)
+        fit_all(start, model, S, energy, np.inf)
         assert (sum(asked) > 10 * S.size / 8 and max(asked) > 2048) == all_of_them
