@@ -18,8 +18,8 @@ from d2rpick.deck.writing import driven_deck
 from d2rpick.histories.opening import open_run
 from d2rpick.running.drive import JOURNAL, Driven, Driver, Journal, Looks
 from d2rpick.running.engine import Commands, Solver, alone
+from d2rpick.running.inner_motion import check_wait, wait_of_deck
 from d2rpick.running.sequence import Limits, windows
-from d2rpick.running.wait import check_wait, wait_of_deck
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.choice.situation import Situation
-    from d2rpick.flight.bodies import Off
+    from d2rpick.flight.position_error import Off
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.part_signs import PartMatch
 

@@ -16,7 +16,7 @@ from d2rpick.choice.cost import ByDeck, CostModel, Share
 from d2rpick.deck.geometry import Placement
 from d2rpick.deck.pieces import pieces_of, supports_of
 from d2rpick.deck.radioss_files import LEFT_RIGID, RUINS
-from d2rpick.flight.bodies import RigidBody
+from d2rpick.flight.position_error import RigidBody
 from d2rpick.histories.surroundings import Support, Surroundings
 
 if TYPE_CHECKING:

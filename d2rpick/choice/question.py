@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.cost import ByDeck
     from d2rpick.deck.geometry import Placement
-    from d2rpick.flight.bodies import RigidBody
+    from d2rpick.flight.position_error import RigidBody
     from d2rpick.histories.history import History
     from d2rpick.histories.run import Run
     from d2rpick.vibration.modes import Mode

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from d2rpick.choice.question import Settings
-    from d2rpick.flight.bodies import Bodies
+    from d2rpick.flight.position_error import Bodies
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.swings import Swings
 
@@ -182,7 +182,7 @@ class Situation:
         """How the bodies that the parts to be switched become drift in the flight; None where no parts show it."""
         if self.flight.parts is None:
             return None
-        from d2rpick.flight.bodies import bodies_in_flight  # not above: a table has no parts
+        from d2rpick.flight.position_error import bodies_in_flight  # not above: a table has no parts
 
         told, placement = self.settings.bodies, self.settings.placement
         return self.fits.once(

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
 
     from d2rpick.choice.situation import Situation
-    from d2rpick.flight.bodies import RigidBody
+    from d2rpick.flight.position_error import RigidBody
     from d2rpick.histories.names import Part
 
 # Beyond this kinetic share more than half of the vibration is lost at td whatever tr is.

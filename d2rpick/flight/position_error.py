@@ -4,17 +4,19 @@ A part that moves against the rest, an engine on its mounts, is frozen where it 
 if nothing had been switched, so the rest of the body is off by the part's share of the mass times its displacement
 against the rest from tr to td, in the frame that turns with the body (docs/choosing.md, "Out of place").
 Displacements come from the velocities of the parts, which are their momenta over their masses.
+
+Of several rigid bodies each is off by itself, and the largest error counts.  One of a single part moves as the part
+does: its momentum is kept, and nothing in it is frozen elsewhere.
 """
 
 from __future__ import annotations
 
 from functools import cached_property
-from itertools import chain
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.flight.rotation import least_rests, least_ways, off_the_circle, periods_of, steady_rotation
+from d2rpick.flight.rotation import moving_apart, off_the_circle, periods_of, shows_rotation
 from d2rpick.flight.turning import Flying, turning_in_flight
 from d2rpick.flight.window import FEWEST
 from d2rpick.histories.samples import integral, window
@@ -22,33 +24,17 @@ from d2rpick.histories.samples import integral, window
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from d2rpick.deck.geometry import Placement
     from d2rpick.flight.flight import Flight
     from d2rpick.flight.turning import Turning
     from d2rpick.histories.history import History, Samples
     from d2rpick.histories.names import Part
 
-    Places = NDArray[np.intp]
-
 # Rotations are looked for on so many states at most; the displacements come from all of them.
 _STATES: Final = 200
-# Parts that are tried as the one that moves against the others, by what a rotation and by what rest leaves over.
-_TRIED: Final = 2
-# Without a further part that moves, the others leave over no more than this of what they did with it.
-_MORE_RIGID: Final = 0.5
-# Less than this share of all that the parts do, r^2, is nothing: a thousandth of the ways.
-_NOTHING: Final = 1e-6
-# A rotation by which the others move a tenth of what the part does changes its displacement by no more.
-_NOTABLE_WAY: Final = 0.1
-# A body shows no rotation where one part has more than this share of it.
-_MOST_OF_BODY: Final = 0.95
 # The velocity against the others of a part that nothing joins to them changes by no more than this share of it: where a
 # body turns by a hundredth of a degree, that of its parts changes by more.
 _STEADY: Final = 1e-4
-# Parts of a smaller share of the mass move the others too little to be asked about that.
-_HEAVY: Final = 0.05
 # Others that bend so make the error a lower bound.  In computed cars whose errors came out right this was at most 0.24,
 # in a public one whose error was three and four times as large 1.1 and 1.4.
 _NOTABLE_DOUBT: Final = 1 / 3
@@ -154,11 +140,11 @@ def drift_of(seen: Flying, placement: Placement | None = None) -> Drift | None:
         return None
     members = [i for i, m in zip(seen.members, mass.tolist(), strict=True) if m > 0]
     mass = masses[members]
-    if not _shows_rotation(mass):
+    if not shows_rotation(mass):
         return None
     ways, path = _ways(time, momenta.values[inside][:, members] / mass[:, np.newaxis], mass)
     stride = -(-time.size // _STATES)
-    moving, rate, rest = _apart(time[::stride], ways[::stride], mass)
+    moving, rate, rest = moving_apart(time[::stride], ways[::stride], mass)
     if not moving:
         return None
     whole = float(
@@ -190,70 +176,6 @@ def _offsets(time: Samples, ways: Samples, mass: Samples, moving: Sequence[int],
     shares = mass[list(moving), np.newaxis] / mass.sum()
     against = ways[:, list(moving)] - np.average(ways[:, others], axis=1, weights=mass[others])[:, np.newaxis]
     return np.asarray(-shares * off_the_circle(time, against, rate))
-
-
-def _apart(time: Samples, ways: Samples, mass: Samples) -> tuple[list[int], Samples, float]:
-    """Find the parts that move against the others, the rate at which these turn, and their rest; none if unknown."""
-    moving: list[int] = []
-    rate, rest = np.zeros(3), np.inf
-    while True:
-        found = _next_apart(time, ways, mass, np.setdiff1d(np.arange(mass.size), moving))
-        if found is None or found.rest > _MORE_RIGID * rest:
-            return moving, rate, rest
-        part, rate, rest, _ = found
-        moving.append(part)
-
-
-class _Apart(NamedTuple):
-    """A part that is left out, how the others turn and what is left of them, and how far the part pushes them off."""
-
-    part: int
-    rate: Samples
-    rest: float
-    effect: float
-
-
-def _next_apart(time: Samples, ways: Samples, mass: Samples, left: Places) -> _Apart | None:
-    """Of the parts that are left, find that without which the others are most nearly rigid.
-
-    A slide of one part may look like a rotation of all: of those alike in this, the one with most effect counts.
-    """
-    about, masses = _about_centre(ways[:, left], mass[left]), mass[left]
-    orders = (np.argsort(least_rests(time, about, masses)), np.argsort(least_ways(about, masses)))
-    may = [[one for one in left[order].tolist() if _may_leave(mass, left, one)][:_TRIED] for order in orders]
-    found = [_without(time, ways, mass, left, part) for part in dict.fromkeys(chain(*may))]
-    nothing = _NOTHING * float(np.sum(masses[:, np.newaxis] * (about - about.mean(axis=0)) ** 2))
-    least = min((one.rest for one in found), default=0.0) + nothing
-    alike = [one for one in found if _MORE_RIGID * one.rest <= least]
-    return max(alike, key=lambda one: one.effect, default=None)
-
-
-def _without(time: Samples, ways: Samples, mass: Samples, left: Places, part: int) -> _Apart:
-    """Leave one part out and see how the others turn."""
-    others = left[left != part]
-    way = ways[:, [part]] - np.average(ways[:, others], axis=1, weights=mass[others])[:, np.newaxis]
-    least = _NOTABLE_WAY**2 * mass[others].sum() * float(np.sum((way - way.mean(axis=0)) ** 2))
-    rate, rest = steady_rotation(time, _about_centre(ways[:, others], mass[others]), mass[others], least)
-    return _Apart(part, rate, rest, float(mass[part] * np.linalg.norm(off_the_circle(time, way, rate))))
-
-
-def _about_centre(ways: Samples, mass: Samples) -> Samples:
-    return np.asarray(ways - np.average(ways, axis=1, weights=mass)[:, np.newaxis])
-
-
-def _may_leave(mass: Samples, left: Places, part: int) -> bool:
-    """Whether the others have half of the mass, not nearly all of it in one part."""
-    others = mass[left[left != part]]
-    return bool(2 * others.sum() >= mass.sum() and others.max() <= _MOST_OF_BODY * others.sum())
-
-
-def _shows_rotation(mass: Samples) -> bool:
-    """Whether the body without any of the heavy parts still shows how it turns."""
-    if mass.size < 3:
-        return False
-    places = np.arange(mass.size)
-    heavy = places[(mass >= _HEAVY * mass.sum()) & (2 * mass <= mass.sum())]
-    return all(_may_leave(mass, places, part) for part in heavy.tolist())
 
 
 def drift_in_flight(
@@ -299,3 +221,115 @@ def _seen(history: History, flight: Flight, parts: Sequence[Part] | None) -> Fly
     flying = [i for i in momenta.moving if momenta.parts[i].id in ids]  # the ground does not fly
     members = [i for i in flying if momenta.parts[i].id in wanted]
     return Flying(momenta, masses, members, *flight.within(momenta.time), flying)
+
+
+class RigidBody(NamedTuple):
+    """Numbers of the parts that become one rigid body; ``whole`` False: a single part whose pieces move by themselves.
+
+    Of pieces that do not hang together and yet become one body nobody writes how they move against each other.
+    """
+
+    parts: tuple[int, ...]
+    whole: bool = True
+
+    @property
+    def name(self) -> str:
+        """Numbers of the parts, as `parts` takes them."""
+        return ",".join(map(str, self.parts))
+
+
+class Off(NamedTuple):
+    """How far the body that is off most will be [length], and how it drifts; ``body`` is named where there are several.
+
+    ``assumed``: no deck tells that the parts become one body.  ``at_least``: it may be further off, or another body is.
+    """
+
+    error: float
+    drift: Drift
+    body: RigidBody | None
+    assumed: bool
+    at_least: bool = False
+
+    @property
+    def part(self) -> str | None:
+        """Name of the part that is frozen elsewhere; None where nothing is."""
+        return self.drift.part.name if self.error > 0 else None
+
+
+class Bodies:
+    """Rigid bodies of a flight, each with its drift; ``told`` are those of a deck, none where one body is assumed.
+
+    Where the drift of one of them is not known, no error is: it may be the largest.  ``apart`` are parts that are to
+    become one body with others, and fly away from them.
+    """
+
+    def __init__(
+        self, drifts: Sequence[Drift | None], told: Sequence[RigidBody] | None, apart: Sequence[Part] = ()
+    ) -> None:
+        self.told, self.apart = tuple(told or ()), tuple(apart)
+        self._known = tuple(one for one in drifts if one)
+        self._complete = len(self._known) == len(drifts) > 0
+        self.unknown = tuple(body for body, one in zip(self.told, drifts, strict=False) if one is None)
+
+    def errors(self, tr: Samples, td: float) -> Samples:
+        """How far the body that is off most will be at td, for times tr (k,) [length]; NaN outside the flight."""
+        return np.asarray(self._each(tr, td).max(axis=0)) if self._complete else np.full(tr.shape, np.nan)
+
+    @property
+    def limit(self) -> float:
+        """From which error on a body is out of place, the least of those whose parts move [length]."""
+        return min((one.limit for one in self._known if one.place.any()), default=np.inf)
+
+    def worst(self, tr: float, td: float) -> Off | None:
+        """Give the body that is off most; None outside the flight, and where one is not known."""
+        found = self._each(np.array([tr]), td)[:, 0] if self._complete else np.full(1, np.nan)
+        if np.isnan(found).any():
+            return None
+        at = int(np.argmax(found))
+        body = self.told[at] if len(self.told) > 1 else None
+        return Off(float(found[at]), self._known[at], body, not self.told, any(one.at_least for one in self._known))
+
+    def _each(self, tr: Samples, td: float) -> Samples:
+        """Errors by body, shape (bodies, k) [length]."""
+        return np.stack([one.errors(tr, td) for one in self._known])
+
+
+def bodies_in_flight(
+    history: History, flight: Flight, told: Sequence[RigidBody] | None, placement: Placement | None = None
+) -> Bodies:
+    """Find how the bodies that the parts to be switched become drift in a flight.
+
+    Parameters
+    ----------
+    history : History
+    flight : Flight
+        With the parts that fly in it.
+    told : sequence of RigidBody or None
+        By a deck; without them the parts are taken for one body.
+    placement : Placement, optional
+        Where the deck puts the parts.
+    """
+    if not told:
+        away = apart_in_flight(history, flight)
+        return Bodies([None if away else drift_in_flight(history, flight, placement=placement)], None, away)
+    parts = [[part for part in history.parts or () if part.id in body.parts] for body in told]
+    leaving = [apart_in_flight(history, flight, own) for own in parts]
+    drifts = [
+        None if some else _drift(history, flight, body, own, placement)
+        for body, own, some in zip(told, parts, leaving, strict=True)
+    ]
+    return Bodies(drifts, told, sum(leaving, ()))
+
+
+def _drift(
+    history: History, flight: Flight, body: RigidBody, parts: Sequence[Part], placement: Placement | None
+) -> Drift | None:
+    """Drift of one body of those parts that have energy; of a single part none at all while it flies."""
+    if not body.whole or len(parts) < len(body.parts):
+        return None
+    if len(parts) > 1:
+        return drift_in_flight(history, flight, parts, placement)
+    (part,) = parts
+    if flight.refusal or part.id not in {one.id for one in flight.parts or ()}:
+        return None
+    return Drift(np.array(flight.within(history.time)), np.zeros((2, 3)), np.zeros(2), part, 0.0)

@@ -1,11 +1,13 @@
 """The steady rotation of a body that flies, as the ways of its parts about its centre show it.
 
 While it turns at a constant rate, each part of a rigid body goes round on a circle.  What is left of the ways when
-these are taken off is how the parts move against each other, seen from a frame that turns with the body.
+these are taken off is how the parts move against each other, seen from a frame that turns with the body.  Those that
+move against the others are the ones without which these are most nearly one rigid body.
 """
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -13,7 +15,11 @@ import numpy as np
 from d2rpick.histories.samples import bent, integral
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from d2rpick.histories.history import Samples
+
+    Places = NDArray[np.intp]
 
 # A rotation counts where it explains three quarters of how the parts move: less may be their vibration.
 _SHOWN: Final = 0.25
@@ -29,14 +35,7 @@ _ALONG_AXIS: Final = 1e-6
 _PERIODS: Final = (*(n / 20 for n in range(4, 41)), *(2 * 1.1**n for n in range(1, 25)))
 
 
-class Rotation(NamedTuple):
-    """``rate`` (3,) at which a body turns [rad/time]; ``rest`` is the sum of m r^2 over parts and states beside it."""
-
-    rate: Samples
-    rest: float
-
-
-def steady_rotation(time: Samples, ways: Samples, masses: Samples, least: float = 0.0) -> Rotation:
+def _steady_rotation(time: Samples, ways: Samples, masses: Samples, least: float) -> tuple[Samples, float]:
     """Find the constant rate of rotation that explains the ways of the parts of a body about its centre best.
 
     Parameters
@@ -47,18 +46,20 @@ def steady_rotation(time: Samples, ways: Samples, masses: Samples, least: float 
         Displacements against the centre of mass, up to a constant each [length].
     masses : array of shape (parts,)
         [mass]
-    least : float, optional
+    least : float
         Ways whose sum of m r^2 over parts and states is no more show no rotation [mass length^2].
 
     Returns
     -------
-    Rotation
-        At rate 0 where no rotation explains three quarters of the ways.
+    rate : array of shape (3,)
+        At which the body turns [rad/time]; 0 where no rotation explains three quarters of the ways.
+    rest : float
+        Sum of m r^2 over parts and states beside it [mass length^2].
     """
     weights = np.sqrt(masses)[:, np.newaxis]
     stood = float(np.sum(_rest(time, ways, np.zeros(3), weights) ** 2))
     if stood <= least:
-        return Rotation(np.zeros(3), stood)
+        return np.zeros(3), stood
     _, right, normal = (one.sum(axis=0) for one in _linear(time, ways, masses))
     rate = np.asarray(np.linalg.pinv(normal, rcond=_ALONG_AXIS, hermitian=True) @ right)
     rest = _rest(time, ways, rate, weights)
@@ -78,7 +79,7 @@ def steady_rotation(time: Samples, ways: Samples, masses: Samples, least: float 
         if 0 <= gain <= _LEAST_GAIN or float(np.abs(step).max()) <= small:
             break
     turned = float(np.sum(rest**2))
-    return Rotation(rate, turned) if turned <= _SHOWN * stood else Rotation(np.zeros(3), stood)
+    return (rate, turned) if turned <= _SHOWN * stood else (np.zeros(3), stood)
 
 
 def off_the_circle(time: Samples, ways: Samples, rate: Samples) -> Samples:
@@ -114,12 +115,12 @@ def periods_of(time: Samples, left: Samples, rate: Samples) -> float:
     return found
 
 
-def least_ways(ways: Samples, masses: Samples) -> Samples:
+def _least_ways(ways: Samples, masses: Samples) -> Samples:
     """Give for each part the m r^2 of the others about their own centre, in a frame at rest (parts,)."""
     return np.asarray(_without_each(masses * np.sum((ways - ways.mean(axis=0)) ** 2, axis=(0, 2)), masses))
 
 
-def least_rests(time: Samples, ways: Samples, masses: Samples) -> Samples:
+def _least_rests(time: Samples, ways: Samples, masses: Samples) -> Samples:
     """Estimate for each part how little of that a rotation of the others leaves over (parts,).
 
     In a rotation the velocity changes by rate x way, so that ways less their straight lines are rate x their integrals:
@@ -157,3 +158,81 @@ def _frame(time: Samples, rate: Samples) -> Samples:
     angle = size * (time - time[0])[:, np.newaxis, np.newaxis]
     across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])  # across @ v is the cross product axis x v
     return np.asarray(np.eye(3) + np.sin(angle) * across + (1 - np.cos(angle)) * (across @ across))
+
+
+# Parts that are tried as the one that moves against the others, by what a rotation and by what rest leaves over.
+_TRIED: Final = 2
+# Without a further part that moves, the others leave over no more than this of what they did with it.
+_MORE_RIGID: Final = 0.5
+# Less than this share of all that the parts do, r^2, is nothing: a thousandth of the ways.
+_NOTHING: Final = 1e-6
+# A rotation by which the others move a tenth of what the part does changes its displacement by no more.
+_NOTABLE_WAY: Final = 0.1
+# A body shows no rotation where one part has more than this share of it.
+_MOST_OF_BODY: Final = 0.95
+# Parts of a smaller share of the mass move the others too little to be asked about that.
+_HEAVY: Final = 0.05
+
+
+def moving_apart(time: Samples, ways: Samples, mass: Samples) -> tuple[list[int], Samples, float]:
+    """Find the parts that move against the others, the rate at which these turn, and their rest; none if unknown."""
+    moving: list[int] = []
+    rate, rest = np.zeros(3), np.inf
+    while True:
+        found = _next_apart(time, ways, mass, np.setdiff1d(np.arange(mass.size), moving))
+        if found is None or found.rest > _MORE_RIGID * rest:
+            return moving, rate, rest
+        part, rate, rest, _ = found
+        moving.append(part)
+
+
+class _Apart(NamedTuple):
+    """A part that is left out, how the others turn and what is left of them, and how far the part pushes them off."""
+
+    part: int
+    rate: Samples
+    rest: float
+    effect: float
+
+
+def _next_apart(time: Samples, ways: Samples, mass: Samples, left: Places) -> _Apart | None:
+    """Of the parts that are left, find that without which the others are most nearly rigid.
+
+    A slide of one part may look like a rotation of all: of those alike in this, the one with most effect counts.
+    """
+    about, masses = _about_centre(ways[:, left], mass[left]), mass[left]
+    orders = (np.argsort(_least_rests(time, about, masses)), np.argsort(_least_ways(about, masses)))
+    may = [[one for one in left[order].tolist() if _may_leave(mass, left, one)][:_TRIED] for order in orders]
+    found = [_without(time, ways, mass, left, part) for part in dict.fromkeys(chain(*may))]
+    nothing = _NOTHING * float(np.sum(masses[:, np.newaxis] * (about - about.mean(axis=0)) ** 2))
+    least = min((one.rest for one in found), default=0.0) + nothing
+    alike = [one for one in found if _MORE_RIGID * one.rest <= least]
+    return max(alike, key=lambda one: one.effect, default=None)
+
+
+def _without(time: Samples, ways: Samples, mass: Samples, left: Places, part: int) -> _Apart:
+    """Leave one part out and see how the others turn."""
+    others = left[left != part]
+    way = ways[:, [part]] - np.average(ways[:, others], axis=1, weights=mass[others])[:, np.newaxis]
+    least = _NOTABLE_WAY**2 * mass[others].sum() * float(np.sum((way - way.mean(axis=0)) ** 2))
+    rate, rest = _steady_rotation(time, _about_centre(ways[:, others], mass[others]), mass[others], least)
+    return _Apart(part, rate, rest, float(mass[part] * np.linalg.norm(off_the_circle(time, way, rate))))
+
+
+def _about_centre(ways: Samples, mass: Samples) -> Samples:
+    return np.asarray(ways - np.average(ways, axis=1, weights=mass)[:, np.newaxis])
+
+
+def _may_leave(mass: Samples, left: Places, part: int) -> bool:
+    """Whether the others have half of the mass, not nearly all of it in one part."""
+    others = mass[left[left != part]]
+    return bool(2 * others.sum() >= mass.sum() and others.max() <= _MOST_OF_BODY * others.sum())
+
+
+def shows_rotation(mass: Samples) -> bool:
+    """Whether the body without any of the heavy parts still shows how it turns."""
+    if mass.size < 3:
+        return False
+    places = np.arange(mass.size)
+    heavy = places[(mass >= _HEAVY * mass.sum()) & (2 * mass <= mass.sum())]
+    return all(_may_leave(mass, places, part) for part in heavy.tolist())

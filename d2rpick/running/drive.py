@@ -16,9 +16,8 @@ from d2rpick.deck.writing import RESTARTS, DrivenDeck
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
 from d2rpick.running.evidence import contact_after, highest_energy, quiet_times
+from d2rpick.running.inner_motion import InnerMotion, Wait, swing_in
 from d2rpick.running.sequence import LOAD, PROBE, RIGID, SEARCH, Leg, Order, Seen, control, next_order, window_of
-from d2rpick.running.swing import swing_in
-from d2rpick.running.wait import InnerMotion, Wait
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

@@ -18,7 +18,7 @@ from d2rpick.deck.radioss_bodies import bodies_for
 from d2rpick.deck.radioss_deck import kept_off, number_of
 from d2rpick.deck.radioss_run import parts_off, read_run
 from d2rpick.deck.reader import read_deck
-from d2rpick.running.wait import Wait, check_wait, wait_of_deck
+from d2rpick.running.inner_motion import Wait, check_wait, wait_of_deck
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence

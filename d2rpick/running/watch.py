@@ -19,8 +19,7 @@ from d2rpick.histories.listings import WITH_AN_ERROR, ending
 from d2rpick.histories.opening import open_run
 from d2rpick.histories.source import expand, later_legs
 from d2rpick.running.evidence import contact_after, highest_energy, quiet_times, rigid_times
-from d2rpick.running.swing import swing_in
-from d2rpick.running.wait import InnerMotion, wait_of_deck
+from d2rpick.running.inner_motion import InnerMotion, swing_in, wait_of_deck
 
 if TYPE_CHECKING:
     import os

@@ -8,7 +8,7 @@ import pytest
 from d2rpick.choice.answers import suggest, suggest_at
 from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import examine
-from d2rpick.flight.bodies import RigidBody
+from d2rpick.flight.position_error import RigidBody
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
 from d2rpick.vibration.oscillator import to_mode

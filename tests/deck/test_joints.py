@@ -6,7 +6,7 @@ import pytest
 
 from d2rpick.choice.deck_of_run import bodies_of
 from d2rpick.deck.model import Inventory
-from d2rpick.flight.bodies import RigidBody
+from d2rpick.flight.position_error import RigidBody
 from tests.deck import test_radioss_inventory as rad
 from tests.deck.test_ls_dyna_inventory import inventory, nodes
 from tests.decks import row, wide

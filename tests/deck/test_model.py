@@ -8,7 +8,7 @@ from d2rpick.choice.deck_of_run import bodies_of
 from d2rpick.deck import read_inventory
 from d2rpick.deck.model import Inventory
 from d2rpick.deck.pieces import pieces_of
-from d2rpick.flight.bodies import RigidBody
+from d2rpick.flight.position_error import RigidBody
 from tests import made_car
 from tests.deck import test_radioss_inventory as rad
 from tests.deck.test_joints import MESH

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from d2rpick.flight.bodies import Bodies, RigidBody, bodies_in_flight
 from d2rpick.flight.flight import Flight, find_flight, seen_flight
-from d2rpick.flight.position_error import MOST_OF_PATH, Drift
+from d2rpick.flight.position_error import MOST_OF_PATH, Bodies, Drift, RigidBody, bodies_in_flight
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Part
 from tests.computed import results

@@ -14,7 +14,7 @@ from d2rpick.histories.history import EXACT, History, Momenta, rows_of
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.running.evidence import Quiet, contact_after, highest_energy, quiet_times
-from d2rpick.running.wait import InnerMotion, Wait
+from d2rpick.running.inner_motion import InnerMotion, Wait
 from tests.command import ROOT
 from tests.records import until
 

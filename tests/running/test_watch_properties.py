@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings, strategies as st
 
 from d2rpick.histories.history import EXACT, Balance, History, Momenta
-from d2rpick.running.wait import InnerMotion
+from d2rpick.running.inner_motion import InnerMotion
 from d2rpick.running.watch import events_of
 from tests.energies import sure
 from tests.records import table, until
