@@ -17,9 +17,9 @@ from d2rpick.flight.flight import Flight, Seen, find_flight, landed, seen_flight
 from d2rpick.flight.internal_energy import largest, round_off
 from d2rpick.flight.margin import margin_before_contact
 from d2rpick.histories.digits import sum_as_read
-from d2rpick.histories.samples import window
 from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD, Identification, identify, identify_several, judge_given
 from d2rpick.vibration.model import Evidence, Vibration, describing, doubtful, energy_at, model_at
+from d2rpick.vibration.signed_models import find_models
 from d2rpick.vibration.span import Fits, Span, described_span, span_of
 from d2rpick.vibration.uncertainty import resolved
 
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from d2rpick.choice.question import Settings
     from d2rpick.flight.position_error import Bodies
     from d2rpick.histories.history import History, Samples
-    from d2rpick.vibration.swings import Swings
 
     Look = Callable[[float], "Situation"]
 
@@ -208,9 +207,7 @@ class Situation:
 
     def sees_as(self, other: Situation) -> bool:
         """Whether the two, of one record, have one flight and one evidence: then only their td differ."""
-        own, its = self.evidence, other.evidence
-        same = own.fit is its.fit and own.parts is its.parts and own.swings is its.swings
-        return same and own.span == its.span and self.flight == other.flight
+        return self.evidence.is_that_of(other.evidence) and self.flight == other.flight
 
     def at(self, td: float) -> Situation:
         """Give the same record, flight and evidence seen from another ``td``."""
@@ -246,18 +243,17 @@ def examine(
     flight = landed(_between_supports(history, flight, td), settings.landing)
     given = settings.oscillator is not None
     evidence = Evidence(fit, span, given, prescribed=given or settings.fit_window is not None)
-    if settings.replay:
-        # without a sign of the next contact nothing is known of what comes after td
-        end = flight.end or (float(history.time[-1]) if flying or span else td)
-        start = min(td, float(history.time[0]) if flight.start is None else flight.start)
-        if history.part_energies is not None:
-            evidence = _with_parts(evidence, history, Span(start, end), fits)
     situation = Situation(history, td, settings, flight, evidence, fits)
-    if not settings.replay or flight.start is None or evidence.signed or not doubtful(situation.whole):
+    if not settings.replay:
         return situation
-    settled = flight.start if flight.settled is None else flight.settled
-    within = Span(settled, flight.end or float(history.time[-1]))
-    return replace(situation, evidence=evidence._replace(swings=_swings(history, within, fits)))
+    first, last = float(history.time[0]), float(history.time[-1])
+    # without a sign of the next contact nothing is known of what comes after td
+    end = flight.end or (last if flying or span else td)
+    around = Span(min(td, first if flight.start is None else flight.start), end)
+    start = flight.start if flight.settled is None else flight.settled
+    within = None if flight.start is None or start is None else Span(start, flight.end or last)
+    models = find_models(history, around, within, lambda: doubtful(situation.whole), fits)
+    return replace(situation, evidence=evidence._replace(models=models)) if models else situation
 
 
 def looking(
@@ -343,23 +339,3 @@ def _settled(history: History, fit: Identification | None, span: Span | None) ->
     if span is None or fit is None or fit.mode is None or span.start <= history.time[0]:
         return span
     return Span(min(span.start + np.pi / 2 / fit.mode.omega, span.end), span.end)
-
-
-def _swings(history: History, within: Span, fits: Fits) -> Swings | None:
-    """Count the swings of the energy in the flight, where they come down to a floor."""
-    from d2rpick.vibration.swings import count_swings
-
-    return fits.once(("swings", *within), lambda: count_swings(*history.between(*within)))
-
-
-def _with_parts(evidence: Evidence, history: History, within: Span, fits: Fits) -> Evidence:
-    """Add what the energies of single parts tell of the flight."""
-    from d2rpick.vibration.part_signs import SignedParts
-
-    assert history.part_energies is not None
-    time, _ = history.between(*within)
-    if time.size < 3:
-        return evidence
-    energies = history.part_energies[window(history.time, *within)]
-    parts = fits.once(("parts", *within), lambda: SignedParts(time, energies, history.part_names))
-    return evidence._replace(parts=parts)

@@ -65,9 +65,7 @@ def _of_energy(situation: Situation) -> Iterator[Caution]:
 def _of_parts(situation: Situation) -> Iterator[Caution]:
     vibration = situation.vibration
     if vibration.estimated:
-        what = "the counted swings leave" if vibration.basis == "swings" else "the modes found in each part add up to"
-        found = f"the kinetic share is what {what}: {vibration.estimated}"
-        yield Caution("kinetic-share-estimated", found)
+        yield Caution("kinetic-share-estimated", f"the kinetic share is what {vibration.estimated}")
     for part in vibration.signed.unsigned if vibration.signed else ():
         yield Caution("part-without-sign", f"{part.name} was left out: {part.reason}")
 

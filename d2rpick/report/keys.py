@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from d2rpick.report.fields import Field, kind_of, many, maybe, one_of, row
+from d2rpick.vibration.signed_models import MODELS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation
 
 SHARE: Final = kind_of("number", minimum=0, maximum=1)
-BASIS: Final = one_of("parts", "oscillator", "swings", "energy")
+BASIS: Final = one_of(*MODELS)
 KIND: Final = one_of("crossing", "start", "extremum", "match")
 
 WARNING: Final = row(Field("code", kind_of("text", pattern="^[a-z0-9-]+$")), Field("message", "text"), name="warning")

@@ -61,10 +61,7 @@ def spoken(source: str | None) -> str:
 
 def _basis(situation: Situation) -> str:
     """What the choice rests on, and the oscillator behind it."""
-    fit, vibration = situation.evidence.fit, situation.vibration
-    mode, signed = vibration.whole.mode, vibration.signed
-    parts = f"parts, signs of {', '.join(signed.names)}" if signed else ""
-    parts = "swings of the energy, counted" if vibration.basis == "swings" else parts
+    fit, mode, parts = situation.evidence.fit, situation.vibration.whole.mode, situation.vibration.told
     if not (mode and fit):
         return f"{parts}; kinetic energy from the modes of each part" if parts else _level_alone(situation)
     rates = ", ".join(f"{one.omega:.6g}" for one in mode.modes)

@@ -1,16 +1,17 @@
 """What is known of the vibration at one td, and which of its four models can be relied on there.
 
 The signs of parts are worth more than an oscillator that describes the record, that more than swings that were counted
-unless it leaves much over, and these more than the energy alone.  Each model is a `Vibration`: the energy of the whole
-around td, and the deformations that can be compared with those at td, if any are known.  A further model is a
-`Deformation` and a line in `model_at`.
+unless it leaves much over, and these more than the energy alone: in the order of `MODELS`.  What is relied on is a
+`Vibration`: the energy of the whole around td, and the deformations that can be compared with those at td, if any are
+known.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 import numpy as np
 
@@ -21,18 +22,19 @@ from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD, Identification, s
 from d2rpick.vibration.measures import Measured
 from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.moments import ModalEnergy, Moments, Profile, SampledEnergy, moments_of_mode
+from d2rpick.vibration.signed_models import MODELS
 from d2rpick.vibration.uncertainty import residual_bound
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.measures import Bound, Deformation
     from d2rpick.vibration.part_signs import PartMatch, SignedParts
+    from d2rpick.vibration.signed_models import SignedModel
     from d2rpick.vibration.span import Span
-    from d2rpick.vibration.swings import Swings
 
 # Why no tr can be trusted where the vibration is known but cannot be made out at td.
 SUNK: Final = "the level at td is below the noise of the record"
@@ -66,15 +68,17 @@ class Vibration:
     Parameters
     ----------
     basis : str
-        Name of the model: "parts", "oscillator", "swings" or "energy".
+        Name of the model, as in `MODELS`.
     whole : SampledEnergy
         The energy of all parts together.
     compared : Compared or None
         None where no deformation with its sign is known, and ``unknown`` says why.
     undescribed : str
         Why a single tr has no measures although deformations are known.
+    told : str
+        What a model that tells the sign has to say of itself.
     estimated : str or None
-        Why the kinetic share is an estimate; None where it is none.
+        What the kinetic share is an estimate from, and why; None where it is none.
     doubts : tuple of str
         Why the level at td means nothing, so that no tr can be trusted.
     parts : SignedParts or None
@@ -86,6 +90,7 @@ class Vibration:
     compared: Compared | None = None
     unknown: str | None = None
     undescribed: str = ""
+    told: str = ""
     estimated: str | None = None
     doubts: tuple[str, ...] = ()
     parts: SignedParts | None = None
@@ -247,62 +252,72 @@ class Evidence(NamedTuple):
     """What was found in a record, whatever it is worth at one td.
 
     ``fit`` is None only where no oscillator was looked for; ``span`` is the window in which it describes the record.
-    ``given``: the oscillator was given; ``prescribed``: it, or the window to identify it in.  ``parts`` are the
-    deformations of single parts, as far as they have a sign; ``swings`` were counted in the energy of the flight, where
-    it comes down to a floor in each.
+    ``given``: the oscillator was given; ``prescribed``: it, or the window to identify it in.  ``models`` are those that
+    were found beside it, by their names; one at most tells the sign.
     """
 
     fit: Identification | None = None
     span: Span | None = None
     given: bool = False
     prescribed: bool = False
-    parts: SignedParts | None = None
-    swings: Swings | None = None
+    models: Mapping[str, SignedModel] = MappingProxyType({})
 
     @property
-    def signed(self) -> SignedParts | None:
-        """The parts, where enough of the energy has a sign."""
-        return self.parts if self.parts and self.parts.signed else None
+    def parts(self) -> SignedParts | None:
+        """The deformations of single parts, also where too few have a sign."""
+        return cast("SignedParts | None", self.models.get("parts"))
+
+    @property
+    def signed(self) -> str | None:
+        """Name of the model that tells the sign, where one does."""
+        return next((name for name, model in self.models.items() if model.signed), None)
 
     @property
     def has_model(self) -> bool:
         """Whether at some td more than the samples of the energy may be relied on."""
         fit = self.fit
-        return bool(self.signed or self.swings or (fit and fit.mode and self.span and not fit.reason))
+        return bool(self.signed or (fit and fit.mode and self.span and not fit.reason))
+
+    def is_that_of(self, other: Evidence) -> bool:
+        """Whether the same was found, of one record."""
+        same = self.fit is other.fit and self.span == other.span
+        return same and all(self.models.get(name) is other.models.get(name) for name in MODELS)
 
 
 def model_at(whole: Vibration, evidence: Evidence) -> Vibration:
     """Give the best model that can be relied on where ``whole`` is that of the whole energy."""
-    history, td, signed, swings = whole.whole.history, whole.td, evidence.signed, evidence.swings
-    sunk = signed is not None and whole.compared is None and signed.sunk(td)  # a model of the whole tells more
-    if signed and not sunk:
-        return replace(
-            _with_signs(whole, signed),
-            basis="parts",
-            undescribed="the signs of the parts' deformations cannot be followed from here to td",
-            parts=signed,
-        )
-    if swings and not whole.doubts and doubtful(whole) and swings.known_at(td):
-        modes = whole.whole
-        if not isinstance(modes, ModalEnergy):
-            return _of_swings(whole, swings)
-        if swings.unseen(modes.span.start, td)[0] < modes.fit.hidden_share:
-            return _of_swings(Vibration("energy", SampledEnergy(history, td), unknown=_LEFT_OVER), swings)
-    return replace(_sunk(whole) if sunk else whole, parts=evidence.parts)
+    return replace(_best(whole, evidence), parts=evidence.parts)
 
 
-def _of_swings(whole: Vibration, swings: Swings) -> Vibration:
-    """The energy alone where its swings can be counted: the deformation is the root of what lies above the floor."""
-    undescribed = "the swings of the energy cannot be counted from here to td"
-    return replace(_with_signs(whole, swings), basis="swings", undescribed=undescribed)
+def _best(whole: Vibration, evidence: Evidence) -> Vibration:
+    if not evidence.signed:
+        return whole
+    basis, model, td, names = evidence.signed, evidence.models[evidence.signed], whole.td, [*MODELS]
+    known, modes = model.known_at(td), whole.whole
+    if names.index(basis) < names.index("oscillator"):
+        return _with_signs(whole, basis, model) if known or whole.compared else _sunk(whole)
+    if not known or whole.doubts or not doubtful(whole):
+        return whole
+    if not isinstance(modes, ModalEnergy):
+        return _with_signs(whole, basis, model)
+    if model.unseen(modes.span.start, td) < modes.fit.hidden_share:
+        return _with_signs(Vibration("energy", SampledEnergy(modes.history, td), unknown=_LEFT_OVER), basis, model)
+    return whole
 
 
-def _with_signs(whole: Vibration, parts: SignedParts | Swings) -> Vibration:
+def _with_signs(whole: Vibration, basis: str, model: SignedModel) -> Vibration:
     """Compare signed deformations, while levels and times are those of the whole energy."""
-    first = parts.comparable_since(whole.td)
-    times = parts.time[parts.time >= first]
-    compared = Compared(parts, first, float(parts.time[-1]), times, parts.residual_bound)
-    return replace(whole, compared=compared, unknown=None, estimated=whole.unknown)
+    first = model.comparable_since(whole.td)
+    times = model.time[model.time >= first]
+    return replace(
+        whole,
+        basis=basis,
+        compared=Compared(model, first, float(model.time[-1]), times, model.residual_bound),
+        unknown=None,
+        undescribed=model.undescribed,
+        told=model.told,
+        estimated=whole.unknown and f"{model.kinetic}: {whole.unknown}",
+    )
 
 
 def _sunk(whole: Vibration) -> Vibration:

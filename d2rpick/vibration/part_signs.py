@@ -258,6 +258,9 @@ class SignedParts:
     True
     """
 
+    kinetic = "the modes found in each part add up to"
+    undescribed = "the signs of the parts' deformations cannot be followed from here to td"
+
     def __init__(self, time: Samples, energies: Samples, names: Sequence[str]) -> None:
         self.time, self._names = time, names
         self._roots = np.sqrt(np.maximum(energies.T, 0.0), order="C")
@@ -295,6 +298,11 @@ class SignedParts:
         """Whether enough of the energy lies in parts that have a sign."""
         return self.unsigned_share <= MOST_UNSIGNED
 
+    @property
+    def told(self) -> str:
+        """Name the parts that a choice rests on."""
+        return f"parts, signs of {', '.join(self.names)}"
+
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Of the k parts that have a sign."""
@@ -327,20 +335,19 @@ class SignedParts:
         """Energy of the vibration, V = E + T [energy]."""
         return np.asarray(np.sum([one.model.vibration_energy(t) for one in self.motions], axis=0))
 
-    def hidden_energy(self, t: Samples | float) -> Samples:
-        """Vibration energy that further modes, and the parts that were left out, may have [energy]."""
+    def unseen(self, t: Samples | float, td: float) -> Samples:
+        """Share of the vibration energy at td that further modes, and parts left out, may have at ``t`` [-]."""
         beside = self.unsigned_share / (1 - self.unsigned_share)
         hidden = [(one.hidden + beside) * one.model.vibration_energy(t) for one in self.motions]
-        return np.asarray(np.sum(hidden, axis=0))
+        return np.asarray(np.sum(hidden, axis=0) / self.vibration_energy(td))
 
-    def sunk(self, t: float) -> bool:
-        """Whether the energy of the vibration is below a solver's errors at ``t``."""
-        return bool(self.vibration_energy(t) < SOLVER_FLOOR * np.max(self.vibration_energy(self.time)))
+    def known_at(self, td: float) -> bool:
+        """Whether the energy of the vibration is above a solver's errors at td."""
+        return bool(self.vibration_energy(td) >= SOLVER_FLOOR * np.max(self.vibration_energy(self.time)))
 
     def residual_bound(self, residual: Samples, tr: Samples, td: float) -> Samples:
         """Largest residual of each tr of shape (n,), if what may be hidden stood opposed at tr and td [-]."""
-        apart = np.sqrt(self.hidden_energy(tr)) + np.sqrt(self.hidden_energy(td))
-        return np.asarray(np.sqrt(residual**2 + apart**2 / self.vibration_energy(td)))
+        return np.asarray(np.hypot(residual, np.sqrt(self.unseen(tr, td)) + np.sqrt(self.unseen(td, td))))
 
     def comparable_since(self, td: float) -> float:
         """Earliest time whose signs can be compared with those at ``td``: the last unclear one before it [time]."""

@@ -7,7 +7,8 @@ on a smooth floor, another mode holds the rest of the energy there, and nothing 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Final, NamedTuple
 
 import numpy as np
 
@@ -36,7 +37,8 @@ _OF_ANY_SPRING: Final = 2.0
 _OF_THE_FLOOR: Final = 5.0
 
 
-class Swings(NamedTuple):
+@dataclass(frozen=True, eq=False, repr=False)
+class Swings:
     """The deformation that was counted, in the states of a flight.
 
     Parameters
@@ -57,6 +59,10 @@ class Swings(NamedTuple):
     envelope: Envelope
     bottoms: Samples
     floor: Samples
+    signed: ClassVar = True
+    told: ClassVar = "swings of the energy, counted"
+    kinetic: ClassVar = "the counted swings leave"
+    undescribed: ClassVar = "the swings of the energy cannot be counted from here to td"
 
     def amplitudes(self, t: Samples | float) -> Samples:
         """Signed deformation, of the shape of ``t`` with an axis of one before it [sqrt(energy)]."""

@@ -160,7 +160,7 @@ def test_parts_that_vibrate_no_more_than_a_solver_errs_have_no_residual() -> Non
     )
     sunk = copy(parts)
     sunk.motions = (*parts.motions, PartMotion(started, np.zeros(0), 0.0))
-    situation = replace(situation, evidence=situation.evidence._replace(fit=None, span=None, parts=sunk))
+    situation = replace(situation, evidence=situation.evidence._replace(fit=None, span=None, models={"parts": sunk}))
     assert (situation.basis, situation.kinetic_share, situation.vibration.doubts) == ("energy", None, (SUNK,))
     (candidate,) = judge(situation, [0.18])
     assert (candidate.acceptable, candidate.residual, candidate.sign_match) == (False, None, None)
