@@ -61,9 +61,11 @@ def spoken(source: str | None) -> str:
 
 def _basis(situation: Situation) -> str:
     """What the choice rests on, and the oscillator behind it."""
-    fit, mode, parts = situation.evidence.fit, situation.vibration.whole.mode, situation.vibration.told
+    fit, vibration = situation.evidence.fit, situation.vibration
+    mode, told = vibration.whole.mode, vibration.told
     if not (mode and fit):
-        return f"{parts}; kinetic energy from the modes of each part" if parts else _level_alone(situation)
+        kinetic = "; kinetic energy from the modes of each part" if vibration.signed else ""
+        return f"{told}{kinetic}" if told else _level_alone(situation)
     rates = ", ".join(f"{one.omega:.6g}" for one in mode.modes)
     facts = [f"omega {rates}", f"alpha {mode.alpha:.4g}"]
     offsets = {"energy_plastic": mode.energy_plastic, "preload": mode.preload}
@@ -72,7 +74,7 @@ def _basis(situation: Situation) -> str:
     source = "given" if situation.settings.oscillator else "identified"
     count = len(mode.modes)
     oscillator = f"oscillator, {source}" if count == 1 else f"oscillator of {count} modes, {source}"
-    front = f"{parts}; " if parts else ""
+    front = f"{told}; " if told else ""
     return f"{front}{oscillator}: {', '.join(facts)}; tr and energies are refined on it"
 
 

@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 from d2rpick.choice.answers import suggest
 from d2rpick.choice.question import Settings
 from d2rpick.histories.history import Samples
+from d2rpick.report.situation import heading
 from d2rpick.vibration.swings import count_swings
 from tests.energies import sure
 from tests.records import table
@@ -69,6 +70,7 @@ def test_the_pair_of_a_spring_that_stiffens_has_the_sign_of_td(lifted: Samples) 
     for td in (20.0, 27.5):
         answer = suggest(record, td, Settings(after=2.0))
         assert answer.situation.basis == "swings"
+        assert ("basis", "swings of the energy, counted") in heading(answer.situation)  # no word of parts
         at_tr, at_td = np.interp([sure(answer.chosen).tr, td], TIME, x)
         assert at_tr == pytest.approx(at_td, abs=0.2 * np.abs(x[td < TIME]).max())
         assert not any(one.acceptable and np.interp(one.tr, TIME, x) * at_td < -1e-3 for one in answer.candidates)
