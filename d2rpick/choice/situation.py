@@ -17,11 +17,10 @@ from d2rpick.flight.flight import Flight, Seen, find_flight, landed, seen_flight
 from d2rpick.flight.internal_energy import largest, round_off
 from d2rpick.flight.margin import margin_before_contact
 from d2rpick.histories.digits import sum_as_read
+from d2rpick.vibration import find_models
 from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD, Identification, identify, identify_several, judge_given
 from d2rpick.vibration.model import Evidence, Vibration, describing, doubtful, energy_at, model_at
-from d2rpick.vibration.signed_models import find_models
-from d2rpick.vibration.span import Fits, Span, described_span, span_of
-from d2rpick.vibration.uncertainty import resolved
+from d2rpick.vibration.span import Fits, Span, described_span, resolved, span_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from d2rpick.report.fields import Field, kind_of, many, maybe, one_of, row
-from d2rpick.vibration.signed_models import MODELS
+from d2rpick.vibration import MODELS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

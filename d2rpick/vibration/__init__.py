@@ -1,1 +1,67 @@
-"""What vibrates, and how?  Oscillators in closed form, found in an energy history and replayed."""
+"""What vibrates, and how?  The models, best first, and how those that tell a sign are looked for beside an oscillator.
+
+A further one is a class in a module of its own, and here its name in `SignedModel`, what finds it in a record, and its
+line in `MODELS`.  It has what `SignedParts` and `Swings` have alike: the methods of a `Deformation`, ``time`` (n,),
+whether enough of the energy is ``signed``, what is known at a td, and words: what a choice rests on (``told``), that
+the kinetic share "is what ..." (``kinetic``), and why a tr has no measures (``undescribed``).
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import TypeAlias
+
+    from d2rpick.histories.history import History, Memory
+    from d2rpick.vibration.part_signs import SignedParts
+    from d2rpick.vibration.span import Span
+    from d2rpick.vibration.swings import Swings
+
+    SignedModel: TypeAlias = SignedParts | Swings
+    Finder: TypeAlias = Callable[[History, Span], SignedModel | None]
+
+
+def _parts(history: History, within: Span) -> SignedModel | None:
+    """Read the signs of single parts, where their energies are written."""
+    time, _ = history.between(*within)
+    if history.part_energies is None or time.size < 3:
+        return None
+    from d2rpick.histories.samples import window
+    from d2rpick.vibration.part_signs import SignedParts
+
+    return SignedParts(time, history.part_energies[window(history.time, *within)], history.part_names)
+
+
+def _swings(history: History, within: Span) -> SignedModel | None:
+    """Count the swings of the energy, where they come down to a floor."""
+    from d2rpick.vibration.swings import count_swings
+
+    return count_swings(*history.between(*within))
+
+
+# By what a choice is said to rest on; an oscillator, and the energy alone, are known of each td in another way.
+MODELS: Final[dict[str, Finder | None]] = {"parts": _parts, "oscillator": None, "swings": _swings, "energy": None}
+
+
+def find_models(
+    history: History, around: Span, flight: Span | None, doubtful: Callable[[], bool], memory: Memory
+) -> dict[str, SignedModel]:
+    """Look for models, best first, until one tells the sign; those behind the oscillator where that is ``doubtful``.
+
+    They are looked for ``around`` td, those behind the oscillator in the ``flight``, where one is known.
+    """
+    found: dict[str, SignedModel] = {}
+    within = around
+    for basis, find in MODELS.items():
+        if basis == "oscillator":
+            if flight is None or not doubtful():
+                break
+            within = flight
+        if find and (model := memory.once((basis, *within), partial(find, history, within))):
+            found[basis] = model
+            if model.signed:
+                break
+    return found

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.samples import narrow
+from d2rpick.histories.samples import first_above, narrow
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -241,3 +241,55 @@ def _leaving(mode: Mode, edges: Samples, wanted: Samples, room: Samples) -> Samp
     distances = np.full(room.size, np.inf)
     distances[column] = np.abs(found.at - edges[0, column])
     return distances
+
+
+class Profile(NamedTuple):
+    """Lock-in errors ``error`` at ascending times ``time``, both of shape (n,), for one td [time], [-]."""
+
+    time: Samples
+    error: Samples
+
+    @classmethod
+    def of(cls, vibration: Deformation, time: Samples, td: float) -> Profile:
+        """Profile at the times before ``td``."""
+        before = time[time < td]
+        return cls(before, lock_in_error(vibration, before, td))
+
+    def minima(self) -> tuple[float, ...]:
+        """Times of the local minima: the vertex of the parabola through three squares, for L^2 is smooth [time]."""
+        t, square = self.time, self.error**2
+        if t.size < 3:
+            return ()
+        at = np.flatnonzero((square[1:-1] < square[:-2]) & (square[1:-1] <= square[2:])) + 1
+        left, right = t[at] - t[at - 1], t[at + 1] - t[at]
+        fall, rise = (square[at] - square[at - 1]) / left, (square[at + 1] - square[at]) / right
+        # the slope grows evenly from ``fall`` in the middle of the left interval to ``rise`` in that of the right
+        share = -fall / (rise - fall)
+        return tuple((t[at] - left / 2 + share * (left + right) / 2).tolist())
+
+    def cell(self, at: Samples) -> Samples:
+        """Interval between the two times around each of ``at`` [time]."""
+        after = np.clip(np.searchsorted(self.time, at), 1, self.time.size - 1)
+        return np.asarray(self.time[after] - self.time[after - 1])
+
+    def tolerances(self, tr: Samples, errors: Samples) -> Samples:
+        """How far each tr (n,) may be off before its error grows by 0.05; at most over all times [time].
+
+        ``errors`` are those at each tr; between its times the profile is linear.
+        """
+        limit, middle, last = errors + TOLERATED_GROWTH, np.searchsorted(self.time, tr), self.time.size - 1
+        after = first_above(self.error, middle, limit)
+        before = last - first_above(self.error[::-1], last + 1 - middle, limit)
+        most = np.full(tr.shape, self.time[-1] - self.time[0])
+        for outside, inwards in ((after, -1), (before, 1)):
+            there = np.flatnonzero((outside >= 0) & (outside <= last))
+            most[there] = np.fmin(most[there], self._leaving(outside[there], inwards, tr[there], limit[there]))
+        return most
+
+    def _leaving(self, outside: NDArray[np.intp], inwards: int, tr: Samples, limit: Samples) -> Samples:
+        """Distance from each ``tr`` to where the error passes ``limit``, linear from the time ``outside`` inwards."""
+        inside = np.clip(outside + inwards, 0, self.time.size - 1)
+        (t0, e0), (t1, e1) = ((self.time[at], self.error[at]) for at in (inside, outside))
+        share = np.divide(limit - e0, e1 - e0, out=np.zeros(tr.shape), where=e1 != e0)
+        # where no time lies between tr and the outside, that counts
+        return np.asarray(np.abs(np.where(e0 > limit, t1, t0 + share * (t1 - t0)) - tr))

@@ -16,14 +16,13 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 import numpy as np
 
 from d2rpick.base.errors import listing
-from d2rpick.vibration import measures
+from d2rpick.vibration import MODELS, measures
 from d2rpick.vibration.fitting import MAX_MISFIT
 from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD, Identification, samples_per_period
-from d2rpick.vibration.measures import Measured
+from d2rpick.vibration.measures import Measured, Profile
 from d2rpick.vibration.modes import Mode
-from d2rpick.vibration.moments import ModalEnergy, Moments, Profile, SampledEnergy, moments_of_mode
-from d2rpick.vibration.signed_models import MODELS
-from d2rpick.vibration.uncertainty import residual_bound
+from d2rpick.vibration.moments import ModalEnergy, Moments, SampledEnergy, moments_of_mode
+from d2rpick.vibration.span import residual_bound
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -31,9 +30,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import History, Samples
+    from d2rpick.vibration import SignedModel
     from d2rpick.vibration.measures import Bound, Deformation
     from d2rpick.vibration.part_signs import PartMatch, SignedParts
-    from d2rpick.vibration.signed_models import SignedModel
     from d2rpick.vibration.span import Span
 
 # Why no tr can be trusted where the vibration is known but cannot be made out at td.
@@ -166,7 +165,8 @@ class Vibration:
     def reach(self, moments: Moments) -> Samples:
         """How far the true time of each moment may lie away; of a match half a cell of the profile [time]."""
         reach = self.whole.reach(moments.tr)
-        return self.profile.bounding(moments, reach) if self.profile else reach
+        # a match lies where the error is least
+        return np.where(moments.are("match"), self.profile.cell(moments.tr) / 2, reach) if self.profile else reach
 
     def part_matches(self, tr: float) -> tuple[PartMatch, ...]:
         """What each part has of the mismatch; nothing where single parts are not known."""

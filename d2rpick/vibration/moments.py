@@ -8,23 +8,22 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final, NamedTuple
+from math import sqrt
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.histories.samples import find_crossings, find_turns, first_above
+from d2rpick.histories.samples import find_crossings, find_turns
 from d2rpick.vibration import measures
 from d2rpick.vibration.modes import Mode
-from d2rpick.vibration.uncertainty import fitted_reach, sampled_reach
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from numpy.typing import NDArray
 
-    from d2rpick.histories.history import History, Samples
+    from d2rpick.histories.history import History, Precision, Samples
     from d2rpick.vibration.identify import Identification
-    from d2rpick.vibration.measures import Deformation
     from d2rpick.vibration.modes import Modes
     from d2rpick.vibration.span import Span
 
@@ -253,57 +252,135 @@ def moments_of_mode(seen: Sequence[ModalEnergy], tolerance: float, since: Sequen
     return [found.at(slice(*each)) for each in pairwise(ends)]
 
 
-class Profile(NamedTuple):
-    """Lock-in errors ``error`` at ascending times ``time``, both of shape (n,), for one td [time], [-]."""
+# Between samples E'' may exceed what second differences of the samples show; on random vibrations a quarter
+# more covers 99 % of the true crossings from 8 samples per vibration period on.
+_BEND_RESERVE = 1.25
+# Three standard deviations: 99.7 % of normal errors.
+_DEVIATIONS = 3.0
+# Rounding errors are many, independent and of either sign: 2.6 standard deviations of their sum hold 99 % of it, and
+# they add to the error of the bend as independent errors do.
+_ROUNDING_DEVIATIONS = 2.6
+# The systematic rest of a fit is mostly a vibration: its peaks are the root of 2 of its rms.
+_PEAK_OF_REST = sqrt(2)
+# However well a fit follows the samples, it is a model of what happens between them: this share of the output
+# interval is kept in reserve.
+_BETWEEN_SAMPLES = 1e-3
 
-    time: Samples
-    error: Samples
 
-    @classmethod
-    def of(cls, vibration: Deformation, time: Samples, td: float) -> Profile:
-        """Profile at the times before ``td``."""
-        before = time[time < td]
-        return cls(before, measures.lock_in_error(vibration, before, td))
+def sampled_reach(history: History, times: Samples, td: float, level: float) -> Samples:
+    """Distance to the true crossing where tr comes from the samples themselves, linear between them.
 
-    def minima(self) -> tuple[float, ...]:
-        """Times of the local minima: the vertex of the parabola through three squares, for L^2 is smooth [time]."""
-        t, square = self.time, self.error**2
-        if t.size < 3:
-            return ()
-        at = np.flatnonzero((square[1:-1] < square[:-2]) & (square[1:-1] <= square[2:])) + 1
-        left, right = t[at] - t[at - 1], t[at + 1] - t[at]
-        fall, rise = (square[at] - square[at - 1]) / left, (square[at + 1] - square[at]) / right
-        # the slope grows evenly from ``fall`` in the middle of the left interval to ``rise`` in that of the right
-        share = -fall / (rise - fall)
-        return tuple((t[at] - left / 2 + share * (left + right) / 2).tolist())
+    Parameters
+    ----------
+    history : History
+    times : array of shape (n,)
+        Switch times tr found at ``level`` [time].
+    td : float
+        [time]
+    level : float
+        Energy taken for that at td: of the samples or, where a fit tells it, off them by the fit's own error [energy].
 
-    def cell(self, at: Samples) -> Samples:
-        """Interval between the two times around each of ``at`` [time]."""
-        after = np.clip(np.searchsorted(self.time, at), 1, self.time.size - 1)
-        return np.asarray(self.time[after] - self.time[after - 1])
+    Returns
+    -------
+    array of shape (n,)
+        The true crossing lies within tr - x and tr + x [time]; at most two output intervals.
+    """
+    time, energy = history.time, history.energy
+    cell, interval = _cells(time, times)
+    at_td, _ = _cells(time, np.atleast_1d(td))
+    bend = curvature(time, energy, times)
+    # Newton's error of linear interpolation: E''/2 times the distances to both neighbours; zero on a sample.
+    off_td = float(curvature(time, energy, td)) * (td - time[at_td]) * (time[at_td + 1] - td) / 2
+    curved = _BEND_RESERVE * (bend * interval**2 / 8 + off_td)
+    of_tr, of_td = _rounding(history, times), _rounding(history, np.atleast_1d(td))
+    most, square = (a + b for a, b in zip(of_tr, of_td, strict=True))
+    rounded = np.minimum(most, _ROUNDING_DEVIATIONS * np.sqrt(square))
+    slope = np.abs((energy[cell + 1] - energy[cell]) / interval)
+    error = np.hypot(curved, rounded) + abs(level - history.energy_at(td))
+    return np.minimum(reach(slope, bend, error), 2 * interval)
 
-    def bounding(self, moments: Moments, reach: Samples) -> Samples:
-        """Give ``reach`` of each moment, of a match half of its cell: it lies where the error is least [time]."""
-        return np.where(moments.are("match"), self.cell(moments.tr) / 2, reach)
 
-    def tolerances(self, tr: Samples, errors: Samples) -> Samples:
-        """How far each tr (n,) may be off before its error grows by 0.05; at most over all times [time].
+def fitted_reach(history: History, fit: Identification, mode: Mode | Modes, times: Samples, td: float) -> Samples:
+    """Distance to the true crossing where tr and the level come from the fitted oscillator.
 
-        ``errors`` are those at each tr; between its times the profile is linear.
-        """
-        limit, middle, last = errors + measures.TOLERATED_GROWTH, np.searchsorted(self.time, tr), self.time.size - 1
-        after = first_above(self.error, middle, limit)
-        before = last - first_above(self.error[::-1], last + 1 - middle, limit)
-        most = np.full(tr.shape, self.time[-1] - self.time[0])
-        for outside, inwards in ((after, -1), (before, 1)):
-            there = np.flatnonzero((outside >= 0) & (outside <= last))
-            most[there] = np.fmin(most[there], self._leaving(outside[there], inwards, tr[there], limit[there]))
-        return most
+    The energy error is that of the fitted curve at tr and at td: its standard deviation from the scatter of the
+    record about it, and what of the misfit is no scatter.  Arguments and result as in ``sampled_reach``, without level.
+    """
+    both = np.append(times, td)
+    off = _DEVIATIONS * fit.energy_deviation(both) + _PEAK_OF_REST * _local_rest(fit, mode, both)
+    error = off[:-1] + off[-1]
+    slope, bend = mode.energy_slopes(times)
+    distance = reach(np.abs(slope), np.abs(bend), error)
+    # the fit, not the output interval, bounds how far a crossing can be off: it stays within a quarter of a period
+    quanta = _half_quanta(history.time_precision, times) + history.time_precision.quantum(td) / 2
+    return np.minimum(distance, np.pi / 2 / mode.fastest) + _BETWEEN_SAMPLES * history.step + quanta
 
-    def _leaving(self, outside: NDArray[np.intp], inwards: int, tr: Samples, limit: Samples) -> Samples:
-        """Distance from each ``tr`` to where the error passes ``limit``, linear from the time ``outside`` inwards."""
-        inside = np.clip(outside + inwards, 0, self.time.size - 1)
-        (t0, e0), (t1, e1) = ((self.time[at], self.error[at]) for at in (inside, outside))
-        share = np.divide(limit - e0, e1 - e0, out=np.zeros(tr.shape), where=e1 != e0)
-        # where no time lies between tr and the outside, that counts
-        return np.asarray(np.abs(np.where(e0 > limit, t1, t0 + share * (t1 - t0)) - tr))
+
+def _local_rest(fit: Identification, mode: Mode | Modes, at: Samples) -> Samples:
+    """Systematic rest of a fit near each time: its rms, and more where the vibration is above its own rms [energy]."""
+    return np.asarray(fit.structure * np.maximum(1.0, mode.vibration_energy(at) / fit.vibration))
+
+
+def _cells(time: Samples, at: Samples) -> tuple[NDArray[np.intp], Samples]:
+    """Index of the sample before each time, and the interval to the next."""
+    cell = np.clip(np.searchsorted(time, at, side="right") - 1, 0, time.size - 2)
+    return cell, time[cell + 1] - time[cell]
+
+
+def _rounding(history: History, at: Samples) -> tuple[Samples, Samples]:
+    """Largest error that the printed digits leave in the interpolated energy, and its mean square [energy].
+
+    Energy and time of both neighbours are off by up to half a quantum each, any value as likely as another.
+    """
+    cell, interval = _cells(history.time, at)
+    off = at - history.time[cell]
+    share, slope = off / interval, (history.energy[cell + 1] - history.energy[cell]) / interval
+    energies = _half_quanta(history.energy_precision, history.energy[cell] + slope * off)
+    times = slope * _half_quanta(history.time_precision, at)
+    square = (energies**2 + times**2) / 3 * ((1 - share) ** 2 + share**2)
+    return energies + np.abs(times), square
+
+
+def _half_quanta(precision: Precision, values: Samples) -> Samples:
+    return precision.quanta(values) / 2
+
+
+def curvature(time: Samples, energy: Samples, at: Samples | float) -> Samples:
+    """Largest |E''| near ``at``: of the four second divided differences about its cell [energy/time^2].
+
+    Zero where the record has fewer than three samples.
+    """
+    at = np.asarray(at, dtype=np.float64)
+    if time.size < 3:
+        return np.zeros(at.shape)
+    cell = np.searchsorted(time, at, side="right") - 1
+    first = np.clip(cell[..., np.newaxis] + np.arange(-2, 2), 0, time.size - 3)
+    t0, t1, t2 = (time[first + i] for i in range(3))
+    e0, e1, e2 = (energy[first + i] for i in range(3))
+    second = np.abs(2 * ((e2 - e1) / (t2 - t1) - (e1 - e0) / (t1 - t0)) / (t2 - t0))
+    return np.asarray(second.max(axis=-1))
+
+
+def reach(slope: Samples | float, bend: Samples | float, error: Samples | float) -> Samples:
+    """How far in time a crossing can lie away when the energy there is wrong by ``error``.
+
+    The smaller root x of slope x - bend x^2/2 = error; where there is none, the curve may turn before it
+    reaches the level and sqrt(2 error/bend) is the distance at which its bend alone has used up the error.
+
+    Parameters
+    ----------
+    slope, bend, error : array_like
+        |E'| [energy/time], |E''| [energy/time^2] and the energy error [energy], not negative.
+
+    Examples
+    --------
+    >>> float(reach(2.0, 0.0, 1.0)), float(reach(0.0, 2.0, 1.0))
+    (0.5, 1.0)
+    """
+    slope, bend, error = np.broadcast_arrays(*(np.asarray(v, dtype=np.float64) for v in (slope, bend, error)))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        steep, curved = slope / error, bend / error  # per error: squares of energies might overflow
+        root = steep**2 - 2 * curved
+        regular = 2 / (steep + np.sqrt(np.maximum(root, 0)))
+        turning = np.sqrt(2 / curved)
+    return np.where(error == 0, 0.0, np.where(root > 0, regular, turning))

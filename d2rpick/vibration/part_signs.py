@@ -1,99 +1,30 @@
-"""The deformation of each part with its sign: what its zeros give, where waves confirm it, else modes of its own.
-
-The root of a part's energy is proportional to its deformation but for the sign, and the sign turns where the energy
-passes through zero.  In a record no energy is zero exactly.  But the deformation is smooth: through a zero the root
-bends sharply unless the sign is turned there, at any other minimum it bends sharply if it is.
-
-Zeros alone prove no sign.  Where a part bends in two planes its energy is the sum of two squares, hardly ever zero, and
-the root of it with signs from its minima jumps or bends as no sum of a few waves does.
-"""
+"""The deformation of each part with its sign: what waves confirm, else modes of its own."""
 
 from __future__ import annotations
 
 from functools import cached_property
-from itertools import pairwise
-from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from d2rpick.histories.history import Memory
-from d2rpick.histories.samples import stretches
 from d2rpick.vibration import measures
 from d2rpick.vibration.identify import Identification, identify, identify_several
+from d2rpick.vibration.span import SMALLEST, resolved
 from d2rpick.vibration.swings import SOLVER_FLOOR
-from d2rpick.vibration.uncertainty import SMALLEST, hidden_share, resolved
-from d2rpick.vibration.waves import Waves, fit_waves
+from d2rpick.vibration.waves import PartMotion, all_zeros, followed
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import Samples
-    from d2rpick.vibration.modes import Mode, Modes
 
+    Places = NDArray[np.intp]
 
-# Of the energy, what waves may leave of a deformation: a sign that is wrong at one of thirty minima leaves ten times as
-# much, noise of half a per cent of the highest energy a tenth.
-_MOST_LEFT: Final = 0.01
-# A second plane with so much of the energy hides zeros, or makes some where there are none.
-_MOST_HIDDEN: Final = 0.01
-# Of the vibration energy at the time, over a quarter of a period: beyond, the record is another one there, or lost in
-# noise, and the sign is unclear.
-_OFF: Final = 0.2
-_MOST_OFF: Final = 0.5  # of the samples
-_ROUNDS: Final = 4  # in which the stretch that is fitted comes to hold all that is clear
 # Modes of a part's own can imitate what crosses between modes in its energy: they must leave so much less.
-_CLEARLY: Final = 0.5
-
-
-class PartMotion(NamedTuple):
-    """A ``model`` of a part's vibration, the times at which it is ``unclear`` [time], and what may be ``hidden``.
-
-    That is the share of the vibration energy that a further mode may have unseen [-].
-    """
-
-    model: Waves | Mode | Modes
-    unclear: Samples
-    hidden: float
-
-
-def followed(time: Samples, tracked: Samples, zeros: Zeros) -> PartMotion | None:
-    """Hold a deformation against waves, which are fitted where it is clear and tell the signs in doubt.
-
-    Parameters
-    ----------
-    time, tracked : array of shape (n,)
-        [time], the root of the energy with the signs that its zeros give [sqrt(energy)].
-    zeros : Zeros
-
-    Returns
-    -------
-    PartMotion or None
-        None where no waves follow it.
-    """
-    root, deformation, width = np.abs(tracked), tracked, max(3, time.size // (2 * zeros.sure.size))
-    edges = np.sort(np.concatenate([time[[0, -1]], zeros.doubtful, zeros.unseen]))
-    longest = int(np.argmax(np.diff(edges)))
-    stretch = slice(*np.searchsorted(time, edges[longest : longest + 2]).tolist())
-    for _ in range(_ROUNDS):
-        fit = fit_waves(time[stretch], deformation[stretch])
-        if fit is None:
-            return None
-        waves = fit
-        modelled = waves.deformation(time)
-        miss = (np.abs(modelled) - root) ** 2
-        missed = _means(miss, width) > _OFF * waves.vibration_energy(time)
-        # and beside it, where the mean still holds much that is right
-        off = _means(missed.astype(np.float64), width) * width > 0.5
-        fitted, stretch = stretch, max(stretches(~off), key=lambda one: one.stop - one.start, default=slice(0, 0))
-        if stretch == fitted:
-            break
-        deformation = np.copysign(root, modelled)
-    if np.mean(off) > _MOST_OFF or miss[~off].sum() > _MOST_LEFT * (root[~off] ** 2).sum():
-        return None
-    hidden = hidden_share(time[fitted], root[fitted] ** 2, waves)
-    return PartMotion(waves, time[off], hidden) if hidden <= _MOST_HIDDEN else None
+_CLEARLY = 0.5
 
 
 def by_own_modes(time: Samples, energy: Samples, followed: PartMotion | None) -> PartMotion | None:
@@ -115,100 +46,6 @@ def by_own_modes(time: Samples, energy: Samples, followed: PartMotion | None) ->
 def _purely_vibrates(fit: Identification) -> bool:
     """Whether a fit describes the record without a plastic rest or preload: these may be a plane of a rate close by."""
     return bool(fit.describes_record and fit.mode and not (fit.mode.energy_plastic or fit.mode.preload))
-
-
-def _means(values: Samples, width: int) -> Samples:
-    """Means of so many values around each."""
-    return np.convolve(values, np.ones(width) / width, mode="same")
-
-
-Places: TypeAlias = "NDArray[np.intp]"
-
-# One way must be this many times smoother than the other to be believed.  At 24 samples per period of a chain of two
-# springs the least clear of 35 minima has 2.5, the usual ones have 5 to 60.
-_SMOOTHER = 2.0
-# Every other sample is left out again and again while minima are unclear: in fine output a zero drowns in the error
-# of the solver, 1e-5 of the highest energy, and the root is round there.  But minima stay this many samples apart.
-_LEAST_APART = 8
-# Samples of parts that are looked at together: what is made of them stays in the cache.
-_TOGETHER = 1 << 14
-# Signs of five samples about a minimum where the deformation turns nowhere, just before the minimum, just after it.
-_TURNS = np.array([[1, 1, 1, 1, 1], [-1, -1, 1, 1, 1], [-1, -1, -1, 1, 1]])
-
-
-class Zeros(NamedTuple):
-    """Times at which a deformation passes zero, at which it may or may not, and, near the ends, cannot be seen to."""
-
-    sure: Samples
-    doubtful: Samples
-    unseen: Samples
-
-
-def all_zeros(time: Samples, roots: Samples) -> Iterator[Zeros]:
-    """Find the zeros of each row of ``roots``, shape (k, n)."""
-    rows = max(1, _TOGETHER // time.size)
-    for first in range(0, len(roots), rows):
-        yield from _zeros(time, roots[first : first + rows])
-
-
-def _zeros(time: Samples, roots: Samples) -> list[Zeros]:
-    """Find the zeros of each row from every sample, or every other, and so on: what leaves the fewest doubts."""
-    best, stride = _zeros_of(time, roots, _minima(roots)), 2
-    unsure = _unsure(best, range(len(best)))
-    while unsure.size:
-        coarse = roots[unsure, ::stride]
-        minima = _minima(coarse)
-        apart = coarse.shape[1] >= _LEAST_APART * np.maximum(1, np.count_nonzero(minima, axis=1))
-        rows = unsure[apart].tolist()
-        for row, coarser in zip(rows, _zeros_of(time[::stride], coarse[apart], minima[apart]), strict=True):
-            best[row] = min(best[row], coarser, key=lambda found: found.doubtful.size)
-        unsure, stride = _unsure(best, rows), 2 * stride
-    return best
-
-
-def _unsure(zeros: Sequence[Zeros], rows: Iterable[int]) -> Places:
-    return np.array([row for row in rows if zeros[row].doubtful.size], dtype=np.intp)
-
-
-def _zeros_of(time: Samples, roots: Samples, minima: NDArray[np.bool_]) -> list[Zeros]:
-    """Zeros of each row from just these samples, which have these minima."""
-    row, at = np.nonzero(minima)
-    # two samples to either side tell how the root bends; of a minimum nearer to an end nothing is known
-    early, late = at < 2, at >= time.size - 2
-    own, middle = row[~early & ~late], at[~early & ~late]
-    around = middle[:, np.newaxis] + np.arange(-2, 3)
-    plain, before, after = _bends(time[around], roots[own[:, np.newaxis], around] * _TURNS[:, np.newaxis])
-    turned = np.minimum(before, after)
-    zero = plain > _SMOOTHER * turned
-    doubt = ~zero & (turned <= _SMOOTHER * plain)
-    left = np.where(before < after, middle - 1, middle)[zero]
-    low, high = roots[own[zero], left], roots[own[zero], left + 1]
-    share = np.divide(low, low + high, out=np.full(left.shape, 0.5), where=low + high > 0)
-    sure = time[left] + share * (time[left + 1] - time[left])
-    # a zero beside a minimum near an end may lie one sample further inwards
-    ends, unseen = np.append(row[early], row[late]), np.append(time[at[early] + 1], time[at[late] - 1])
-    order = np.argsort(ends, kind="stable")
-    tables = (sure, own[zero]), (time[middle[doubt]], own[doubt]), (unseen[order], ends[order])
-    parted = (_by_row(times, owners, len(roots)) for times, owners in tables)
-    return [Zeros(*one) for one in zip(*parted, strict=True)]
-
-
-def _by_row(values: Samples, row: Places, rows: int) -> list[Samples]:
-    """Values of each row, of which some may have none; they stand in the order of the rows."""
-    edges = np.searchsorted(row, np.arange(rows + 1)).tolist()
-    return [values[first:last] for first, last in pairwise(edges)]
-
-
-def _minima(values: Samples) -> NDArray[np.bool_]:
-    """Where in each row local minima are, of a flat one the first; an end below its neighbour counts."""
-    around = np.pad(values, ((0, 0), (1, 1)), constant_values=np.inf)
-    return np.asarray((values < around[:, :-2]) & (values <= around[:, 2:]))
-
-
-def _bends(times: Samples, values: Samples) -> Samples:
-    """Largest second difference of the slopes in each row of five samples, of any number of tables of such rows."""
-    slopes = (values[..., 1:] - values[..., :-1]) / (times[:, 1:] - times[:, :-1])
-    return np.asarray(np.abs(slopes[..., 1:] - slopes[..., :-1]).max(axis=-1, initial=0.0))
 
 
 # A deformation that swings about zero is zero on average; beyond this share of its mean size it swings about

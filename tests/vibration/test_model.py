@@ -5,9 +5,10 @@ import pytest
 
 from d2rpick.vibration import measures
 from d2rpick.vibration.identify import identify_several
+from d2rpick.vibration.measures import Profile
 from d2rpick.vibration.model import Evidence, energy_at
 from d2rpick.vibration.modes import Mode, Modes
-from d2rpick.vibration.moments import Moments, Profile
+from d2rpick.vibration.moments import Moments
 from d2rpick.vibration.span import Span
 from tests.records import table
 

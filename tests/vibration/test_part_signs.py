@@ -16,8 +16,8 @@ from d2rpick.cli import d2rpick  # noqa: F401  imported first, it sets the threa
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection, open_run
 from d2rpick.vibration.model import SUNK
-from d2rpick.vibration.part_signs import MOST_UNSIGNED, PartMotion, SignedParts
-from d2rpick.vibration.waves import Waves
+from d2rpick.vibration.part_signs import MOST_UNSIGNED, SignedParts
+from d2rpick.vibration.waves import PartMotion, Waves
 from tests import chain
 from tests.command import BOX
 from tests.energies import sure
@@ -155,7 +155,7 @@ def test_the_residual_of_switched_runs_is_predicted(estimated: bool) -> None:
 def test_parts_that_vibrate_no_more_than_a_solver_errs_have_no_residual() -> None:
     situation = seen(chain.TD_LATE)
     parts = sure(situation.evidence.parts)
-    started = Waves(
+    started = Waves.at(
         np.array([-300 + 900j]), np.array([101 * np.sqrt(parts.vibration_energy(chain.TD_LATE))]), parts.time[0]
     )
     sunk = copy(parts)

@@ -8,8 +8,8 @@ from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.histories.history import History
 from d2rpick.vibration.measures import kinetic_share, lock_in_error
-from d2rpick.vibration.part_signs import SignedParts, all_zeros, by_own_modes, followed
-from d2rpick.vibration.waves import Waves
+from d2rpick.vibration.part_signs import SignedParts, by_own_modes
+from d2rpick.vibration.waves import Waves, all_zeros, followed
 from tests.benchmarks.promise_parts import Motion, history
 from tests.energies import sure
 from tests.records import noisy

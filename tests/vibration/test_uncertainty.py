@@ -12,7 +12,8 @@ from d2rpick.histories.history import Precision
 from d2rpick.histories.samples import find_crossings
 from d2rpick.vibration.identify import identify
 from d2rpick.vibration.modes import Mode, Modes
-from d2rpick.vibration.uncertainty import curvature, fitted_reach, reach, residual_bound, resolved, sampled_reach
+from d2rpick.vibration.moments import curvature, fitted_reach, reach, sampled_reach
+from d2rpick.vibration.span import residual_bound, resolved
 from tests.benchmarks.identification import small_second_modes
 from tests.energies import sure
 from tests.records import ENERGY, TIME, noisy, printed, replayed_residual, table
