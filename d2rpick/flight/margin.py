@@ -83,15 +83,14 @@ def landing_spread(history: History, flight: Flight) -> float | None:
     balance, momentum = history.balance, _momentum(history, flight)
     if balance is None or balance.internal is None or balance.kinetic is None or momentum is None:
         return None
-    assert flight.start is not None
-    assert flight.end is not None
-    inside = window(balance.time, flight.start, flight.end)
+    start, end = flight.within(history.time)
+    inside = window(balance.time, start, end)
     energy = balance.internal[inside]
     if energy.size < 2:
         return None
     vibration = float(energy.mean()) - max(0.0, float(energy.min()))
     crossings = int(np.count_nonzero(np.diff(energy > energy.mean())))
-    omega = np.pi * crossings / (2 * (flight.end - flight.start))
+    omega = np.pi * crossings / (2 * (end - start))
     approach = float(balance.kinetic[inside][-1]) * _towards_ground(momentum)
     if vibration <= 0 or crossings == 0:
         return 0.0
@@ -110,9 +109,7 @@ def _momentum(history: History, flight: Flight) -> Samples | None:
             members = [i for i, part in enumerate(momenta.parts) if part.id in flying]  # type: ignore[assignment]
         if set(np.flatnonzero(moving).tolist()) - set(members):
             return None
-        assert flight.start is not None
-        assert flight.end is not None
-        values = momenta.of(members)[window(momenta.time, flight.start, flight.end)]
+        values = momenta.of(members)[window(momenta.time, *flight.within(momenta.time))]
         return values if len(values) > 1 else None
     return None
 

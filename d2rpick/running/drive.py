@@ -58,25 +58,21 @@ class Driven:
     cautions: tuple[Caution, ...]
 
 
+@dataclass
 class Driver:
     """One run in its folder, as far as its journal says.
 
     ``told`` gets each thing that happens, in a line; ``at`` is the leg that is computed and its time.
     """
 
-    def __init__(
-        self,
-        deck: DrivenDeck,
-        solver: Solver,
-        journal: Journal,
-        commands: Commands,
-        limits: Limits,
-        look: Looks,
-        told: Callable[[str], None],
-    ) -> None:
-        self.deck, self.solver, self.journal, self.commands = deck, solver, journal, commands
-        self.limits, self.look, self.told = limits, look, told
-        self.at: tuple[Order, float] | None = None
+    deck: DrivenDeck
+    solver: Solver
+    journal: Journal
+    commands: Commands
+    limits: Limits
+    look: Looks
+    told: Callable[[str], None]
+    at: tuple[Order, float] | None = None
 
     @property
     def legs(self) -> list[Leg]:

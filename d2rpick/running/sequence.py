@@ -10,15 +10,13 @@ from itertools import takewhile
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import D2RPickError
+from d2rpick.flight.margin import SHARE
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
 LOAD, SEARCH, APPROACH, PROBE, RIGID = "load", "search", "approach", "probe", "rigid"
 RIGID_KINDS: Final = (PROBE, RIGID)
-# Without a margin that is given: this share of the flight held in eight windows of two structures.  Where nothing
-# vibrates the rigid body flies as the deformable one would, and the least margin is enough.
-_MARGIN_SHARE: Final = 0.03
 # A search ends when nothing higher came for this share of it: the rest would be computed twice.
 _PASSED: Final = 0.25
 # Where a leg ends, its history does so up to one state earlier; times within it are the same.
@@ -44,7 +42,9 @@ class Limits(NamedTuple):
         """Margin before the contact at the end of a flight of this length [time]; ``idle``: nothing vibrates in it."""
         if self.margin is not None:
             return self.margin
-        return self.shortest if idle and self.shortest else max(self.shortest, _MARGIN_SHARE * flight)
+        # the share held in eight windows of two structures; where nothing vibrates the rigid body flies as the
+        # deformable one would, and the least margin is enough
+        return self.shortest if idle and self.shortest else max(self.shortest, SHARE * flight)
 
     @property
     def same(self) -> float:

@@ -243,6 +243,16 @@ def _leaving(mode: Mode, edges: Samples, wanted: Samples, room: Samples) -> Samp
     return distances
 
 
+def vertices(time: Samples, values: Samples, at: NDArray[np.intp]) -> tuple[Samples, Samples]:
+    """Times and values of the vertices of the parabolas through the samples ``at`` and their neighbours."""
+    before, after = time[at] - time[at - 1], time[at + 1] - time[at]
+    fall, rise = (values[at] - values[at - 1]) / before, (values[at + 1] - values[at]) / after
+    bend = (rise - fall) / (before + after)
+    slope = (fall * after + rise * before) / (before + after)
+    step = np.divide(-slope, 2 * bend, out=np.zeros(at.shape), where=bend != 0)
+    return time[at] + step, values[at] + step * slope / 2
+
+
 class Profile(NamedTuple):
     """Lock-in errors ``error`` at ascending times ``time``, both of shape (n,), for one td [time], [-]."""
 
@@ -261,11 +271,7 @@ class Profile(NamedTuple):
         if t.size < 3:
             return ()
         at = np.flatnonzero((square[1:-1] < square[:-2]) & (square[1:-1] <= square[2:])) + 1
-        left, right = t[at] - t[at - 1], t[at + 1] - t[at]
-        fall, rise = (square[at] - square[at - 1]) / left, (square[at + 1] - square[at]) / right
-        # the slope grows evenly from ``fall`` in the middle of the left interval to ``rise`` in that of the right
-        share = -fall / (rise - fall)
-        return tuple((t[at] - left / 2 + share * (left + right) / 2).tolist())
+        return tuple(vertices(t, square, at)[0].tolist())
 
     def cell(self, at: Samples) -> Samples:
         """Interval between the two times around each of ``at`` [time]."""

@@ -109,7 +109,7 @@ class Vibration:
         """Say why no deformation with its sign is known, of single parts too; None where one is."""
         if self.compared or not self.parts:
             return self.unknown
-        names: dict[str, list[str]] = {}  # of each reason, since all parts of a structure often share one
+        names: dict[str | None, list[str]] = {}  # of each reason, since all parts of a structure often share one
         for part in self.parts.unsigned:
             names.setdefault(part.reason, []).append(part.name)
         of_parts = (f"{listing(alike, most=_NAMED)}: {reason}" for reason, alike in names.items())

@@ -105,13 +105,9 @@ class Mode:
         """Signed deformations of all modes, of the shape of ``t`` with an axis of length one before it."""
         return self.deformation(t)[np.newaxis]
 
-    def elastic_energy(self, t: Samples | float) -> Samples:
-        """q(t)**2, the energy that springs back [energy]."""
-        return self.deformation(t) ** 2
-
     def energy(self, t: Samples | float) -> Samples:
         """E(t), plastic and elastic [energy]."""
-        return self.energy_plastic + self.elastic_energy(t)
+        return self.energy_plastic + self.deformation(t) ** 2
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
         """Kinetic energy of the vibration, T = (dq/dt)**2 / omega_0**2 [energy].

@@ -57,11 +57,16 @@ MOST_UNSIGNED = 0.01
 _NOT_FOLLOWED = "no few modes have its energy, with the signs that its minima give or on their own"
 
 
-class Unsigned(NamedTuple):
-    """A part whose deformation has no sign, and why."""
+class PartMatch(NamedTuple):
+    """One part: whether its deformation has the same sign at tr and td, and its share in the square of D.
+
+    Both None where the part has no sign; ``reason`` says why.
+    """
 
     name: str
-    reason: str
+    sign_match: bool | None
+    share: float | None
+    reason: str | None = None
 
 
 class SignedParts:
@@ -103,7 +108,7 @@ class SignedParts:
         self._roots = np.sqrt(np.maximum(energies.T, 0.0), order="C")
         held = np.sum(self._roots**2, axis=1)
         self._order = np.argsort(-held, kind="stable")
-        lost, self._main = 0.0, dict[int, PartMotion | Unsigned]()
+        lost, self._main = 0.0, dict[int, PartMotion | str]()
         for i, known in self._by_zeros(self._order):
             motion = known if isinstance(known, PartMotion) else None
             if motion is None or motion.hidden > SMALLEST:
@@ -114,18 +119,18 @@ class SignedParts:
                 break
         self.unsigned_share = float(lost / held.sum()) if lost else float(not held.any())
 
-    def _by_zeros(self, places: Places) -> Iterator[tuple[int, PartMotion | Unsigned]]:
-        """Read the signs of parts from the zeros of their energy."""
+    def _by_zeros(self, places: Places) -> Iterator[tuple[int, PartMotion | str]]:
+        """Read the signs of parts from the zeros of their energy, or why there are none."""
         lasting = np.gradient(self.time)
         for i, own in zip(places.tolist(), all_zeros(self.time, self._roots[places]), strict=True):
             root = self._roots[i]
             tracked = np.where(np.searchsorted(own.sure, self.time) % 2, -root, root)
             reason = _no_sign(lasting, tracked, own.sure)
             motion = None if reason else followed(self.time, tracked, own)
-            yield i, motion or Unsigned(self._names[i], reason or _NOT_FOLLOWED)
+            yield i, motion or reason or _NOT_FOLLOWED
 
     @cached_property
-    def _all(self) -> list[PartMotion | Unsigned]:
+    def _all(self) -> list[PartMotion | str]:
         """All parts: where too much has no sign, no modes of their own are looked for in those that hold less."""
         found = {**self._main, **dict(self._by_zeros(self._order[len(self._main) :]))}
         return [found[i] for i in sorted(found)]
@@ -151,9 +156,10 @@ class SignedParts:
         return tuple(known for known in self._all if isinstance(known, PartMotion))
 
     @property
-    def unsigned(self) -> tuple[Unsigned, ...]:
+    def unsigned(self) -> tuple[PartMatch, ...]:
         """Parts that were left out."""
-        return tuple(known for known in self._all if isinstance(known, Unsigned))
+        all_parts = zip(self._names, self._all, strict=True)
+        return tuple(PartMatch(name, None, None, why) for name, why in all_parts if isinstance(why, str))
 
     @cached_property
     def owner(self) -> Places:
@@ -206,25 +212,13 @@ def _no_sign(lasting: Samples, deformation: Samples, zeros: Samples) -> str | No
 _NAMED_TOGETHER = 0.8
 
 
-class PartMatch(NamedTuple):
-    """One part: whether its deformation has the same sign at tr and td, and its share in the square of D.
-
-    Both None where the part has no sign; ``reason`` says why.
-    """
-
-    name: str
-    sign_match: bool | None
-    share: float | None
-    reason: str | None = None
-
-
 def contributions(vibration: SignedParts, tr: float, td: float) -> tuple[PartMatch, ...]:
     """Give the match of each part, that with the largest share first, then those without a sign."""
     shares = np.bincount(vibration.owner, measures.mismatch_shares(vibration, tr, td)).tolist()
     same = np.bincount(vibration.owner, vibration.amplitudes(tr) * vibration.amplitudes(td)) >= 0
     matches = [PartMatch(*row) for row in zip(vibration.names, same.tolist(), shares, strict=True)]
     matches.sort(key=lambda one: -(one.share or 0.0))
-    return (*matches, *(PartMatch(part.name, None, None, part.reason) for part in vibration.unsigned))
+    return (*matches, *vibration.unsigned)
 
 
 def main_contributors(matches: Sequence[PartMatch]) -> str:

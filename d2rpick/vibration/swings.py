@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, ClassVar, Final, NamedTuple
 import numpy as np
 
 from d2rpick.histories.samples import find_turns
-from d2rpick.vibration.measures import wrong_sign
+from d2rpick.vibration.measures import vertices, wrong_sign
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -124,7 +124,7 @@ def count_swings(time: Samples, energy: Samples) -> Swings | None:
     low[:1] = ~low[1:2]
     if np.count_nonzero(low) < _FEWEST:
         return None
-    moment, value = _vertices(time, energy, at)
+    moment, value = vertices(time, energy, at)
     bottom, floor = moment[low], value[low]
     swing = np.interp(bottom, moment[~low], value[~low]) - floor
     off = np.abs(_off_line(bottom, floor)) > _OFF_FLOOR * swing
@@ -157,16 +157,6 @@ def _turns(energy: Samples) -> tuple[NDArray[np.intp], int]:
             swing, before = abs(extreme - before) or swing, extreme
             extreme, at, direction = value, place, -direction
     return np.array([one for one in found if one > 0], dtype=np.intp), last if direction > 0 else min(at, last)
-
-
-def _vertices(time: Samples, energy: Samples, at: NDArray[np.intp]) -> tuple[Samples, Samples]:
-    """Times and energies of the vertices of the parabolas through the samples ``at`` and their neighbours."""
-    before, after = time[at] - time[at - 1], time[at + 1] - time[at]
-    fall, rise = (energy[at] - energy[at - 1]) / before, (energy[at + 1] - energy[at]) / after
-    bend = (rise - fall) / (before + after)
-    slope = (fall * after + rise * before) / (before + after)
-    step = np.divide(-slope, 2 * bend, out=np.zeros(at.shape), where=bend != 0)
-    return time[at] + step, energy[at] + step * slope / 2
 
 
 def _along(time: Samples, x: Samples, y: Samples) -> Samples:

@@ -102,7 +102,7 @@ def test_a_part_that_does_not_swing_about_zero_has_no_sign(make: object, reason:
     time = np.arange(0, 12, 0.02)
     found = SignedParts(time, np.stack([two_springs(time)[:, 0] ** 2, make(time)], axis=1), ["good", "bad"])  # type: ignore[operator]
     assert found.names == ("good",)
-    assert [(part.name, reason in part.reason) for part in found.unsigned] == [("bad", True)]
+    assert [(part.name, reason in sure(part.reason)) for part in found.unsigned] == [("bad", True)]
     assert not found.signed
 
 
