@@ -234,25 +234,26 @@ def test_all_flights_of_a_run_are_listed_and_the_one_around_td_is_taken() -> Non
         assert (around.start, around.end) == pytest.approx((flight.start, flight.end), abs=1e-3)
 
 
-@pytest.mark.parametrize("td", [0.03, 0.35])
-def test_there_is_no_flight_around_a_td_in_the_load_or_the_contact(td: float) -> None:
-    assert flight_around(flown([*pulse(0.0, 0.06, -2e4), *pulse(0.33, 0.37, 5e4)]), td) is None
+RESTING = replace(flown(trip()), values=0 * flown(trip()).values)
+BEFORE_AND_AFTER = flown([*pulse(0.0, 0.06, -2e4), *pulse(0.33, 0.37, 5e4)])
 
 
-@pytest.mark.parametrize("td", [-0.1, END + 0.1])
-def test_there_is_no_flight_around_a_td_outside_the_record(td: float) -> None:
-    assert flight_around(flown(trip()), td) is None
+@pytest.mark.parametrize(
+    ("momenta", "td"),
+    [
+        *((BEFORE_AND_AFTER, td) for td in (0.03, 0.35)),  # in the load, and in the contact
+        *((flown(trip()), td) for td in (-0.1, END + 0.1)),  # outside the record
+        (RESTING, TD),
+    ],
+)
+def test_there_is_no_flight_around_a_td_under_force_outside_the_record_or_at_rest(momenta: Momenta, td: float) -> None:
+    assert flight_around(momenta, td) is None
 
 
 @pytest.mark.parametrize("digits", [5, 17])
 def test_a_momentum_that_never_changes_tells_of_flight_throughout(digits: int) -> None:
     free = flown([Piece(0.0, (0, 0, 0))], gravity=0.0, digits=digits)
     assert flight_around(free, TD) == FreeFlight(0.0, END, PARTS[:2], end_seen=False)
-
-
-def test_parts_at_rest_do_not_fly() -> None:
-    momenta = flown(trip())
-    assert flight_around(replace(momenta, values=0 * momenta.values), TD) is None
 
 
 def test_a_body_that_was_braked_to_rest_does_not_fly() -> None:

@@ -129,16 +129,10 @@ def test_crossings_are_all_sign_changes_on_a_fine_grid(mode: Mode, share: float)
     assert (len(crossings) - np.count_nonzero(above[1:] != above[:-1])) % 2 == 0
 
 
-def test_an_extremum_that_touches_the_level_is_no_crossing() -> None:
+def test_an_extremum_that_touches_the_level_is_no_crossing_and_both_ends_are_outside() -> None:
     mode = Mode(omega=np.pi, alpha=0.0, cosine=0.0, sine=2.0, origin=0.0)
-    assert mode.crossings(2.0, 0.0, 10.0) == ()
-    assert mode.crossings(2.1, 0.0, 10.0) == ()
-
-
-def test_both_ends_are_outside() -> None:
-    mode = Mode(omega=np.pi, alpha=0.0, cosine=0.0, sine=2.0, origin=0.0)
-    assert mode.crossings(0.0, 0.0, 2.0) == (1.0,)
-    assert mode.extrema(0.5, 2.5) == (1.5,)
+    assert (mode.crossings(2.0, 0.0, 10.0), mode.crossings(2.1, 0.0, 10.0)) == ((), ())
+    assert (mode.crossings(0.0, 0.0, 2.0), mode.extrema(0.5, 2.5)) == ((1.0,), (1.5,))
 
 
 TIME = np.linspace(0, 6, 1200)

@@ -1,4 +1,4 @@
-"""Intervals of tr must hold the true crossing, and be no wider than they need."""
+"""Times that may serve as tr: minima of the lock-in error, and intervals that hold the true time."""
 
 from dataclasses import replace
 
@@ -10,13 +10,80 @@ from d2rpick.choice.answers import suggest
 from d2rpick.choice.question import Settings
 from d2rpick.histories.history import Precision
 from d2rpick.histories.samples import find_crossings
-from d2rpick.vibration.identify import identify
+from d2rpick.vibration import measures
+from d2rpick.vibration.identify import identify, identify_several
+from d2rpick.vibration.measures import Profile
+from d2rpick.vibration.model import Evidence, energy_at
 from d2rpick.vibration.modes import Mode, Modes
-from d2rpick.vibration.moments import curvature, fitted_reach, reach, sampled_reach
-from d2rpick.vibration.span import residual_bound, resolved
-from tests.benchmarks.identification import small_second_modes
+from d2rpick.vibration.moments import Moments, curvature, fitted_reach, reach, sampled_reach
+from d2rpick.vibration.span import Span
 from tests.energies import sure
-from tests.records import ENERGY, TIME, noisy, printed, replayed_residual, table
+from tests.records import printed, table
+
+MODE = Mode(omega=2 * np.pi, alpha=0.2, cosine=0.0, sine=1.0, origin=0.0)
+TD = 5.1
+PROFILE = Profile.of(MODE, np.arange(0, 6, 1 / 64), TD)
+
+
+def test_it_ends_before_td() -> None:
+    assert PROFILE.time[-1] < TD
+    np.testing.assert_allclose(PROFILE.error, measures.lock_in_error(MODE, PROFILE.time, TD))
+
+
+def test_minima_are_where_the_deformation_is_that_at_td() -> None:
+    crossings = np.array(MODE.crossings(float(MODE.deformation(TD)), 0.0, TD - 0.1))
+    found = np.array(PROFILE.minima())
+    assert max(np.abs(found - t).min() for t in crossings) < 2e-3
+
+
+def test_three_times_are_needed_for_a_minimum() -> None:
+    assert Profile(np.array([0.0, 1.0]), np.array([1.0, 0.0])).minima() == ()
+
+
+def tolerance(profile: Profile, tr: float, error: float) -> float:
+    return float(profile.tolerances(np.array([tr]), np.array([error]))[0])
+
+
+@pytest.mark.parametrize("tr", [0.3, 1.11, 2.75, 4.0])
+def test_the_tolerance_is_that_of_the_closed_form(tr: float) -> None:
+    error = float(measures.lock_in_error(MODE, tr, TD))
+    expected = float(measures.timing_tolerance(MODE, np.array([tr]), TD)[0])
+    assert tolerance(PROFILE, tr, error) == pytest.approx(expected, abs=1e-3)
+
+
+def test_the_tolerance_is_all_of_the_time_where_the_error_never_grows() -> None:
+    flat = Profile(np.linspace(0, 2, 5), np.full(5, 0.1))
+    assert tolerance(flat, 1.0, 0.1) == 2.0
+
+
+def test_an_error_that_grows_at_once_leaves_the_way_to_the_next_time() -> None:
+    steep = Profile(np.linspace(0, 4, 5), np.array([1.0, 1.0, 0.0, 1.0, 1.0]))
+    assert tolerance(steep, 2.0, 0.0) == pytest.approx(0.05)
+    assert tolerance(steep, 0.5, 0.2) == pytest.approx(0.5)
+
+
+def test_a_td_at_which_two_modes_set_in_has_nothing_before_it_to_compare() -> None:
+    modes = Modes((Mode(8.0, 0.05, 1.0, 0.4, 0.0), Mode(19.0, 0.05, 0.3, 0.6, 0.0)))
+    time = np.linspace(0.0, 6.0, 1201)
+    history = table(time, np.asarray(modes.energy(time)))
+    fit = identify_several(time, history.energy)
+    vibration = energy_at(history, 2.0, Evidence(fit, Span(2.0, 6.0)))
+    crossings = vibration.moments(0.2)
+    assert vibration.basis == "oscillator"
+    assert crossings.are("crossing").all()
+    assert (crossings.tr < 2.0).all()
+    assert np.isfinite(vibration.reach(crossings)).all()
+    assert not vibration.measured(crossings.tr).compared.any()
+
+
+def test_crossings_of_a_level_come_before_the_other_moments() -> None:
+    others = Moments.of("extremum", [2.0]), Moments.of("match", ()), Moments.of("given", np.array([0.5]))
+    found = Moments.of_level(np.array([1.0, 3.0]), np.array([True, False]), *others)
+    each = [found[i] for i in range(len(found))]
+    assert each == [(1.0, "crossing", True), (3.0, "crossing", False), (2.0, "extremum", None), (0.5, "given", None)]
+    assert found.are("extremum").tolist() == [False, False, True, False]
+    assert found.at(np.array([3, 0]))[1] == found.at(slice(1))[0] == each[0]
+    assert found.at(found.are("given"))[0] == each[3]
 
 
 def random_mode(rng: np.random.Generator) -> Mode:
@@ -128,75 +195,3 @@ def test_reach_uses_up_the_error(slope: float, bend: float, error: float) -> Non
 def test_curvature_of_a_parabola_is_exact_on_uneven_times() -> None:
     time = np.array([0.0, 0.1, 0.35, 0.4, 0.8, 1.0])
     np.testing.assert_allclose(curvature(time, 3 * time**2, np.array([0.0, 0.5, 1.0])), 6.0, rtol=1e-12)
-
-
-MAIN = Mode(2 * np.pi, 0.2, 0.3, 0.9, 0.0)
-TIMES = np.arange(0, 7, 1 / 40)
-
-
-def beside(share: float, rate: float = 2.3) -> Modes:
-    """The main mode and one with that share of its energy."""
-    root = float(np.sqrt(share * MAIN.vibration_energy(0.0)))
-    return Modes((MAIN, Mode(rate * 2 * np.pi, 0.2, root * np.cos(1.0), root * np.sin(1.0) * 0.97, 0.0)))
-
-
-@pytest.mark.parametrize("rate", [0.6, 1.8, 3.1])
-@pytest.mark.parametrize("noise", [0.0, 1e-3])
-@pytest.mark.parametrize("share", [0.003, 0.01])
-def test_a_small_second_mode_is_told_from_one(share: float, noise: float, rate: float) -> None:
-    truth = beside(share, rate)
-    energy = noisy(truth.energy(TIMES), noise, seed=1)
-    one = identify(TIMES, energy)
-    assert one.describes_record
-    assert isinstance(one.mode, Mode)  # its rest is too small to refuse it
-    two = resolved(TIMES, energy, one)
-    tr, td = np.array([0.3, 1.1, 2.6]), 5.3
-    assert two.mode is not None
-    assert replayed_residual(two.mode, tr, td) == pytest.approx(replayed_residual(truth, tr, td), abs=0.02 + 2 * noise)
-    # with 6 samples per period of its energy the second mode may be the alias of another
-    assert (two.hidden_share < share / 2) == (rate < 2)
-
-
-@pytest.mark.parametrize("seed", range(2))
-@pytest.mark.parametrize("noise", [1e-4, 0.03])
-def test_white_noise_is_no_second_mode(noise: float, seed: int) -> None:
-    energy = noisy(MAIN.energy(TIMES), noise, seed)
-    one = identify(TIMES, energy)
-    found = resolved(TIMES, energy, one)
-    assert found.mode is one.mode
-    assert 0 < found.hidden_share < 3 * noise
-
-
-def test_a_clean_or_printed_record_hides_nothing() -> None:
-    for energy, most in ((ENERGY, 1e-12), (printed(ENERGY), 1e-5)):
-        assert resolved(TIME, energy, identify(TIME, energy)).hidden_share < most
-
-
-def test_the_bound_holds_for_a_mode_that_drowns_in_noise() -> None:
-    tr, td = np.array([0.3, 1.1, 2.6]), 5.3
-    for seed in range(0, 20, 3):
-        truth = beside(0.005, rate=1.5 + seed / 10)
-        energy = noisy(truth.energy(TIMES), 0.03, seed)
-        found = resolved(TIMES, energy, identify(TIMES, energy))
-        assert found.mode is not None
-        true, told = replayed_residual(truth, tr, td), replayed_residual(found.mode, tr, td)
-        assert np.all(residual_bound(found, told, tr, td) > true - 0.05)
-
-
-def test_candidates_state_how_large_their_residual_may_be() -> None:
-    energy = noisy(MAIN.energy(TIMES), 0.03, seed=3)
-    found = suggest(table(TIMES, energy), 5.3, Settings(after=0.0))
-    assert found.candidates
-    for one in found.candidates:
-        assert sure(one.residual_high) >= sure(one.residual)
-        noted = any("if the record hides a further mode" in note for note in one.notes)
-        assert noted == (sure(one.residual_high) > sure(one.residual) + 0.1)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["one", "small", "large"])
-def test_of_random_records_95_percent_are_within_their_bounds(kind: str) -> None:
-    found = small_second_modes(kind, range(3))
-    assert len(found) >= 2
-    off = [max(one.stated - one.true, one.true - one.highest, 0.0) for one in found]
-    assert np.percentile(off, 95) <= 0.05
