@@ -26,7 +26,7 @@ from d2rpick.histories.samples import bent, integral, window
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from d2rpick.histories.history import Balance, Samples
+    from d2rpick.histories.history import Balance, Momenta, Samples
 
 # Gravity on earth in m, inches and feet per second squared; in other units of length and time a power of ten of these.
 # Decks have what stands below it; a load that is so close to one of them by chance is one in two hundred.
@@ -67,21 +67,13 @@ class Laws:
     ``gravities`` (0: none acts for a time); where these are None, times that of the earth, in whatever units.
     """
 
-    def __init__(
-        self,
-        time: Samples,
-        momentum: Samples,
-        mass: float,
-        noise: float,
-        balance: Balance | None,
-        gravities: tuple[float, ...] | None = None,
-        *,
-        velocity: bool,
-        complete: bool = True,
-    ) -> None:
-        self.gravities = gravities
-        self.fit, self.noise, self.balance, self.velocity = FreeFall(time, momentum), noise, balance, velocity
-        self.mass = 1.0 if velocity else mass
+    def __init__(self, momenta: Momenta, members: tuple[int, ...], balance: Balance | None) -> None:
+        time, momentum = momenta.time, momenta.of(members)
+        self.fit, self.noise = FreeFall(time, momentum), momenta.noise(members)
+        self.balance, self.velocity = balance, momenta.velocity
+        self.gravities = momenta.surroundings.gravity_on(momenta.parts and [momenta.parts[i] for i in members])
+        self.mass = 1.0 if momenta.velocity else momenta.mass(members)
+        complete = set(momenta.moving) <= set(members)
         self.extent = float(np.ptp(momentum, axis=0).max())
         largest = float(np.linalg.norm(momentum, axis=1).max())
         share = min(1.0, largest / self.extent) if self.extent > 0 else 0.0

@@ -155,17 +155,8 @@ def flight_of(momenta: Momenta, members: Sequence[int], td: float, balance: Bala
 
 def laws_of(momenta: Momenta, members: tuple[int, ...], balance: Balance | None = None) -> Laws:
     """Give the laws of free flight for a set of parts, made once for all td."""
-    mass = momenta.mass(members)
-    whole = balance if momenta.parts is None or np.isnan(mass) else None
-    parts = None if momenta.parts is None else [momenta.parts[i] for i in members]
-    gravities, complete = momenta.surroundings.gravity_on(parts), set(momenta.moving) <= set(members)
-    return momenta.known.once(
-        ("laws", members, whole is None),
-        lambda: Laws(
-            momenta.time, momenta.of(members), mass, momenta.noise(members), whole, gravities,
-            velocity=momenta.velocity, complete=complete,
-        ),
-    )  # fmt: skip
+    whole = balance if momenta.parts is None or np.isnan(momenta.mass(members)) else None
+    return momenta.known.once(("laws", members, whole is None), lambda: Laws(momenta, members, whole))
 
 
 def _falls(momenta: Momenta) -> bool:

@@ -146,6 +146,7 @@ class Recorder:
             raise RangeError(
                 "the motion of the box becomes infinite: these parameters are beyond what the model can do"
             )
+        exchanged = ("external_work", "friction_energy", "wall_energy", "damping_energy", "lost_energy")
         return Record(
             time=real[0],
             centre=plane[0],
@@ -155,11 +156,7 @@ class Recorder:
             internal_energy=real[3:5].T,
             kinetic_energy=real[5:7].T,
             momentum=plane[2:4].T,
-            external_work=real[7],
-            friction_energy=real[8],
-            wall_energy=real[9],
-            damping_energy=real[10],
-            lost_energy=real[11],
+            **dict(zip(exchanged, real[7:], strict=True)),
             outline=self._outline,
             mass=float(motion.structure.masses.sum()),
             released=motion.contact.released,
