@@ -166,7 +166,10 @@ def find_flight(
             start, end, source, parts, damping, seen.refusal, seen.doubts, gravity=gravity, described=span is not None
         )
     if after is not None:
-        end = landing_after(history, after) if span is None else span[1] if span[1] < history.time[-1] else None
+        if span is None:  # many td have the same one
+            end = history.known.once(("landing", after), lambda: landing_after(history, after))
+        else:
+            end = span[1] if span[1] < history.time[-1] else None
         return Flight(after, None if seen.refusal else end, "given", refusal=seen.refusal, doubts=seen.doubts)
     if seen.refusal:
         return Flight(refusal=seen.refusal, doubts=seen.doubts)
