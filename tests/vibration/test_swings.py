@@ -7,9 +7,13 @@ from scipy.integrate import solve_ivp
 
 from d2rpick.choice.answers import suggest
 from d2rpick.choice.question import Settings
-from d2rpick.histories.history import Samples
+from d2rpick.histories.history import Memory, Samples
 from d2rpick.report.situation import heading
-from d2rpick.vibration.swings import count_swings
+from d2rpick.vibration import find_models
+from d2rpick.vibration.identify import identify
+from d2rpick.vibration.model import Evidence, energy_at, model_at
+from d2rpick.vibration.span import Span
+from d2rpick.vibration.swings import Swings, count_swings
 from tests.energies import sure
 from tests.records import table
 
@@ -74,3 +78,31 @@ def test_the_pair_of_a_spring_that_stiffens_has_the_sign_of_td(lifted: Samples) 
         at_tr, at_td = np.interp([sure(answer.chosen).tr, td], TIME, x)
         assert at_tr == pytest.approx(at_td, abs=0.2 * np.abs(x[td < TIME]).max())
         assert not any(one.acceptable and np.interp(one.tr, TIME, x) * at_td < -1e-3 for one in answer.candidates)
+
+
+def test_swings_are_looked_for_in_a_flight_alone_and_where_an_oscillator_is_doubtful() -> None:
+    record, memory = table(TIME, stiffening(1.0, 0.02)[1]), Memory()
+    around, flight = Span(0.0, 30.0), Span(2.0, 28.0)
+    assert not find_models(record, around, None, lambda: True, memory)
+    assert not find_models(record, around, flight, lambda: False, memory)
+    found, again = (find_models(record, around, flight, lambda: True, memory)["swings"] for _ in range(2))
+    assert found is again
+    assert (found.time[0], found.time[-1]) == (2.0, 28.0)
+
+
+@pytest.mark.parametrize(
+    ("hidden", "unseen", "basis"), [(0.1, 0.05, "swings"), (0.1, 0.2, "oscillator"), (0.0, -1.0, "oscillator")]
+)
+def test_counted_swings_are_relied_on_where_they_leave_less_than_the_oscillator(
+    hidden: float, unseen: float, basis: str
+) -> None:
+    class Told(Swings):
+        def unseen(self, tr: object, td: float) -> Samples:  # noqa: ARG002
+            return np.array([unseen])
+
+    time = np.linspace(0.0, 6.0, 601)
+    record = table(time, np.sin(5 * time) ** 2)
+    counted = sure(count_swings(time, record.energy))
+    fit = identify(time, record.energy)._replace(hidden_share=hidden)
+    evidence = Evidence(fit, Span(0.0, 6.0), models={"swings": Told(**vars(counted))})
+    assert model_at(energy_at(record, 4.1, evidence), evidence).basis == basis
