@@ -9,6 +9,7 @@ import numpy as np
 from d2rpick.choice.warnings import end_of_flight, end_of_load
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.digits import above, first_as_read
+from d2rpick.vibration import measures
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import Samples
-    from d2rpick.vibration.measures import Measured
+    from d2rpick.vibration.measures import Columns
 
 
 # Many modes never rest all at once, so the energy at rest is less than the lowest in flight.  This share of it gives
@@ -167,12 +168,7 @@ class Objection(NamedTuple):
 
 
 def objections(
-    situations: Sequence[Situation],
-    place: NDArray[np.int32],
-    tr: Samples,
-    known: Measured,
-    energy: Samples,
-    level_error: Samples,
+    situations: Sequence[Situation], place: NDArray[np.int32], tr: Samples, columns: Columns
 ) -> Iterator[Objection]:
     """Give every reason against some of the candidates.
 
@@ -184,24 +180,20 @@ def objections(
         Of the situation of each candidate.
     tr : array of shape (n,)
         [time]
-    known : Measured
-        Of shape (n,).
-    energy : array of shape (n,)
-        [energy]
-    level_error : array of shape (n,)
-        NaN where an energy is not positive [-].
+    columns : mapping of arrays of shape (n,)
+        By their names: the measures, ``energy`` and ``level_error``.
     """
     begun = np.array([np.nan if one.earliest_tr is None else first_as_read(one.earliest_tr) for one in situations])
     yield Objection(~(tr >= begun[place]), lambda i: [_in_load(situations[place[i]])])
     refused = np.array([any(True for _ in against_td(one)) for one in situations])
     yield Objection(refused[place], lambda i: against_td(situations[place[i]]))
     moves = np.array([not one.at_rest for one in situations])[place]
-    compared = known.compared
+    compared = measures.compared(columns)
     described = compared | np.array([bool(one.vibration.unknown) for one in situations])[place]
-    same_sign = known.sign_match != 0
+    same_sign = columns["sign_match"] != 0
     yield Objection(moves & ~described, lambda i: [situations[place[i]].vibration.undescribed])
     yield Objection(moves & ~same_sign, lambda _: ["opposite sign of the deformation"])
-    error, judged = np.where(compared, known.lock_in_error, level_error), moves & described & same_sign
+    error, judged = np.where(compared, columns["lock_in_error"], columns["level_error"]), moves & described & same_sign
     nothing = "the energy is not positive here, so there is nothing to compare"
     yield Objection(judged & np.isnan(error), lambda _: [nothing])
     most = situations[0].settings.tolerance
@@ -210,6 +202,7 @@ def objections(
     # beyond its end the flight tells nothing of what comes after td
     means = [means_of(one) if one.td <= one.latest_td else None for one in situations]
     if any(means):
+        energy = columns["energy"]
         more = energy > np.array([one.most if one else np.inf for one in means])[place]
         yield Objection(more, lambda i: _above_the_reference(means[place[i]], energy[i]))
 

@@ -41,7 +41,7 @@ def rank(candidates: Candidates) -> Candidates:
 
 def ranked(judged: Judged) -> Iterator[Candidates]:
     """The same of all td that were judged together."""
-    group = np.where(judged.acceptable, judged.same_swing, np.int8(2)) + 3 * judged.place
+    group = np.where(judged.acceptable, judged.columns["same_swing"], np.int8(2)) + 3 * judged.place
     room = np.repeat([like_quality(one) for one in judged.situations], 3)
     places = order(group, judged.error, judged.td - judged.moments.tr, judged.out_of_place, room)
     kept = judged.kept[places]

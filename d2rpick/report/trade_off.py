@@ -36,7 +36,6 @@ OFFER: Final = row(
     Field("acceptable_windows", maybe(many(keys.WINDOW)), "on basis energy: windows in which every tr is acceptable",
           lambda offer: offer.answer.windows),
     keys.EXPECTED._replace(get=lambda offer: offer.answer.expected),
-    later=("position_error_is_lower_bound",),
 )  # fmt: skip
 # Columns of the csv and of a frame.
 COLUMNS: Final = [key for key in OFFER.keys if key not in ("quality_reasons", "acceptable_windows", "expected")]
