@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, overload
 import numpy as np
 
 from d2rpick.base.tuples import Record
-from d2rpick.choice.expectation import Objection, objections
+from d2rpick.choice.warnings import Objection, objections
 from d2rpick.histories.digits import not_before
 from d2rpick.vibration import measures
 from d2rpick.vibration.measures import Measured

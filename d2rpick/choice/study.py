@@ -13,9 +13,9 @@ import numpy as np
 
 from d2rpick.base import __version__
 from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, Caution, D2RPickError, RangeError, listing, one_line
-from d2rpick.choice.of_run import suggest_of
+from d2rpick.choice.answers import suggest_of
+from d2rpick.choice.quality import EQUALLY_GOOD
 from d2rpick.choice.question import read
-from d2rpick.choice.ranking import EQUALLY_GOOD
 from d2rpick.choice.windows import (
     acceptable_windows,
     alike_windows,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import printable
-from d2rpick.choice.ranking import EQUALLY_GOOD
+from d2rpick.choice.quality import EQUALLY_GOOD
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, many, maybe, row
 from d2rpick.report.situation import what_was_read

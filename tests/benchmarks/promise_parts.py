@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.choice.answers import suggest
+from d2rpick.choice.answers import suggest, suggest_in_window
 from d2rpick.choice.question import Settings
-from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.histories.history import History
 from tests.benchmarks.promise import Truth, table
 

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from d2rpick.choice.answers import suggest, suggest_at, verify, verify_at
+from d2rpick.choice.answers import suggest, suggest_at, suggest_in_window, verify, verify_at
 from d2rpick.choice.candidates import Pair
 from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import examine
-from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.histories.history import History
 from tests import paper
 from tests.energies import codes, of, rollover, sure, vibration

@@ -5,8 +5,8 @@ import pytest
 
 from d2rpick.choice.answers import suggest
 from d2rpick.choice.candidates import find_candidates, judged_of
+from d2rpick.choice.quality import rank
 from d2rpick.choice.question import Settings
-from d2rpick.choice.ranking import rank
 from d2rpick.choice.situation import looking
 from d2rpick.vibration import measures
 from tests import paper

@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.answers import Verdict
+from d2rpick.choice.answers import Verdict, compare_with, verify_of
 from d2rpick.choice.comparison import MOST_MOMENTUM_ERROR, Comparison, compare_runs
-from d2rpick.choice.of_run import compare_with, verify_of
 from d2rpick.choice.question import Settings
 from d2rpick.choice.switched_run import rigid_parts, switched_history
 from d2rpick.histories.history import History, Samples, Track

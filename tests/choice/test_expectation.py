@@ -7,10 +7,10 @@ import pytest
 
 from d2rpick.choice.answers import suggest_at, verify_at
 from d2rpick.choice.candidates import judge
-from d2rpick.choice.expectation import MOST_KEPT, expectation, most_energy
 from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import Situation, examine
 from d2rpick.choice.trade_off import offers_of
+from d2rpick.choice.warnings import MOST_KEPT, expectation, most_energy
 from d2rpick.choice.windows import acceptable_windows
 from d2rpick.histories.history import History
 from d2rpick.rules.judgement import faults_of

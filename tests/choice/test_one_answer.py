@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from d2rpick.choice.answers import Verdict, suggest, verify, verify_at
+from d2rpick.choice.answers import Verdict, suggest, suggest_in_window, verify, verify_at
 from d2rpick.choice.plan import plan_of
 from d2rpick.choice.question import Reference, Settings
-from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.choice.windows import acceptable_windows
 from d2rpick.flight.flight import all_seen, seen_flight
 from d2rpick.histories.digits import as_read

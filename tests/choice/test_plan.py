@@ -9,10 +9,9 @@ import pytest
 from hypothesis import example, given, settings, strategies as st
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.of_run import suggest_of
+from d2rpick.choice.answers import suggest_in_window, suggest_of
 from d2rpick.choice.plan import Plan, plan_of
 from d2rpick.choice.question import Reference, Settings
-from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.choice.trade_off import explored_flights
 from d2rpick.histories.digits import first_as_read
 from d2rpick.histories.opening import Selection

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from d2rpick.choice.answers import suggest, suggest_at
+from d2rpick.choice.answers import suggest, suggest_at, suggest_in_window
 from d2rpick.choice.candidates import find_candidates
-from d2rpick.choice.expectation import expectation, shortfall
+from d2rpick.choice.quality import rank
 from d2rpick.choice.question import Settings
-from d2rpick.choice.ranking import rank
 from d2rpick.choice.situation import Situation, examine
-from d2rpick.choice.suggest_td import longest_rigid_times, suggest_in_window
+from d2rpick.choice.suggest_td import longest_rigid_times
+from d2rpick.choice.warnings import expectation, shortfall
 from d2rpick.histories.history import EXACT, Given, History, Momenta, Samples
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from d2rpick.choice.answers import suggest, suggest_at
+from d2rpick.choice.answers import suggest, suggest_at, suggest_of
 from d2rpick.choice.candidates import find_candidates
-from d2rpick.choice.of_run import suggest_of
+from d2rpick.choice.quality import rank
 from d2rpick.choice.question import Reference, Settings
-from d2rpick.choice.ranking import rank
 from d2rpick.choice.situation import examine
 from d2rpick.choice.trade_off import Offer, TradeOff, explore_of
 from d2rpick.histories.digits import as_read

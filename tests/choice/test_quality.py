@@ -9,9 +9,17 @@ from hypothesis import given, settings, strategies as st
 
 from d2rpick.choice.answers import suggest, verify
 from d2rpick.choice.candidates import find_candidates
-from d2rpick.choice.quality import GRADES, Quality, quality_of, states_per_period
+from d2rpick.choice.quality import (
+    EQUALLY_GOOD,
+    GRADES,
+    Quality,
+    order,
+    over_limits,
+    quality_of,
+    rank,
+    states_per_period,
+)
 from d2rpick.choice.question import Settings
-from d2rpick.choice.ranking import EQUALLY_GOOD, order, over_limits, rank
 from d2rpick.choice.situation import examine
 from d2rpick.histories.history import History
 from d2rpick.report.formats import Shown

@@ -2,8 +2,8 @@
 
 from functools import partial
 
+from d2rpick.choice.answers import suggest_of, verify_of
 from d2rpick.choice.judged_card import CardRequest, judged_card
-from d2rpick.choice.of_run import judge_of, suggest_of, verify_of
 from d2rpick.choice.question import Reference, Settings, read
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
@@ -46,6 +46,6 @@ def test_a_card_is_judged_by_what_the_choice_found_in_the_record() -> None:
     box = suggest_of(reference, 0.37, PLAIN, fits=fits)
     before = fits.made
     assert before > 0
-    judge = partial(judge_of, reference, box.situation)
+    judge = partial(verify_of, reference, settings=PLAIN, known=box.situation)
     assert judged_card([sure(box.recommended)[:2]], box.situation.history, judge, CardRequest("ls-dyna"))
     assert fits.made == before
