@@ -10,9 +10,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from d2rpick.base.errors import Caution, RangeError
-from d2rpick.choice.candidates import Candidate, Candidates, Pair, find_candidates, judge
+from d2rpick.choice.candidates import Candidate, Candidates, Pair, judge
 from d2rpick.choice.health import OF_THE_MODEL, assess, cautions_of_engine, cautions_of_health, refuse_unsound
-from d2rpick.choice.quality import EQUALLY_GOOD, ROUNDING, Quality, over_limits, quality_of, rank
+from d2rpick.choice.quality import EQUALLY_GOOD, ROUNDING, Quality, candidates_at, over_limits, quality_of
 from d2rpick.choice.situation import OfTd, Situation, examine
 from d2rpick.choice.warnings import (
     POOR_KINETIC_SHARE,
@@ -205,7 +205,7 @@ def suggest_at(situation: Situation, *, with_better: bool = True, ranked: Candid
 
     ``ranked`` are the candidates in order where they are known, up to the recommended one at least.
     """
-    candidates = rank(find_candidates(situation)) if ranked is None else ranked
+    candidates = next(candidates_at([situation])) if ranked is None else ranked
     best = candidates.chosen
     better = find_better_pair(situation) if with_better else None
     cautions = list(cautions_of(situation))
@@ -253,7 +253,7 @@ def _level_refuses(situation: Situation) -> bool:
 
 def _saving(situation: Situation) -> Pair | None:
     """Give what is recommended at a td, where that saves something."""
-    return rank(find_candidates(situation, in_flight=True)).saving
+    return next(candidates_at([situation], in_flight=True)).saving
 
 
 def _anew(situation: Situation, td: float) -> Situation:

@@ -294,17 +294,13 @@ def _known(value: Any) -> Any:
     return None if value != value else value
 
 
-def find_candidates(situation: Situation, *, in_flight: bool = False) -> Candidates:
+def judged_of(situations: Sequence[Situation], *, in_flight: bool = False, most: int = _MOST) -> Iterator[Judged]:
     """All crossings of the level before td, extrema near enough to it, and closest matches, judged, in time order.
 
     Where nothing vibrates in the flight, its start alone.  With ``in_flight`` those before the flight, of which none is
-    acceptable, may be left out: noise in a long record makes tens of thousands.
+    acceptable, may be left out: noise in a long record makes tens of thousands.  The situations are of one record, by
+    one set of rules: at once so many td are judged as have ``most`` candidates.
     """
-    return next(next(judged_of([situation], in_flight=in_flight)).each())
-
-
-def judged_of(situations: Sequence[Situation], *, in_flight: bool = False, most: int = _MOST) -> Iterator[Judged]:
-    """The same of many td of one record, by one set of rules: at once so many td as have ``most`` candidates."""
     first, together = 0, 1
     while first < len(situations):
         asked = situations[first : first + together]

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.choice.candidates import judged_of
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE
 from d2rpick.histories.digits import above
 from d2rpick.vibration.identify import MIN_PLASTIC, MIN_SAMPLES_PER_PERIOD
 from d2rpick.vibration.measures import TOLERATED_GROWTH, wrong_sign
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -34,18 +35,18 @@ ROUNDING: Final = 1e-3
 _LIKE_TIMES = 0.1
 
 
-def rank(candidates: Candidates) -> Candidates:
-    """Order candidates, best first, number them, and recommend the first that keeps the limits asked for, if any.
+def candidates_at(situations: Sequence[Situation], *, in_flight: bool = False) -> Iterator[Candidates]:
+    """Give the candidates of each td of one record, by `judged_of`, best first, one of them recommended."""
+    return chain.from_iterable(map(ranked, judged_of(situations, in_flight=in_flight)))
+
+
+def ranked(judged: Judged) -> Iterator[Candidates]:
+    """Order the candidates of each td, best first, number them, and recommend the first that keeps the limits, if any.
 
     Acceptable ones first, of them those on the same swing as td last: they save nothing.  Of each group first those
     of like quality, the earliest first, but where it is much the same those that leave the body out of place behind the
     others; then the rest by their error.
     """
-    return next(one for one in ranked(candidates.judged) if one.situation is candidates.situation)
-
-
-def ranked(judged: Judged) -> Iterator[Candidates]:
-    """The same of all td that were judged together."""
     group = np.where(judged.acceptable, judged.columns["same_swing"], np.int8(2)) + 3 * judged.place
     room = np.repeat([like_quality(one) for one in judged.situations], 3)
     places = order(group, judged.error, judged.td - judged.moments.tr, judged.out_of_place, room)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import chain
 from math import sqrt
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.choice.candidates import Pair, judged_of
 from d2rpick.choice.flights import longest_flight
-from d2rpick.choice.quality import LIKE_LEVELS, ROUNDING, like_quality, ranked
+from d2rpick.choice.quality import LIKE_LEVELS, ROUNDING, candidates_at, like_quality
 from d2rpick.choice.situation import Situation, looking
 from d2rpick.choice.warnings import mean_in_flight, shortfall
 from d2rpick.flight.flight import SOURCES
@@ -24,6 +22,7 @@ from d2rpick.vibration.span import Fits
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
+    from d2rpick.choice.candidates import Pair
     from d2rpick.choice.question import Settings
     from d2rpick.choice.situation import Look
     from d2rpick.histories.history import History, Samples
@@ -303,8 +302,7 @@ def _shortening(situation: Situation, times: Iterable[float]) -> Iterator[Choice
 
 def _acceptable(situations: Iterable[Situation]) -> list[Choice]:
     """What is recommended in each situation, where that saves something."""
-    found = chain.from_iterable(map(ranked, judged_of([*situations], in_flight=True)))
-    return [(one.situation, one.saving) for one in found if one.saving]
+    return [(one.situation, one.saving) for one in candidates_at([*situations], in_flight=True) if one.saving]
 
 
 def _longest(pairs: Iterable[Choice]) -> Choice | None:

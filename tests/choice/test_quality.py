@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from d2rpick.choice.answers import suggest, verify
-from d2rpick.choice.candidates import find_candidates
 from d2rpick.choice.quality import (
     EQUALLY_GOOD,
     GRADES,
     Quality,
+    candidates_at,
     order,
     over_limits,
     quality_of,
-    rank,
+    ranked,
     states_per_period,
 )
 from d2rpick.choice.question import Settings
@@ -74,7 +74,7 @@ def test_tr_does_not_jump_when_td_moves_a_little(parts: str) -> None:
     history, known, found = solved("carT01.gz", parts).history, Fits(), []
     for td in np.arange(0.141, 0.1502, 0.0015).tolist():
         situation = examine(history, td, Settings(), known)
-        best = sure(rank(find_candidates(situation)).chosen)
+        best = sure(next(candidates_at([situation])).chosen)
         assert sure(best.level_error) < 0.06
         found.append(best.tr)
     assert max(found) - min(found) < 3e-3
@@ -83,18 +83,17 @@ def test_tr_does_not_jump_when_td_moves_a_little(parts: str) -> None:
 
 def test_of_times_alike_the_one_that_leaves_the_body_in_place_is_recommended() -> None:
     situation = examine(solved("carT01.gz", "1-17").history, 0.12, Settings())
-    ranked = rank(find_candidates(situation))
     assert situation.bodies is not None
-    judged, tr = ranked.judged, ranked.judged.moments.tr
-    off, nothing_near = (
-        replace(
-            ranked, judged=replace(judged, columns={**judged.columns, "position_error": np.where(tr < one, 1.0, 0.0)})
-        )
-        for one in (0.0395, 0.09)
-    )
-    first, second = ranked[0], rank(off)[0]
-    assert first.tr < 0.0395 < second.tr < first.tr + 0.1 * (0.12 - first.tr)
-    assert rank(nothing_near)[0].tr == first.tr
+    found = next(candidates_at([situation]))
+
+    def first(until: float) -> float:
+        """The best where those before a time leave the body out of place."""
+        off = np.where(found.judged.moments.tr < until, 1.0, 0.0)
+        return next(ranked(replace(found.judged, columns={**found.judged.columns, "position_error": off})))[0].tr
+
+    best = found[0].tr
+    assert best < 0.0395 < first(0.0395) < best + 0.1 * (0.12 - best)
+    assert first(0.09) == best
 
 
 @cache
@@ -107,7 +106,7 @@ def fits(_: float) -> Fits:
 @pytest.mark.parametrize(("history", "td"), [(paper.history(), paper.TD), (rollover(), 0.37)])
 def test_candidates_are_kept_together_as_one_by_one(history: History, td: float, limits: dict[str, float]) -> None:
     situation = examine(history, td, Settings(**limits), fits(td))  # type: ignore[arg-type]
-    ranked = rank(find_candidates(situation))
+    ranked = next(candidates_at([situation]))
     assert len(ranked) > 3
     kept = ranked.kept.tolist()
     assert kept == [one.acceptable and not over_limits(situation, one) for one in ranked]

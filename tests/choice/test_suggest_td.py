@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from d2rpick.choice.answers import suggest, suggest_at, suggest_in_window
-from d2rpick.choice.candidates import find_candidates
-from d2rpick.choice.quality import rank
+from d2rpick.choice.quality import candidates_at
 from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import Situation, examine
 from d2rpick.choice.suggest_td import longest_rigid_times
@@ -235,7 +234,7 @@ def test_the_expected_run_time_is_told_by_suggest_and_verify() -> None:
 
 
 def rigid_time(situation: Situation) -> float:
-    best = rank(find_candidates(situation)).chosen
+    best = next(candidates_at([situation])).chosen
     return best.rigid_time if best and not best.same_swing else 0.0
 
 

@@ -10,8 +10,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from d2rpick.choice.answers import suggest, suggest_at, suggest_of
-from d2rpick.choice.candidates import find_candidates
-from d2rpick.choice.quality import rank
+from d2rpick.choice.quality import candidates_at
 from d2rpick.choice.question import Reference, Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.trade_off import Offer, TradeOff, explore_of
@@ -145,7 +144,7 @@ def test_candidates_before_the_flight_never_change_what_is_best(
     history: History, td: float, after: float, replay: bool
 ) -> None:
     situation = examine(history, td, Settings(after=after, replay=replay))
-    every, flying = (rank(find_candidates(situation, in_flight=one)) for one in (False, True))
+    every, flying = (next(candidates_at([situation], in_flight=one)) for one in (False, True))
     assert flying.chosen == every.chosen
     if situation.basis == "energy":
         assert sorted(flying.tr) == sorted(every.tr[every.tr >= after])
