@@ -143,7 +143,7 @@ def histories(draw: st.DrawFn) -> History:
     energy = decay * np.sin(omega * time) ** 2 + second * decay * np.cos(1.7 * omega * time) ** 2
     energy += draw(st.sampled_from([0.0, 3.0])) * np.exp(-(((time - 1.5) / 0.6) ** 2))
     energy += draw(st.sampled_from([0.0, 0.01, 0.2])) * np.abs(rng.standard_normal(count))
-    return History(time, energy, ("made",), "made", "energy")
+    return of(energy, time)
 
 
 def holds(history: History, pair: Pair | None, asked: Settings) -> bool:
@@ -181,7 +181,7 @@ def test_a_better_td_that_does_not_verify_is_not_named(td: float) -> None:
 def test_a_limit_on_what_is_not_known_leaves_no_td_of_a_window(limit: dict[str, Any]) -> None:
     time = np.linspace(0, 10, 60)
     energy = 3 * np.exp(-(((time - 1.5) / 0.6) ** 2)) + np.sin(3 * time) ** 2 + 0.6 * np.cos(5.1 * time) ** 2
-    history = History(time, energy, ("made",), "made", "energy")
+    history = of(energy, time)
     free = suggest_in_window(history, (6.0, 9.0), Settings(replay=False))
     assert free.recommended
     assert suggest_in_window(history, (6.0, 9.0), Settings(replay=False, **limit)).recommended is None
@@ -189,7 +189,7 @@ def test_a_limit_on_what_is_not_known_leaves_no_td_of_a_window(limit: dict[str, 
 
 def test_too_few_states_per_period_recommend_nothing() -> None:
     time = np.linspace(0, 10, 141)
-    history = History(time, np.exp(-0.05 * time) * np.sin(7.3 * time) ** 2, ("made",), "made", "energy")
+    history = of(np.exp(-0.05 * time) * np.sin(7.3 * time) ** 2, time)
     answer = suggest(history, 8.0, Settings())  # six states in each period of the energy
     assert answer.situation.basis == "energy"
     assert answer.recommended is None

@@ -15,7 +15,7 @@ from d2rpick.histories.opening import open_run
 from d2rpick.report.situation import measures_of
 from tests.command import BOX, ENERGY, GLSTAT, answer, codes, put, run
 from tests.computed import stored
-from tests.energies import sure
+from tests.energies import of, sure
 from tests.made_t01 import t01, value
 
 TIME: Samples = np.linspace(0.0, 1.0, 201)
@@ -267,9 +267,7 @@ def test_energies_of_nothing_are_nothing_to_judge() -> None:
     assert said(record(0 * LOADED, 0 * LOADED + 1.9e-9)) == ["nothing-to-judge"]
     assert said(record(1e-32 * LOADED, 1e-31 * LOADED)) == ["nothing-to-judge"]
     assert said(record(1e-18 + 0 * LOADED, 225.0 * LOADED)) == []  # a free fall deforms nothing yet
-    assert (
-        said(History(LOADED, 0 * LOADED, ("made",), "made", "E")) == []
-    )  # of a column alone its energy is objected to
+    assert said(of(0 * LOADED, LOADED)) == []  # of a column alone its energy is objected to
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ from d2rpick.histories.names import Selection
 from d2rpick.histories.run import Run
 from d2rpick.vibration.span import Fits
 from tests.command import ROOT
-from tests.energies import sure
+from tests.energies import of, sure
 from tests.reading import read
 
 SAMPLES = {"energy.csv": Selection(), "rollover_box.matsum": Selection(parts=("box",))}
@@ -96,7 +96,7 @@ def histories(draw: st.DrawFn) -> History:
     energy[time > draw(st.floats(0.8, 1.2))] += draw(st.floats(0.0, 5.0))
     noise = np.random.default_rng(draw(st.integers(0, 99))).standard_normal(states)
     share = draw(st.sampled_from([0.0, 0.003, 0.1]))
-    return History(time, energy + share * noise, ("made",), "made", "E")
+    return of(energy + share * noise, time)
 
 
 @pytest.mark.parametrize("seed", [9, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 6, 10))])
@@ -154,7 +154,7 @@ def test_the_flight_beside_a_td_is_the_one_that_suggest_names() -> None:
     """The energy alone shows another flight to each td; that of the window's start was shown."""
     time = np.linspace(0.0, 1.0, 2001)
     energy = np.exp(-6 * time) * np.sin(250 * time) ** 2 + 0.4 * np.exp(-3 * time) * np.sin(611 * time) ** 2
-    history = History(time, energy + 5 * np.exp(-(((time - 0.01) / 0.006) ** 2)), ("made",), "made", "energy")
+    history = of(energy + 5 * np.exp(-(((time - 0.01) / 0.006) ** 2)), time)
     asked = Settings(replay=False)
     alone = suggest(history, 0.37, asked).situation.flight
     assert alone.source == "energy"
@@ -198,6 +198,6 @@ def test_a_level_that_stays_the_same_is_graded_alike_at_each_td() -> None:
     """Plastic energy with a vibration of a ten-thousandth: about half of it is kinetic, whichever side of it td is."""
     time = np.linspace(0, 1, 2001)
     energy = 1000 + 0.05 * np.sin(400 * time) * np.sin(731 * time)
-    found = explore_of(reference(History(time, energy, ("made",), "made", "E")), Settings(after=0.1, replay=False))
+    found = explore_of(reference(of(energy, time)), Settings(after=0.1, replay=False))
     grades = {one.quality.grade for one in found.offers if one.quality and one.best and not one.best.same_swing}
     assert grades == {"fair"}
