@@ -178,11 +178,6 @@ def test_a_flight_that_is_not_certain_is_no_better_than_fair() -> None:
     assert sure(answer.quality).grade in ("poor", "fair")
 
 
-def test_rest_is_good() -> None:
-    history = of(np.full(TIME.size, 3.0), TIME)
-    assert grade(history, 0.1, after=0.01) == "good"
-
-
 def test_a_pair_is_graded_the_same_whether_it_is_suggested_or_verified() -> None:
     for td in (0.064, 0.0687534, 0.07):
         answer = suggest(RECORD, td, Settings())
@@ -219,30 +214,36 @@ def test_rest_is_good_only_in_a_flight_that_is_certain() -> None:
     assert quality_of(guessed, sure(found.chosen), None) == Quality("fair", ("the flight is not certain",))
 
 
-@pytest.mark.parametrize("vibration", [0.05, 2.6])
-def test_plastic_work_hides_no_vibration(vibration: float) -> None:
+UNIT, FINE = np.linspace(0, 1, 401), np.linspace(0, 1, 2001)
+DAMPED = 100 + 2.6 * np.exp(-40 * FINE) * (1 + np.cos(150 * FINE) * np.cos(97 * FINE))
+STATES = np.arange(400)
+EARLY = np.where(STATES < 12, 1e-12, 1.0 + np.sin(STATES) ** 2)
+
+
+def crushed(vibration: float) -> np.ndarray:
     """Of 100 J of which little vibrates, the level says nothing: a frozen tr may be wrong by all of the vibration."""
-    time = np.linspace(0, 1, 401)
-    swinging = sum(np.sin(rate * time + rate) ** 2 for rate in (31.0, 47.0, 66.0)) / 3
-    energy = 100 * np.minimum(time / 0.1, 1) ** 2 + vibration * np.where(time > 0.1, swinging, 0)
-    found = suggest(of(energy, time), 0.9, Settings(after=0.15))
-    assert not found.situation.at_rest
-    assert found.quality is None or found.quality.grade != "good"
-    still = suggest(
-        of(energy - energy * (time > 0.1) + 100.0 * (time > 0.1), time),
-        0.9,
-        Settings(after=0.15),
-    )
-    assert still.situation.at_rest
+    swinging = sum(np.sin(rate * UNIT + rate) ** 2 for rate in (31.0, 47.0, 66.0)) / 3
+    return np.asarray(100 * np.minimum(UNIT / 0.1, 1) ** 2 + vibration * np.where(UNIT > 0.1, swinging, 0))
 
 
-@pytest.mark.slow
-def test_a_vibration_that_was_damped_out_is_rest() -> None:
-    time = np.linspace(0, 1, 2001)
-    energy = 100 + 2.6 * np.exp(-40 * time) * (1 + np.cos(150 * time) * np.cos(97 * time))
-    record = of(energy, time)
-    assert suggest(record, 0.9, Settings(after=0.5)).situation.at_rest
-    assert not suggest(record, 0.9, Settings(after=0.05)).situation.at_rest
+@pytest.mark.parametrize(
+    ("energy", "time", "td", "after", "rest"),
+    [
+        (np.full(TIME.size, 3.0), TIME, 0.1, 0.01, True),
+        (crushed(0.05), UNIT, 0.9, 0.15, False), (crushed(2.6), UNIT, 0.9, 0.15, False),
+        (crushed(0.0), UNIT, 0.9, 0.15, True),
+        (DAMPED, FINE, 0.9, 0.5, True), (DAMPED, FINE, 0.9, 0.05, False),
+        # one state and td in the same output interval say nothing of what happens between them
+        (np.tile([1.5, 2.5, 1.0, 2.5], 10), np.linspace(0, 3.9, 40), 2.2, 2.15, False),
+        (EARLY, 0.1 * STATES, 0.85, 0.0, False), (EARLY, 0.1 * STATES, 1.05, 0.0, True),
+    ],
+)  # fmt: skip
+def test_rest_is_told_from_a_vibration_which_is_not_good(
+    energy: np.ndarray, time: np.ndarray, td: float, after: float, rest: bool
+) -> None:
+    found = suggest(of(energy, time), td, Settings(after=after))
+    assert found.situation.at_rest is rest
+    assert rest or found.quality != Quality("good")
 
 
 def test_what_a_wrong_sign_would_cost_is_told() -> None:
@@ -279,23 +280,6 @@ def test_a_flight_that_vibrates_later_was_never_at_rest() -> None:
     assert quiet.at_rest  # of what comes after td nothing is known
     assert not replace(quiet, flight=quiet.flight._replace(end=0.9)).at_rest
     assert replace(quiet, flight=quiet.flight._replace(end=0.5)).at_rest
-
-
-def test_between_few_states_nothing_is_called_at_rest() -> None:
-    """One state and td in the same output interval say nothing of what happens between them."""
-    energy = np.tile([1.5, 2.5, 1.0, 2.5], 10)
-    record = of(energy, np.linspace(0, 3.9, 40))
-    found = suggest(record, 2.2, Settings(after=2.15))
-    assert not found.situation.at_rest
-    assert found.quality is None or found.quality.grade != "good"
-
-
-def test_between_few_states_not_even_round_off_is_called_rest() -> None:
-    energy = np.where(np.arange(400) < 12, 1e-12, 1.0 + np.sin(np.arange(400)) ** 2)
-    record = of(energy, np.linspace(0, 39.9, 400))
-    early, later = (suggest(record, td, Settings(after=0.0)).situation for td in (0.85, 1.05))
-    assert not early.at_rest
-    assert later.at_rest
 
 
 def test_where_nothing_vibrates_there_is_no_residual() -> None:
