@@ -70,10 +70,14 @@ class Verdict(OfTd):
         return quality_of(self.situation, self.candidate, expectation(self.situation, self.candidate.energy))
 
 
-def verify(history: History, tr: float, td: float, settings: Settings) -> Verdict:
-    """Judge one pair; RangeError when a time lies outside the record or tr is not before td."""
+def verify(history: History, tr: float, td: float, settings: Settings, known: Situation | None = None) -> Verdict:
+    """Judge one pair, by what is ``known`` where its td is that one, or nearly so as it is printed.
+
+    RangeError when a time lies outside the record or tr is not before td.
+    """
     _in_order(tr, td)
-    return verify_at(examine(history, td, settings), tr)
+    fits = known.fits if known else None
+    return verify_at(known if known and td == known.td else examine(history, td, settings, fits), tr)
 
 
 def verify_at(situation: Situation, tr: float) -> Verdict:
@@ -284,22 +288,6 @@ def _why_none(situation: Situation, ranked: Candidates) -> str:
 _Answer = TypeVar("_Answer", Suggestion, Verdict)
 
 
-def suggest_in_window(
-    history: History,
-    window: tuple[float, float] | None,
-    settings: Settings,
-    fits: Fits | None = None,
-    since: float | None = None,
-    times: Sequence[float] | None = None,
-) -> Suggestion:
-    """Choose td in ``window`` as `d2rpick.choice.suggest_td.choose_td` does, and tr for it."""
-    from d2rpick.choice.suggest_td import choose_td  # not above: a td that is given needs no search
-
-    chosen = choose_td(history, window, settings, fits, since, times)
-    found = suggest_at(chosen.situation)
-    return replace(found, td_window=chosen.window, longer=chosen.given_up(found.recommended))
-
-
 def suggest_of(
     reference: Reference,
     td: float | tuple[float, float] | None,
@@ -323,7 +311,11 @@ def suggest_of(
     """
     refuse_unsound(reference.history, settings, td)
     if td is None or isinstance(td, tuple):
-        answer = suggest_in_window(reference.history, td, settings, fits, since, times)
+        from d2rpick.choice.suggest_td import choose_td  # not above: a td that is given needs no search
+
+        chosen = choose_td(reference.history, td, settings, fits, since, times)
+        answer = suggest_at(chosen.situation)
+        answer = replace(answer, td_window=chosen.window, longer=chosen.given_up(answer.recommended))
     else:
         answer = suggest_at(examine(reference.history, td, settings, fits), with_better=with_better)
     return _with_health(answer, reference.run)
@@ -332,19 +324,9 @@ def suggest_of(
 def verify_of(
     reference: Reference, tr: float, td: float, settings: Settings, known: Situation | None = None
 ) -> Verdict:
-    """Judge one pair of switch times, by what is ``known`` where its td is that one or nearly so, as it is printed.
-
-    Raises
-    ------
-    RangeError
-        If a time lies outside the record or tr is not before td.
-    """
-    history = reference.history
-    refuse_unsound(history, settings, td, choosing=False)
-    _in_order(tr, td)
-    fits = known.fits if known else None
-    there = known if known and td == known.td else examine(history, td, settings, fits)
-    return _with_health(verify_at(there, tr), reference.run)
+    """Judge one pair of switch times; errors and ``known`` as for `verify`."""
+    refuse_unsound(reference.history, settings, td, choosing=False)
+    return _with_health(verify(reference.history, tr, td, settings, known), reference.run)
 
 
 def compare_with(verdict: Verdict, reference: Reference, switched: Reference, min_mean: float = 0.0) -> Verdict:

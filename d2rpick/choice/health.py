@@ -244,16 +244,12 @@ def _in_window(balance: Balance, start: float, end: float, locked: float | None)
     found = {}
     for name, energy in (("window_sliding", balance.sliding), ("window_eroded", balance.eroded)):
         if energy is not None and energy[inside].size:
-            found[name] = _beyond_print(balance, energy[inside], float(np.ptp(energy[inside]))) / locked
+            open_ = balance.precision.quantum(float(np.abs(energy[inside]).max()))  # by its printed digits
+            found[name] = max(0.0, float(np.ptp(energy[inside])) - open_) / locked
     work = work_beyond_gravity(balance, start, end)
     if work is not None:
         found["window_work"] = work / locked
     return found
-
-
-def _beyond_print(balance: Balance, energy: Samples, change: float) -> float:
-    """Give a change of an energy less what its printed digits leave open [energy]."""
-    return max(0.0, change - balance.precision.quantum(float(np.abs(energy).max())))
 
 
 # A run that blew up gains energy from nothing: within a twentieth of the record its kinetic energy exceeds all that

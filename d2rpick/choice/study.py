@@ -314,15 +314,12 @@ def _least_loss(judged: Sequence[StudyRow], shared: Samples) -> tuple[float, flo
     times = times[(np.searchsorted(shared[:, 0], times, "right") - np.searchsorted(shared[:, 1], times)) > 0]
     worst = np.full(times.size, -np.inf)
     for row, profile in zip(judged, profiles, strict=True):
-        worst = np.maximum(worst, np.interp(times, *profile) - _own_error(row, profile))
+        own = 0.0 if row.tr is None else error_at(profile, row.tr)
+        worst = np.maximum(worst, np.interp(times, *profile) - own)
     first = int(np.argmax(worst <= worst.min() + EQUALLY_GOOD))
     holder = shared[np.searchsorted(shared[:, 0], times[first], "right") - 1]
     following = times[min(first + 1, times.size - 1)]
     return float(times[first]), float(min(following, holder[1]))
-
-
-def _own_error(row: StudyRow, profile: Samples) -> float:
-    return 0.0 if row.tr is None else error_at(profile, row.tr)
 
 
 def fewest_digits(low: float, high: float) -> float:

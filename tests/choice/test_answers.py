@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from d2rpick.choice.answers import suggest, suggest_at, suggest_in_window, suggest_of, verify, verify_at, verify_of
+from d2rpick.choice.answers import suggest, suggest_at, suggest_of, verify, verify_at, verify_of
 from d2rpick.choice.candidates import Pair
 from d2rpick.choice.judged_card import CardRequest, judged_card
 from d2rpick.choice.question import Reference, Settings, read
@@ -19,7 +19,7 @@ from d2rpick.rules.judgement import faults_of
 from tests import paper
 from tests.command import BOX as T01, ENERGY, GLSTAT
 from tests.counted_fits import CountedFits
-from tests.energies import codes, of, rollover, sure, vibration
+from tests.energies import codes, of, rollover, suggest_in_window, sure, vibration
 from tests.reading import solved
 
 PLAIN = Settings()

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from d2rpick.choice.answers import Verdict, suggest, suggest_in_window, verify, verify_at
+from d2rpick.choice.answers import Verdict, suggest, verify, verify_at
 from d2rpick.choice.plan import plan_of
 from d2rpick.choice.question import Reference, Settings
 from d2rpick.choice.windows import acceptable_windows
@@ -24,7 +24,7 @@ from tests.choice.test_same_answers import made
 from tests.command import BOX, run
 from tests.computed import stored
 from tests.drops import drop, written
-from tests.energies import codes, of, sure
+from tests.energies import codes, of, suggest_in_window, sure
 from tests.reading import read
 
 PLAIN = Settings()

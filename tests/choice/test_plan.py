@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given, settings, strategies as st
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.answers import suggest_in_window, suggest_of
+from d2rpick.choice.answers import suggest_of
 from d2rpick.choice.plan import Plan, plan_of
 from d2rpick.choice.question import Reference, Settings
 from d2rpick.choice.trade_off import explored_flights
@@ -17,7 +17,7 @@ from d2rpick.histories.digits import first_as_read
 from d2rpick.histories.opening import Selection
 from tests.computed import stored
 from tests.drops import drop, written
-from tests.energies import sure
+from tests.energies import suggest_in_window, sure
 from tests.reading import read, solved
 
 PLAIN = Settings(replay=False)  # no oscillator describes these runs, and none is sought

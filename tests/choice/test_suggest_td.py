@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from d2rpick.choice.answers import suggest, suggest_at, suggest_in_window
+from d2rpick.choice.answers import suggest, suggest_at
 from d2rpick.choice.quality import candidates_at
 from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import Situation, examine
@@ -22,7 +22,7 @@ from tests import paper
 from tests.command import ENERGY, ROLLOVER, answer, run
 from tests.computed import results
 from tests.counted_fits import CountedFits
-from tests.energies import of, sure
+from tests.energies import of, suggest_in_window, sure
 from tests.reading import read, solved
 
 PLAIN = Settings()

@@ -2,8 +2,6 @@
 
 from itertools import pairwise
 from pathlib import Path
-from types import SimpleNamespace
-from typing import cast
 
 import numpy as np
 import pytest
@@ -11,25 +9,18 @@ from hypothesis import given, settings, strategies as st
 
 from d2rpick.choice.answers import suggest, suggest_at, suggest_of
 from d2rpick.choice.quality import candidates_at
-from d2rpick.choice.question import Reference, Settings
+from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.trade_off import Offer, TradeOff, explore_of
 from d2rpick.histories.digits import as_read
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Selection
-from d2rpick.histories.run import Run
 from d2rpick.vibration.span import Fits
 from tests.command import ROOT
-from tests.energies import of, sure
+from tests.energies import of, reference, sure
 from tests.reading import read
 
 SAMPLES = {"energy.csv": Selection(), "rollover_box.matsum": Selection(parts=("box",))}
-
-
-def reference(history: History) -> Reference:
-    """Give a record that was made in memory as if it had been read: a run without databases."""
-    bare = SimpleNamespace(databases=(), parts=(), sources=("made",))
-    return Reference(cast("Run", bare), history)
 
 
 def check(found: TradeOff, history: History, asked: Settings, offers: list[Offer]) -> None:
