@@ -187,11 +187,6 @@ class Judged:
         columns = {name: column[rows] for name, column in self.columns.items()}
         return Judged(self.situations, self.place[rows], self.moments.at(rows), columns, ())
 
-    def each(self) -> Iterator[Candidates]:
-        """Give the candidates of each situation, in the order of time."""
-        for situation, rows in zip(self.situations, pairwise(self.ends), strict=True):
-            yield Candidates(situation, self, np.arange(*rows))
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Candidates(Sequence[Candidate]):
@@ -313,7 +308,8 @@ def judged_of(situations: Sequence[Situation], *, in_flight: bool = False, most:
 
 def judge(situation: Situation, times: Iterable[float]) -> Candidates:
     """Measure each of the ``times`` before td as tr, and hold it against flight, sign and tolerance."""
-    return next(Judged.of([situation], [Moments.of("given", [*times])]).each())
+    judged = Judged.of([situation], [Moments.of("given", [*times])])
+    return Candidates(situation, judged, np.arange(judged.place.size))
 
 
 def _at_start(situation: Situation) -> Moments | None:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import chain, pairwise
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.choice.candidates import judged_of
+from d2rpick.choice.candidates import Candidates, judged_of
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE
 from d2rpick.histories.digits import above
 from d2rpick.vibration.identify import MIN_PLASTIC, MIN_SAMPLES_PER_PERIOD
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from d2rpick.choice.candidates import Candidate, Candidates, Judged
+    from d2rpick.choice.candidates import Candidate, Judged
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.warnings import Expectation
     from d2rpick.histories.history import Samples
@@ -51,9 +50,9 @@ def ranked(judged: Judged) -> Iterator[Candidates]:
     room = np.repeat([like_quality(one) for one in judged.situations], 3)
     places = order(group, judged.error, judged.td - judged.moments.tr, judged.out_of_place, room)
     kept = judged.kept[places]
-    for one, (first, last) in zip(judged.each(), pairwise(judged.ends), strict=True):
+    for one, (first, last) in zip(judged.situations, pairwise(judged.ends), strict=True):
         best = np.flatnonzero(kept[first:last])
-        yield replace(one, order=places[first:last], ranked=True, recommended=int(best[0]) if best.size else None)
+        yield Candidates(one, judged, places[first:last], ranked=True, recommended=int(best[0]) if best.size else None)
 
 
 def like_quality(situation: Situation) -> float:

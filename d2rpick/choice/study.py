@@ -227,14 +227,20 @@ def stamps(source: str) -> tuple[Stamp, ...]:
 
 def summarise(td: float | tuple[float, float], rows: Sequence[StudyRow]) -> Study:
     """Hold the rows of a study against each other; ``td`` as it was asked for."""
-    times = [row.tr for row in rows if row.tr is not None]
-    lows = [row.tr_low for row in rows if row.tr_low is not None]
-    highs = [row.tr_high for row in rows if row.tr_high is not None]
+    times, low, high = _known(rows)
     spread = Spread(min(times), median(times), max(times)) if times else None
-    agree = max(lows) <= min(highs) if times else None
+    agree = low <= high if times else None
     common = common_tr(rows)
     one, window = (None, td) if isinstance(td, tuple) else (td, None)
     return Study(one, window, tuple(rows), spread, agree, common, tuple(_cautions(rows, common)))
+
+
+def _known(rows: Sequence[StudyRow]) -> tuple[list[float], float, float]:
+    """Give every tr, and from when to when all of them may be, the end before the start where they do not agree."""
+    found = [(row.tr, row.tr_low, row.tr_high) for row in rows if row.tr is not None]
+    low = max((one for _, one, _ in found if one is not None), default=np.inf)
+    high = min((one for _, _, one in found if one is not None), default=-np.inf)
+    return [tr for tr, _, _ in found], low, high
 
 
 def cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
@@ -298,9 +304,7 @@ def common_tr(rows: Sequence[StudyRow]) -> Common:
 
 def _agreed(judged: Sequence[StudyRow], keeping: Samples) -> float | None:
     """Give the tr of runs that agree, the middle one where they differ at all; None where they do not agree."""
-    known = [row.tr for row in judged if row.tr is not None]
-    low = max((row.tr_low for row in judged if row.tr_low is not None), default=np.inf)
-    high = min((row.tr_high for row in judged if row.tr_high is not None), default=-np.inf)
+    known, low, high = _known(judged)
     if len(known) < len(judged) or low > high:
         return None
     tr = float(np.clip(median(known), low, high))
