@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.switched_run import FEWEST, SAME, judged_parts
+from d2rpick.choice.switched_run import FEWEST, SAME, same_parts
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.samples import stretches
 from d2rpick.vibration import measures
@@ -86,7 +86,7 @@ def compare(
     flight, parts, run = situation.flight, situation.history.parts, reference.run
     together = flight.parts if flight.source == "momentum" else flight.parts or parts
     pair = tr, situation.td
-    judged = judged_parts(reference, switched, pair)
+    judged = same_parts(reference, switched, pair)
     found = compare_runs(
         judged.reference,
         judged.switched,

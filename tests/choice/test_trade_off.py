@@ -1,7 +1,6 @@
 """Every td of a trade-off is answered as ``suggest`` answers it, and what is marked as unbeaten is."""
 
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -91,7 +90,7 @@ def histories(draw: st.DrawFn) -> History:
 
 
 @pytest.mark.parametrize("seed", [9, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 6, 10))])
-def test_no_td_beats_the_one_that_is_chosen_by_the_level_alone(seed: int, tmp_path: Path) -> None:
+def test_no_td_beats_the_one_that_is_chosen_by_the_level_alone(seed: int) -> None:
     """Of forty modes, for whose td an oscillator is not sought everywhere."""
     rng, time = np.random.default_rng(seed), np.linspace(0, 1, 900)
     energy = sum(
@@ -99,9 +98,7 @@ def test_no_td_beats_the_one_that_is_chosen_by_the_level_alone(seed: int, tmp_pa
         for cycles in rng.uniform(6, 30, 40)
     )
     energy = energy * np.exp(-0.8 * time) + 60 * np.exp(-(((time - 0.06) / 0.01) ** 2))
-    file = tmp_path / "modes.csv"
-    np.savetxt(file, np.column_stack([time, energy]), delimiter=",", header="time,internal_energy", comments="")
-    found = explore_of(read([str(file)]), Settings(), None, steps=40)
+    found = explore_of(reference(of(energy, time)), Settings(), None, steps=40)
     assert (sure(found.recommended).basis, found.suggestion.situation.flight.source) == ("energy", "energy")
     assert sure(found.recommended).unbeaten
 
