@@ -1,6 +1,6 @@
 """The way from a request to what a choice needs: open, let the deck tell, take the energy, cost it.
 
-The commands of one run and Python go this way; `d2rpick.choice.of_run` leads on from there to an answer.
+The commands of one run and Python go this way; `d2rpick.choice.answers` leads on from there to an answer.
 """
 
 from __future__ import annotations

@@ -234,8 +234,8 @@ def judged(
     ArgumentError
         If nobody says whom it switches, or an option belongs to another solver.
     """
+    from d2rpick.choice.answers import verify_of
     from d2rpick.choice.judged_card import judged_card
-    from d2rpick.choice.of_run import verify_of
     from d2rpick.deck.printing import SOLVERS
 
     reference, request = asked.reference, cards.request(asked).by(asked.settings)

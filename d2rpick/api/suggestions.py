@@ -12,7 +12,7 @@ from d2rpick.api.asked import Asked, ask, request_of
 from d2rpick.api.cards import CardOptions, Cards, JudgedCard, judged as card_judged
 from d2rpick.api.request import MIN_MEAN_ENERGY, time_or_window
 from d2rpick.base.errors import ArgumentError
-from d2rpick.choice import answers, of_run
+from d2rpick.choice import answers
 from d2rpick.histories.digits import as_read
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class Suggestion(RunAnswer, answers.Suggestion):
     def printed(self, cards: Cards) -> JudgedCard | None:
         """Print the card of the recommended pair, judged as printed; None without one."""
         pair, asked = self.recommended, self.question
-        judge = partial(of_run.judge_of, asked.reference, self.situation)
+        judge = partial(answers.verify_of, asked.reference, settings=self.situation.settings, known=self.situation)
         return card_judged(asked, cards, [(pair.tr, pair.td)], judge) if pair else None
 
     def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:
@@ -183,7 +183,7 @@ def suggest(
 
 def suggested(asked: Asked, td: float | tuple[float, float] | None) -> Suggestion:
     """Choose tr for ``td``, or both times with td in a window or, for None, in the longest flight."""
-    found = of_run.suggest_of(asked.reference, td, asked.settings)
+    found = answers.suggest_of(asked.reference, td, asked.settings)
     if found.better_pair and found.recommended and _read(found.better_pair) == _read(found.recommended):
         found = replace(found, better_pair=None)
     times = ("--td-window", *map(repr, td)) if isinstance(td, tuple) else () if td is None else ("--td", repr(td))
@@ -271,9 +271,9 @@ def judged(
         tr, td = read[0] if tr is None else tr, read[1] if td is None else td
     assert tr is not None
     assert td is not None
-    found, times = of_run.verify_of(asked.reference, tr, td, asked.settings), ["--tr", repr(tr), "--td", repr(td)]
+    found, times = answers.verify_of(asked.reference, tr, td, asked.settings), ["--tr", repr(tr), "--td", repr(td)]
     if switched is not None and other:
-        found = of_run.compare_with(found, asked.reference, other, min_mean_energy)
+        found = answers.compare_with(found, asked.reference, other, min_mean_energy)
         times += [text for name in switched.sources for text in ("--switched", name)]
         times += ["--min-mean-energy", repr(min_mean_energy)] * (min_mean_energy != MIN_MEAN_ENERGY)
     return Verdict.about(asked, found, *times, compared=switched)

@@ -1,26 +1,41 @@
-"""Answers about one td: the recommendation with its rivals and the better td, and the verdict on a pair."""
+"""From a run to an answer: the recommendation with its rivals and the better td, and the verdict on a pair.
+
+The command line, ``study``, ``check --history``, ``card`` and Python go this one way, and get the same numbers.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from d2rpick.base.errors import Caution, RangeError
-from d2rpick.choice.candidates import Candidate, Candidates, Pair, find_candidates, judge
-from d2rpick.choice.expectation import Expectation, against_td, expectation, most_energy
-from d2rpick.choice.quality import Quality, quality_of
-from d2rpick.choice.ranking import EQUALLY_GOOD, over_limits, rank
+from d2rpick.choice.candidates import Candidate, Candidates, Pair, judge
+from d2rpick.choice.health import OF_THE_MODEL, assess, cautions_of_engine, cautions_of_health, refuse_unsound
+from d2rpick.choice.quality import EQUALLY_GOOD, ROUNDING, Quality, candidates_at, over_limits, quality_of
 from d2rpick.choice.situation import OfTd, Situation, examine
-from d2rpick.choice.warnings import POOR_KINETIC_SHARE, cautions_of, out_of_place
+from d2rpick.choice.warnings import (
+    POOR_KINETIC_SHARE,
+    Expectation,
+    against_td,
+    cautions_of,
+    expectation,
+    most_energy,
+    out_of_place,
+)
 from d2rpick.flight.internal_energy import round_off
+from d2rpick.histories.balance import balance_of
 from d2rpick.histories.digits import as_read
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from d2rpick.choice.comparison import Comparison
     from d2rpick.choice.health import Health
-    from d2rpick.choice.question import Settings
+    from d2rpick.choice.question import Reference, Settings
     from d2rpick.histories.history import History
+    from d2rpick.histories.run import Run
+    from d2rpick.vibration.span import Fits
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,10 +70,14 @@ class Verdict(OfTd):
         return quality_of(self.situation, self.candidate, expectation(self.situation, self.candidate.energy))
 
 
-def verify(history: History, tr: float, td: float, settings: Settings) -> Verdict:
-    """Judge one pair; RangeError when a time lies outside the record or tr is not before td."""
+def verify(history: History, tr: float, td: float, settings: Settings, known: Situation | None = None) -> Verdict:
+    """Judge one pair, by what is ``known`` where its td is that one, or nearly so as it is printed.
+
+    RangeError when a time lies outside the record or tr is not before td.
+    """
     _in_order(tr, td)
-    return verify_at(examine(history, td, settings), tr)
+    fits = known.fits if known else None
+    return verify_at(known if known and td == known.td else examine(history, td, settings, fits), tr)
 
 
 def verify_at(situation: Situation, tr: float) -> Verdict:
@@ -89,8 +108,6 @@ def _in_order(tr: float, td: float) -> None:
         raise RangeError(f"tr {tr:g} is not before td {td:g}; the part is rigid from tr to td")
 
 
-# Level error that rounding leaves of a crossing at most, of a level above this share of the highest energy.
-ROUNDING: Final = 1e-3
 # Pairs at other peaks that may turn out not to verify when the record is examined there, before it is given up.
 _MOST_REFUSED = 3
 
@@ -192,7 +209,7 @@ def suggest_at(situation: Situation, *, with_better: bool = True, ranked: Candid
 
     ``ranked`` are the candidates in order where they are known, up to the recommended one at least.
     """
-    candidates = rank(find_candidates(situation)) if ranked is None else ranked
+    candidates = next(candidates_at([situation])) if ranked is None else ranked
     best = candidates.chosen
     better = find_better_pair(situation) if with_better else None
     cautions = list(cautions_of(situation))
@@ -240,7 +257,7 @@ def _level_refuses(situation: Situation) -> bool:
 
 def _saving(situation: Situation) -> Pair | None:
     """Give what is recommended at a td, where that saves something."""
-    return rank(find_candidates(situation, in_flight=True)).saving
+    return next(candidates_at([situation], in_flight=True)).saving
 
 
 def _anew(situation: Situation, td: float) -> Situation:
@@ -266,3 +283,92 @@ def _why_none(situation: Situation, ranked: Candidates) -> str:
     nearest = ranked[0]
     reasons = "; ".join((*nearest.notes, *over_limits(situation, nearest)))
     return f"none of {len(ranked)} candidates is acceptable; the nearest, tr = {nearest.tr:.6g}: {reasons}"
+
+
+_Answer = TypeVar("_Answer", Suggestion, Verdict)
+
+
+def suggest_of(
+    reference: Reference,
+    td: float | tuple[float, float] | None,
+    settings: Settings,
+    *,
+    with_better: bool = True,
+    fits: Fits | None = None,
+    since: float | None = None,
+    times: Sequence[float] | None = None,
+) -> Suggestion:
+    """Choose tr for ``td``, or both times with td in a window (low, high) or, for None, in the longest flight [time].
+
+    ``with_better`` False: for a given td no better one is looked for.  ``fits`` are those of an earlier look at the
+    record with the same settings.  For a td in a window: no flight is taken to begin before ``since``, and ``times``
+    are td that are looked at beside the peaks of the energy, by default an even grid [time].
+
+    Raises
+    ------
+    RangeError
+        If td or the window lies outside the record, no flight is seen, or the run cannot be judged.
+    """
+    refuse_unsound(reference.history, settings, td)
+    if td is None or isinstance(td, tuple):
+        from d2rpick.choice.suggest_td import choose_td  # not above: a td that is given needs no search
+
+        chosen = choose_td(reference.history, td, settings, fits, since, times)
+        answer = suggest_at(chosen.situation)
+        answer = replace(answer, td_window=chosen.window, longer=chosen.given_up(answer.recommended))
+    else:
+        answer = suggest_at(examine(reference.history, td, settings, fits), with_better=with_better)
+    return _with_health(answer, reference.run)
+
+
+def verify_of(
+    reference: Reference, tr: float, td: float, settings: Settings, known: Situation | None = None
+) -> Verdict:
+    """Judge one pair of switch times; errors and ``known`` as for `verify`."""
+    refuse_unsound(reference.history, settings, td, choosing=False)
+    return _with_health(verify(reference.history, tr, td, settings, known), reference.run)
+
+
+def compare_with(verdict: Verdict, reference: Reference, switched: Reference, min_mean: float = 0.0) -> Verdict:
+    """Hold a finished switched run, read in the same way, against the reference by which its times were judged.
+
+    ``min_mean`` is the least mean energy after td that is expected, as a share of the reference's [-].
+
+    Raises
+    ------
+    RangeError
+        If one of the two runs does not go on after td.
+    """
+    from d2rpick.choice.comparison import compare
+
+    found = compare(verdict.situation, verdict.candidate.tr, reference, switched, min_mean)
+    return replace(
+        verdict,
+        switched=found,
+        verified=verdict.verified and not found.objections,  # a wrong motion overrules the verdict
+        reasons=verdict.reasons + found.objections,
+        cautions=(*verdict.cautions, *cautions_of_engine(switched.run.sources)),
+    )
+
+
+def _with_health(answer: _Answer, run: Run) -> _Answer:
+    """Add how far the run can be trusted, above all in the rigid window, else in the flight up to td.
+
+    What comes after td does not matter for the choice.
+    """
+    answer = replace(answer, cautions=(*answer.cautions, *cautions_of_engine(run.sources)))
+    history, td = answer.situation.history, answer.situation.td
+    balance = balance_of(run.databases, history.parts, td)
+    if balance is None:
+        return answer
+    if isinstance(answer, Verdict):
+        start: float | None = answer.candidate.tr
+    else:
+        start = answer.recommended.tr if answer.recommended else answer.situation.earliest_tr
+    window = None if start is None or start >= td else (start, td)
+    locked = history.mean_energy(*window) if window else None
+    health, flight = assess(balance, window, locked, td), answer.situation.flight
+    flies = window is not None and flight.within(history.time)[0] <= window[0] and answer.situation.in_flight
+    found = cautions_of_health(health, at_rest=answer.situation.at_rest)
+    told: list[Caution] = [one for one in found if not (flies and flight.by_parts and one.code in OF_THE_MODEL)]
+    return replace(answer, health=health, cautions=(*answer.cautions, *told))

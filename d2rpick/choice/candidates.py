@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, overload
 
 import numpy as np
 
-from d2rpick.choice.expectation import Objection, objections
+from d2rpick.base.tuples import Record
+from d2rpick.choice.warnings import Objection, objections
 from d2rpick.histories.digits import not_before
 from d2rpick.vibration import measures
 from d2rpick.vibration.measures import Measured
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation
     from d2rpick.flight.position_error import Off
     from d2rpick.histories.history import Samples
+    from d2rpick.vibration.measures import Columns
     from d2rpick.vibration.part_signs import PartMatch
 
 
@@ -37,7 +39,7 @@ ONE_BODY = "the parts become one rigid body"
 _SAME_SWING = ("on the same swing of the energy as td, which saves hardly anything",)
 
 
-class Candidate(NamedTuple):
+class Candidate(Measured, Record):
     """One tr for the td of a situation; fields are the keys of the JSON output, None where nothing can be said.
 
     Times in the unit of the history; ``level_error``, ``lock_in_error``, ``residual`` and ``rigid_fraction``
@@ -67,12 +69,6 @@ class Candidate(NamedTuple):
     acceptable: bool
     recommended: bool
     notes: tuple[str, ...]
-    sign_match: bool | None = None
-    lock_in_error: float | None = None
-    residual: float | None = None
-    residual_high: float | None = None
-    timing_tolerance: float | None = None
-    part_mismatch: float | None = None
     run_time_share: float | None = None
     same_swing: bool = False
     parts: tuple[PartMatch, ...] = ()
@@ -108,19 +104,15 @@ class Pair(NamedTuple):
 class Judged:
     """Times that may serve as tr for one td or many of a record, held against flight, sign and tolerance.
 
-    All columns are of shape (n,), those of each td together, in the order of the ``situations``: ``place`` in these,
-    ``moments``, and ``known`` of them; ``energy`` [energy]; ``level_error`` [-], NaN where an energy is not positive;
-    ``same_swing``; ``position_error`` [length], NaN where unknown.
+    All is of shape (n,), that of each td together, in the order of the ``situations``: ``place`` in these, ``moments``,
+    and ``columns`` by the names of fields of a candidate: its measures, ``energy``, ``level_error``, ``same_swing`` and
+    ``position_error``, NaN where nothing can be said.
     """
 
     situations: Sequence[Situation]
     place: NDArray[np.int32]
     moments: Moments
-    known: Measured
-    energy: Samples
-    level_error: Samples
-    same_swing: NDArray[np.bool_]
-    position_error: Samples
+    columns: Columns
     objections: tuple[Objection, ...]
 
     @classmethod
@@ -137,21 +129,18 @@ class Judged:
         level_error = measures.level_error(energy, np.array([one.energy_td for one in situations])[place])
         if still.any():  # beside nothing that vibrates the ratio of two rests of round-off is no error
             level_error[still] = 0.0
-            known = Measured(*(np.where(still, np.nan, column) for column in known))
+            known = {name: np.where(still, np.nan, column) for name, column in known.items()}
         turns = situations[0].history.turns
         few = np.searchsorted(turns, [one.td for one in situations])[place] - np.searchsorted(turns, tr, "right") < 2
         off = [one.position_errors(tr[slice(*rows)]) for one, rows in zip(situations, pairwise(ends), strict=True)]
-        return cls(
-            situations=situations,
-            place=place,
-            moments=moments,
-            known=known,
-            energy=energy,
-            level_error=level_error,
-            same_swing=few & ~still,
-            position_error=off[0] if len(off) == 1 else np.concatenate(off),
-            objections=tuple(objections(situations, place, tr, known, energy, level_error)),
-        )
+        columns = {
+            **known,
+            "energy": energy,
+            "level_error": level_error,
+            "same_swing": few & ~still,
+            "position_error": off[0] if len(off) == 1 else np.concatenate(off),
+        }
+        return cls(situations, place, moments, columns, tuple(objections(situations, place, tr, columns)))
 
     @property
     def ends(self) -> list[int]:
@@ -177,39 +166,26 @@ class Judged:
             shares = [np.inf if one.kinetic_share is None else one.kinetic_share for one in self.situations]
             found = found & (np.array(shares) <= settings.max_kinetic_share)[self.place]
         if settings.max_residual is not None:
-            found = found & (self.known.residual <= settings.max_residual)  # not where unknown, NaN
+            found = found & (self.columns["residual"] <= settings.max_residual)  # not where unknown, NaN
         return found
 
     @property
     def error(self) -> Samples:
         """What the order goes by, as ``Candidate.error`` [-]."""
-        error = np.where(np.isnan(self.known.residual), self.level_error, self.known.residual)
+        residual = self.columns["residual"]
+        error = np.where(np.isnan(residual), self.columns["level_error"], residual)
         return np.where(np.isnan(error), np.inf, error)
 
     @property
     def out_of_place(self) -> NDArray[np.bool_]:
         """Which of them leave a body so far out of place that it is worth a warning."""
         limits = [np.inf if one.bodies is None else one.bodies.limit for one in self.situations]
-        return np.asarray(self.position_error > np.array(limits)[self.place])
+        return np.asarray(self.columns["position_error"] > np.array(limits)[self.place])
 
     def at(self, rows: NDArray[np.intp]) -> Judged:
         """Keep some that nothing speaks against, in ascending order."""
-        return Judged(
-            situations=self.situations,
-            place=self.place[rows],
-            moments=self.moments.at(rows),
-            known=Measured(*(column[rows] for column in self.known)),
-            energy=self.energy[rows],
-            level_error=self.level_error[rows],
-            same_swing=self.same_swing[rows],
-            position_error=self.position_error[rows],
-            objections=(),
-        )
-
-    def each(self) -> Iterator[Candidates]:
-        """Give the candidates of each situation, in the order of time."""
-        for situation, rows in zip(self.situations, pairwise(self.ends), strict=True):
-            yield Candidates(situation, self, np.arange(*rows))
+        columns = {name: column[rows] for name, column in self.columns.items()}
+        return Judged(self.situations, self.place[rows], self.moments.at(rows), columns, ())
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -246,12 +222,11 @@ class Candidates(Sequence[Candidate]):
         """The same as a pair, which takes less."""
         if self.recommended is None:
             return None
-        i, found = self.order[self.recommended], self.judged
-        tr, residual, level_error, same_swing = (
-            column[i].item() for column in (found.moments.tr, found.known.residual, found.level_error, found.same_swing)
-        )
-        known = not np.isnan(residual)
-        return Pair(tr, self.situation.td, residual if known else None, residual if known else level_error, same_swing)
+        i = self.order[self.recommended]
+        found = {name: self.judged.columns[name][i].item() for name in ("residual", "level_error", "same_swing")}
+        residual = _known(found["residual"])
+        error = found["level_error"] if residual is None else residual
+        return Pair(self.judged.moments.tr[i].item(), self.situation.td, residual, error, found["same_swing"])
 
     @property
     def saving(self) -> Pair | None:
@@ -279,22 +254,22 @@ class Candidates(Sequence[Candidate]):
 
     def _candidate(self, rank: int, reach: float) -> Candidate:
         i, situation, found = int(self.order[rank]), self.situation, self.judged
-        known, (tr, kind, rising) = found.known.of(i), found.moments[i]
-        history, td = situation.history, situation.td
-        energy, level, same_swing, off = (
-            column[i].item() for column in (found.energy, found.level_error, found.same_swing, found.position_error)
-        )
-        worst = None if np.isnan(off) or situation.bodies is None else situation.bodies.worst(tr, td)
+        tr, kind, rising = found.moments[i]
+        values: dict[str, Any] = {name: _known(column[i].item()) for name, column in found.columns.items()}
+        known = values["sign_match"] is not None  # whether its deformation was compared with that at td
+        values["sign_match"] = values["sign_match"] > 0 if known else None
+        history, td, energy = situation.history, situation.td, values["energy"]
+        if values["position_error"] is not None and situation.bodies:
+            values |= _position(situation.bodies.worst(tr, td))
         rigid_fraction = (td - tr) / float(history.time[-1] - history.time[0])
         parts = situation.vibration.part_matches(tr) if known else ()
         against = tuple(chain.from_iterable(one.told(i) for one in found.objections if one.holds[i]))
+        remarks = _remarks(situation, reach, values if known else {}, parts)
         return Candidate(
             rank=(rank + 1) * self.ranked,
             tr=tr,
             kind=kind,
-            energy=energy,
             energy_ratio=energy / situation.energy_td if situation.energy_td > 0 and not situation.at_rest else None,
-            level_error=None if np.isnan(level) else level,
             rising=rising,
             rigid_time=td - tr,
             rigid_fraction=rigid_fraction,
@@ -302,26 +277,25 @@ class Candidates(Sequence[Candidate]):
             tr_high=tr + reach,
             acceptable=not against,
             recommended=rank == self.recommended,
-            notes=(*against, *_SAME_SWING * same_swing, *_remarks(situation, reach, known, parts)),
+            notes=(*against, *_SAME_SWING * values["same_swing"], *remarks),
             run_time_share=situation.settings.run_time_share(rigid_fraction),
-            same_swing=same_swing,
             parts=parts,
-            **known,
-            **_position(worst),
+            **values,
         )
 
 
-def find_candidates(situation: Situation, *, in_flight: bool = False) -> Candidates:
-    """All crossings of the level before td, extrema near enough to it, and closest matches, judged, in time order.
-
-    Where nothing vibrates in the flight, its start alone.  With ``in_flight`` those before the flight, of which none is
-    acceptable, may be left out: noise in a long record makes tens of thousands.
-    """
-    return next(next(judged_of([situation], in_flight=in_flight)).each())
+def _known(value: Any) -> Any:
+    """Give what a column holds, None where it is no number."""
+    return None if value != value else value
 
 
 def judged_of(situations: Sequence[Situation], *, in_flight: bool = False, most: int = _MOST) -> Iterator[Judged]:
-    """The same of many td of one record, by one set of rules: at once so many td as have ``most`` candidates."""
+    """All crossings of the level before td, extrema near enough to it, and closest matches, judged, in time order.
+
+    Where nothing vibrates in the flight, its start alone.  With ``in_flight`` those before the flight, of which none is
+    acceptable, may be left out: noise in a long record makes tens of thousands.  The situations are of one record, by
+    one set of rules: at once so many td are judged as have ``most`` candidates.
+    """
     first, together = 0, 1
     while first < len(situations):
         asked = situations[first : first + together]
@@ -334,7 +308,8 @@ def judged_of(situations: Sequence[Situation], *, in_flight: bool = False, most:
 
 def judge(situation: Situation, times: Iterable[float]) -> Candidates:
     """Measure each of the ``times`` before td as tr, and hold it against flight, sign and tolerance."""
-    return next(Judged.of([situation], [Moments.of("given", [*times])]).each())
+    judged = Judged.of([situation], [Moments.of("given", [*times])])
+    return Candidates(situation, judged, np.arange(judged.place.size))
 
 
 def _at_start(situation: Situation) -> Moments | None:

@@ -10,15 +10,19 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.switched_run import FEWEST, SAME
+from d2rpick.choice.switched_run import FEWEST, SAME, same_parts
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.samples import stretches
 from d2rpick.vibration import measures
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
+    from d2rpick.choice.question import Reference
+    from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import History, Samples, Track
+    from d2rpick.histories.names import Part
+    from d2rpick.histories.run import Run
 
 
 # A deviation of the momentum after td beyond this share of it is worth an objection: the motion is another one.
@@ -65,6 +69,42 @@ class Comparison(NamedTuple):
     rigid_to: float | None
     objections: tuple[str, ...]
     notes: tuple[str, ...]
+
+
+def compare(
+    situation: Situation, tr: float, reference: Reference, switched: Reference, min_mean: float = 0.0
+) -> Comparison:
+    """Hold a finished switched run against the reference, by the parts that tell how right it is.
+
+    Both are read in the same way; ``situation`` is that of td in the reference, and ``min_mean`` as for `compare_runs`.
+
+    Raises
+    ------
+    RangeError
+        If one of the two runs does not go on after td.
+    """
+    flight, parts, run = situation.flight, situation.history.parts, reference.run
+    together = flight.parts if flight.source == "momentum" else flight.parts or parts
+    pair = tr, situation.td
+    judged = same_parts(reference, switched, pair)
+    found = compare_runs(
+        judged.reference,
+        judged.switched,
+        pair,
+        situation.latest_td if situation.latest_td > situation.td else np.inf,
+        situation.settings.tolerance,
+        momenta=(run.momentum(together), _momentum(switched.run, together)),
+        centres=(run.centre(parts), switched.run.centre(parts)) if parts else (None, None),
+        known=judged.known,
+        min_mean=min_mean,
+    )
+    return found._replace(objections=(*judged.objections, *found.objections), notes=(*judged.notes, *found.notes))
+
+
+def _momentum(run: Run, parts: Sequence[Part] | None) -> Track | None:
+    """Momentum of some parts, None also where the run does not have them all."""
+    missing = {part.id for part in parts or ()} - {part.id for part in run.parts}
+    return None if missing else run.momentum(parts)
 
 
 def compare_runs(

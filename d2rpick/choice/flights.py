@@ -114,14 +114,11 @@ def _flights_of(history: History, settings: Settings, fits: Fits | None) -> tupl
             continue
         situation = look(td)
         flight = situation.flight
-        if situation.in_flight and not flight.refusal and not (found and _overlap(flight, found[-1])):
+        # one that lasts into the next misses the load before that one, so its end is not known
+        lasts = found and flight.within(history.time)[1] > found[-1].within(history.time)[0]
+        if situation.in_flight and not flight.refusal and not lasts:
             found.append(flight)
     return tuple(reversed(found))
-
-
-def _overlap(earlier: Flight, later: Flight) -> bool:
-    """Say whether a flight lasts into a later one: it misses the load before that one, so its end is not known."""
-    return earlier.end is None or later.start is None or earlier.end > later.start
 
 
 def momentum_of_flight(history: History) -> dict[str, Samples]:

@@ -19,7 +19,7 @@ from d2rpick.histories.history import LARGEST_ENERGY
 from d2rpick.histories.samples import window as within
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Collection, Iterator, Sequence
 
     from d2rpick.choice.question import Settings
     from d2rpick.histories.history import Balance, History, Samples
@@ -45,6 +45,8 @@ _SMALL_PART = 0.01
 # Where the run has hardly any energy yet, a small error is a large ratio (Altair, Radioss FAQ on the energy error): the
 # ratio counts where its reference exceeds a tenth of its peak, so that the tenth allowed is 1 % of that peak or more.
 _COUNTING_REFERENCE = 0.1
+# Code of the warning of an engine that reports wrong energies.
+WRONG_ENERGY: Final = "engine-wrong-energy"
 # Codes of what says nothing of parts whose own momentum is that of free flight.
 OF_THE_MODEL = ("contact-in-window", "work-in-window")
 
@@ -132,6 +134,18 @@ def cautions_of_health(health: Health, *, at_rest: bool = False) -> Iterator[Cau
     for code, holds, sentence in _ALARMS:
         if holds(health) and not (at_rest and code.endswith("hourglass")):
             yield Caution(code, sentence.format(h=health, up_to=up_to, where=where))
+
+
+def cautions_of_engine(sources: Collection[str]) -> Iterator[Caution]:
+    """Say so where listings beside the files of a run show an engine that reports wrong energies."""
+    if not any("T0" in name for name in sources):  # none is a leg of a Radioss run
+        return
+    from d2rpick.histories.listings import wrong_energies  # not above: other histories do without it
+
+    if found := list(wrong_energies(sources)):
+        why = "OpenRadioss from before January 2026 reports a wrong internal energy after /RBODY/ON or /RBODY/OFF"
+        told = f"{found[0]}: {why} in a restart (its pull request 4538); do not judge by the energies of this run"
+        yield Caution(WRONG_ENERGY, told)
 
 
 def _above(value: float | None, limit: float) -> bool:
@@ -230,16 +244,12 @@ def _in_window(balance: Balance, start: float, end: float, locked: float | None)
     found = {}
     for name, energy in (("window_sliding", balance.sliding), ("window_eroded", balance.eroded)):
         if energy is not None and energy[inside].size:
-            found[name] = _beyond_print(balance, energy[inside], float(np.ptp(energy[inside]))) / locked
+            open_ = balance.precision.quantum(float(np.abs(energy[inside]).max()))  # by its printed digits
+            found[name] = max(0.0, float(np.ptp(energy[inside])) - open_) / locked
     work = work_beyond_gravity(balance, start, end)
     if work is not None:
         found["window_work"] = work / locked
     return found
-
-
-def _beyond_print(balance: Balance, energy: Samples, change: float) -> float:
-    """Give a change of an energy less what its printed digits leave open [energy]."""
-    return max(0.0, change - balance.precision.quantum(float(np.abs(energy).max())))
 
 
 # A run that blew up gains energy from nothing: within a twentieth of the record its kinetic energy exceeds all that

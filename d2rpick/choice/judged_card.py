@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.base.errors import D2RPickError
-from d2rpick.choice.of_run import judge_of
+from d2rpick.choice.answers import verify_of
 from d2rpick.deck.printed_card import PrintedCard, Printing, Times
 from d2rpick.deck.printing import DEFAULT, SOLVERS, cards, solver_of
 
@@ -64,7 +64,7 @@ def input_for(reference: Reference, situation: Situation, tr: float, request: Ca
     """Print the card of ``tr`` and the td of a situation, judged as it is printed."""
     solver, _ = request.of(situation.history)
     named = "" if solver == DEFAULT else solver, SOLVERS[solver].switches
-    judge = partial(judge_of, reference, situation)
+    judge = partial(verify_of, reference, settings=situation.settings, known=situation)
     try:
         found = judged_card([(tr, situation.td)], situation.history, judge, request.by(situation.settings))
     except D2RPickError as error:

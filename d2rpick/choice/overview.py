@@ -10,10 +10,9 @@ import numpy as np
 from d2rpick.base.errors import Caution, FormatError, RangeError, if_written, listing
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.flights import flights_of
-from d2rpick.choice.health import Health, assess, cautions_of_health, refuse_unsound, unsound
+from d2rpick.choice.health import Health, assess, cautions_of_engine, cautions_of_health, refuse_unsound, unsound
 from d2rpick.choice.question import Reference, Settings
 from d2rpick.choice.switched_run import Times, by_the_model, rigid_times
-from d2rpick.choice.warnings import cautions_of_engine
 from d2rpick.flight.momentum import with_parts_by_number
 from d2rpick.flight.window import FreeFlight
 from d2rpick.histories.balance import balance_of

@@ -17,11 +17,10 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import Caution
+from d2rpick.choice.answers import suggest_of
 from d2rpick.choice.flights import flights_of, last_td
-from d2rpick.choice.health import refuse_unsound
-from d2rpick.choice.of_run import suggest_of
+from d2rpick.choice.health import WRONG_ENERGY, cautions_of_engine, refuse_unsound
 from d2rpick.choice.switched_run import Done, Times, done_windows, switched_history
-from d2rpick.choice.warnings import WRONG_ENERGY, cautions_of_engine
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.margin import Margin, margin_before_contact
 from d2rpick.vibration.span import Fits

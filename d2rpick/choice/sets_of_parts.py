@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import Caution, FormatError, RangeError, are, name_units
+from d2rpick.choice.answers import suggest_of, verify_of
 from d2rpick.choice.candidates import ONE_BODY
 from d2rpick.choice.cost import CostModel, Share, Weights
 from d2rpick.choice.deck_of_run import (
@@ -21,7 +22,6 @@ from d2rpick.choice.deck_of_run import (
     left_rigid_in,
     of_another_model,
 )
-from d2rpick.choice.of_run import suggest_of, verify_of
 from d2rpick.choice.question import Reference
 from d2rpick.choice.switchable_parts import PartRow, RunFacts, facts_of, rows_of, step_growth
 from d2rpick.choice.warnings import out_of_place

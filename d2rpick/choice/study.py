@@ -13,9 +13,9 @@ import numpy as np
 
 from d2rpick.base import __version__
 from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, Caution, D2RPickError, RangeError, listing, one_line
-from d2rpick.choice.of_run import suggest_of
+from d2rpick.choice.answers import suggest_of
+from d2rpick.choice.quality import EQUALLY_GOOD
 from d2rpick.choice.question import read
-from d2rpick.choice.ranking import EQUALLY_GOOD
 from d2rpick.choice.windows import (
     acceptable_windows,
     alike_windows,
@@ -227,14 +227,20 @@ def stamps(source: str) -> tuple[Stamp, ...]:
 
 def summarise(td: float | tuple[float, float], rows: Sequence[StudyRow]) -> Study:
     """Hold the rows of a study against each other; ``td`` as it was asked for."""
-    times = [row.tr for row in rows if row.tr is not None]
-    lows = [row.tr_low for row in rows if row.tr_low is not None]
-    highs = [row.tr_high for row in rows if row.tr_high is not None]
+    times, low, high = _known(rows)
     spread = Spread(min(times), median(times), max(times)) if times else None
-    agree = max(lows) <= min(highs) if times else None
+    agree = low <= high if times else None
     common = common_tr(rows)
     one, window = (None, td) if isinstance(td, tuple) else (td, None)
     return Study(one, window, tuple(rows), spread, agree, common, tuple(_cautions(rows, common)))
+
+
+def _known(rows: Sequence[StudyRow]) -> tuple[list[float], float, float]:
+    """Give every tr, and from when to when all of them may be, the end before the start where they do not agree."""
+    found = [(row.tr, row.tr_low, row.tr_high) for row in rows if row.tr is not None]
+    low = max((one for _, one, _ in found if one is not None), default=np.inf)
+    high = min((one for _, _, one in found if one is not None), default=-np.inf)
+    return [tr for tr, _, _ in found], low, high
 
 
 def cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
@@ -298,9 +304,7 @@ def common_tr(rows: Sequence[StudyRow]) -> Common:
 
 def _agreed(judged: Sequence[StudyRow], keeping: Samples) -> float | None:
     """Give the tr of runs that agree, the middle one where they differ at all; None where they do not agree."""
-    known = [row.tr for row in judged if row.tr is not None]
-    low = max((row.tr_low for row in judged if row.tr_low is not None), default=np.inf)
-    high = min((row.tr_high for row in judged if row.tr_high is not None), default=-np.inf)
+    known, low, high = _known(judged)
     if len(known) < len(judged) or low > high:
         return None
     tr = float(np.clip(median(known), low, high))
@@ -314,15 +318,12 @@ def _least_loss(judged: Sequence[StudyRow], shared: Samples) -> tuple[float, flo
     times = times[(np.searchsorted(shared[:, 0], times, "right") - np.searchsorted(shared[:, 1], times)) > 0]
     worst = np.full(times.size, -np.inf)
     for row, profile in zip(judged, profiles, strict=True):
-        worst = np.maximum(worst, np.interp(times, *profile) - _own_error(row, profile))
+        own = 0.0 if row.tr is None else error_at(profile, row.tr)
+        worst = np.maximum(worst, np.interp(times, *profile) - own)
     first = int(np.argmax(worst <= worst.min() + EQUALLY_GOOD))
     holder = shared[np.searchsorted(shared[:, 0], times[first], "right") - 1]
     following = times[min(first + 1, times.size - 1)]
     return float(times[first]), float(min(following, holder[1]))
-
-
-def _own_error(row: StudyRow, profile: Samples) -> float:
-    return 0.0 if row.tr is None else error_at(profile, row.tr)
 
 
 def fewest_digits(low: float, high: float) -> float:

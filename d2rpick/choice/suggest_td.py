@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import chain
 from math import sqrt
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.choice.answers import ROUNDING, Suggestion, suggest_at
-from d2rpick.choice.candidates import Pair, judged_of
-from d2rpick.choice.expectation import mean_in_flight, shortfall
 from d2rpick.choice.flights import longest_flight
-from d2rpick.choice.ranking import LIKE_LEVELS, like_quality, ranked
+from d2rpick.choice.quality import LIKE_LEVELS, ROUNDING, candidates_at, like_quality
 from d2rpick.choice.situation import Situation, looking
+from d2rpick.choice.warnings import mean_in_flight, shortfall
 from d2rpick.flight.flight import SOURCES
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.margin import margin_before_contact
@@ -25,6 +22,7 @@ from d2rpick.vibration.span import Fits
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
+    from d2rpick.choice.candidates import Pair
     from d2rpick.choice.question import Settings
     from d2rpick.choice.situation import Look
     from d2rpick.histories.history import History, Samples
@@ -83,15 +81,33 @@ _MUCH: Final = 0.1
 _HIDDEN: Final = 2.0
 
 
-def suggest_in_window(
+class Chosen(NamedTuple):
+    """The ``situation`` of the td that was chosen in a window, and the ``longest`` acceptable pair in it.
+
+    ``window`` is the one that was asked for, ``inside`` what of it keeps the margin [time].
+    """
+
+    situation: Situation
+    window: tuple[float, float]
+    inside: tuple[float, float]
+    longest: Pair | None
+
+    def given_up(self, pair: Pair | None) -> Pair | None:
+        """Give the longest pair where it is rigid for much longer than the one that is recommended."""
+        much = _MUCH * (self.inside[1] - self.inside[0])
+        found = self.longest
+        return found if found and pair and found.rigid_time - pair.rigid_time > much else None
+
+
+def choose_td(
     history: History,
     window: tuple[float, float] | None,
     settings: Settings,
     fits: Fits | None = None,
     since: float | None = None,
     times: Sequence[float] | None = None,
-) -> Suggestion:
-    """Choose td in ``window``, for None in the longest flight up to the margin, and tr for it, not before ``since``.
+) -> Chosen:
+    """Choose td in ``window``, for None in the longest flight up to the margin, for a tr not before ``since``.
 
     Of the pairs of all peaks of the energy those that are alike in quality count, and of these the one with the
     longest rigid window wins.  Where deformations are known, a residual within 0.02 of the smallest is alike; on the
@@ -119,8 +135,8 @@ def suggest_in_window(
         times = offered_times(situation, inside, STEPS)[0].tolist() if times is None else times
         earliest = float(history.time[0]) if since is None else since
         td = _unbeaten(td, times, earliest, look, looking(history, replace(settings, replay=False), since=since))
-    found = suggest_at(looking(history, settings, fits, since, quick=False)(td))
-    return replace(found, td_window=window, longer=_given_up(longest, found.recommended, inside, look))
+    pair = _longest(_acceptable([look(longest)])) if longest is not None else None
+    return Chosen(looking(history, settings, fits, since, quick=False)(td), window, inside, pair[1] if pair else None)
 
 
 def offered_times(situation: Situation, window: tuple[float, float], steps: int) -> tuple[Samples, set[float]]:
@@ -242,14 +258,6 @@ def _certainty(situation: Situation) -> tuple[bool, int]:
     return not situation.in_flight, SOURCES.index(situation.flight.source)
 
 
-def _given_up(longest: float | None, chosen: Pair | None, window: tuple[float, float], look: Look) -> Pair | None:
-    """Give the pair at the td of the longest rigid window where it is much longer than the chosen one."""
-    pair = _longest(_acceptable([look(longest)])) if longest is not None else None
-    if pair is None or chosen is None or pair[1].rigid_time - chosen.rigid_time <= _MUCH * (window[1] - window[0]):
-        return None
-    return pair[1]
-
-
 def _by_residual(situation: Situation, window: tuple[float, float], look: Look) -> tuple[float | None, float | None]:
     """Give the td of the longest rigid window among those alike in residual, and among all acceptable ones."""
     peaks = situation.peaks(*window)
@@ -294,8 +302,7 @@ def _shortening(situation: Situation, times: Iterable[float]) -> Iterator[Choice
 
 def _acceptable(situations: Iterable[Situation]) -> list[Choice]:
     """What is recommended in each situation, where that saves something."""
-    found = chain.from_iterable(map(ranked, judged_of([*situations], in_flight=True)))
-    return [(one.situation, one.saving) for one in found if one.saving]
+    return [(one.situation, one.saving) for one in candidates_at([*situations], in_flight=True) if one.saving]
 
 
 def _longest(pairs: Iterable[Choice]) -> Choice | None:

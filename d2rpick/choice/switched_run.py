@@ -269,7 +269,7 @@ def rigid_parts(run: Run, parts: Sequence[Part], time: Samples, tr: float, td: f
     return np.asarray(still | absent)
 
 
-class Judged(NamedTuple):
+class SameParts(NamedTuple):
     """Energies of the same parts in both runs, and what to say of other parts.
 
     ``known`` is False where the energies of all parts are reported wrongly.
@@ -282,7 +282,7 @@ class Judged(NamedTuple):
     known: bool = True
 
 
-def judged_parts(without: Reference, switched: Reference, pair: Times) -> Judged:
+def same_parts(without: Reference, switched: Reference, pair: Times) -> SameParts:
     """Choose the parts by which a finished switched run is judged.
 
     Parameters
@@ -295,10 +295,10 @@ def judged_parts(without: Reference, switched: Reference, pair: Times) -> Judged
 
     Returns
     -------
-    Judged
+    SameParts
         Of a model of which only some parts were rigid these; in any case without parts that are reported wrongly.
     """
-    as_read = Judged(without.history, switched.history)
+    as_read = SameParts(without.history, switched.history)
     try:
         parts = _deformable(without, switched.run.parts)
         return _judged(without, switched, pair, parts) if parts else as_read
@@ -306,7 +306,7 @@ def judged_parts(without: Reference, switched: Reference, pair: Times) -> Judged
         return as_read
 
 
-def _judged(without: Reference, switched: Reference, pair: Times, parts: tuple[Part, ...]) -> Judged:
+def _judged(without: Reference, switched: Reference, pair: Times, parts: tuple[Part, ...]) -> SameParts:
     history = without.history
     rigid = rigid_parts(switched.run, parts, switched.run.part_time, *pair)
     some = rigid is not None and bool(rigid.any()) and not rigid.all()
@@ -322,7 +322,7 @@ def _judged(without: Reference, switched: Reference, pair: Times, parts: tuple[P
             objections.append(f"not rigid from tr {pair[0]:g} to td {pair[1]:g} in the switched run: {_names(others)}")
     wrong = _reported_wrong(without, switched.run, chosen, pair)
     if not wrong and chosen is parts:
-        return Judged(history, switched.history, tuple(objections))
+        return SameParts(history, switched.history, tuple(objections))
     left = tuple(part for part in chosen if part not in wrong)
     if not left:
         who = f"the energies of {_names(wrong)}"
@@ -335,7 +335,7 @@ def _judged(without: Reference, switched: Reference, pair: Times, parts: tuple[P
         springs=tuple(str(part.id) for part in history.springs),
     )
     energies = without.run.history(selection), switched.run.history(selection)
-    return Judged(*energies, tuple(objections), tuple(notes), known=bool(left))
+    return SameParts(*energies, tuple(objections), tuple(notes), known=bool(left))
 
 
 def _reported_wrong(without: Reference, switched: Run, parts: tuple[Part, ...], pair: Times) -> tuple[Part, ...]:

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.errors import Caution, RangeError
-from d2rpick.choice.answers import Suggestion, suggest_at
-from d2rpick.choice.candidates import find_candidates, judged_of
+from d2rpick.choice.answers import Suggestion, suggest_at, suggest_of
+from d2rpick.choice.candidates import judged_of
 from d2rpick.choice.flights import longest_flight
 from d2rpick.choice.health import refuse_unsound
-from d2rpick.choice.of_run import suggest_of
-from d2rpick.choice.ranking import EQUALLY_GOOD, rank, ranked
+from d2rpick.choice.quality import EQUALLY_GOOD, candidates_at, ranked
 from d2rpick.choice.situation import OfTd, Situation, looking
 from d2rpick.choice.suggest_td import STEPS, as_printed, error_of, offered_times, within_flight
 from d2rpick.choice.warnings import cautions_of
@@ -86,7 +85,7 @@ class Offer(OfTd):
         """What ``suggest`` says: of windows by all candidates, of why there is none by those before the flight too."""
         known = self.candidates if self.pair else None  # of a td without a pair all are looked at again
         if known and self.basis == "energy":
-            known = rank(find_candidates(self.situation, in_flight=True))
+            known = next(candidates_at([self.situation], in_flight=True))
         return suggest_at(self.situation, with_better=False, ranked=known)
 
     @cached_property

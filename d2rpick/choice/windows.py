@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.choice.candidates import Candidate, Candidates, judge
-from d2rpick.choice.expectation import most_energy
+from d2rpick.choice.warnings import most_energy
 from d2rpick.histories.samples import find_crossings, narrow, union
 from d2rpick.vibration.measures import TOLERATED_GROWTH
 

@@ -48,12 +48,16 @@ Name = Literal[
 
 
 class Field(NamedTuple):
-    """A key with its kind and meaning; its value is what ``get`` takes from a thing, else what bears its name there."""
+    """A key with its kind and meaning; its value is what ``get`` takes from a thing, else what bears its name there.
+
+    ``later``: it came after every schema that has it, so that older results may lack it.
+    """
 
     key: str
     kind: Kind | Name
     meaning: str = ""
     get: Callable[[Any], Any] | None = None
+    later: bool = False
 
     def of(self, thing: Any) -> Any:
         """Give the value that JSON has of a thing."""
@@ -84,7 +88,7 @@ def row(*fields: Field, name: str = "", later: Iterable[str] = (), closed: bool 
     """
     schema = {
         "type": "object",
-        "required": [field.key for field in fields if field.key not in later],
+        "required": [field.key for field in fields if not field.later and field.key not in later],
         "properties": {field.key: field for field in fields},
         **({"additionalProperties": False} if closed else {}),
         **more,

@@ -173,9 +173,9 @@ _POSITION: Final = (
           "what is taken for granted since no deck tells which parts become one rigid body; null with a deck"),
     Field("position_error_is_lower_bound", "flag?",
           "whether the body may be further off: inner motion that is slower than the flight, or that bends the body, "
-          "passes for its rotation; null where nothing is known"),
+          "passes for its rotation; null where nothing is known", later=True),
 )  # fmt: skip
-# What is said of a candidate beside its parts; in CSV the notes come last.
+# What is said of a candidate beside its parts; in CSV the notes come last.  A new measure stands at the end.
 CANDIDATE: Final = row(
     Field("rank", kind_of("integer", minimum=1)),
     Field("tr", "number"),
@@ -201,14 +201,16 @@ CANDIDATE: Final = row(
     Field("residual_high", "size?"),
     *_POSITION,
 )
-# Of these those that measure a pair of times, in the order in which ``verify`` shows them.
-MEASURES: Final = (
+# What tells a tr and does not measure the pair; and the measures that ``verify`` shows first, in their order there.
+_OF_TR: Final = (
+    "rank", "tr", "kind", "rising", "tr_low", "tr_high", "acceptable", "recommended", "notes", "same_swing",
+)  # fmt: skip
+_FIRST: Final = (
     *("energy", "energy_ratio", "level_error", "sign_match", "lock_in_error", "residual", "residual_high"),
     *("part_mismatch", "timing_tolerance", "rigid_time", "rigid_fraction", "run_time_share"),
-    *("position_error", "position_error_part", "position_error_body", "position_error_assumes"),
-    "position_error_is_lower_bound",
 )
-# Keys that came later than the schemas that have them.
+MEASURES: Final = (*_FIRST, *(key for key in CANDIDATE.keys if key not in (*_OF_TR, *_FIRST)))
+# Keys that came later than the schemas of ``suggest`` and ``verify``, but not than others.
 LATER: Final = ("run_time_share", "same_swing", "residual_high", *(field.key for field in _POSITION))
 
 MATCHES: Final = Field("parts", many(row(

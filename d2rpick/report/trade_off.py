@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import printable
-from d2rpick.choice.ranking import EQUALLY_GOOD
+from d2rpick.choice.quality import EQUALLY_GOOD
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, many, maybe, row
 from d2rpick.report.situation import what_was_read
@@ -36,7 +36,6 @@ OFFER: Final = row(
     Field("acceptable_windows", maybe(many(keys.WINDOW)), "on basis energy: windows in which every tr is acceptable",
           lambda offer: offer.answer.windows),
     keys.EXPECTED._replace(get=lambda offer: offer.answer.expected),
-    later=("position_error_is_lower_bound",),
 )  # fmt: skip
 # Columns of the csv and of a frame.
 COLUMNS: Final = [key for key in OFFER.keys if key not in ("quality_reasons", "acceptable_windows", "expected")]

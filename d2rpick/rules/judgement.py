@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import Caution, DeckError, if_written, name_units
-from d2rpick.choice.answers import Verdict, find_better_pair, suggest_at
+from d2rpick.choice.answers import Verdict, find_better_pair, suggest_at, verify_of
 from d2rpick.choice.deck_of_run import in_deck
-from d2rpick.choice.of_run import verify_of
+from d2rpick.choice.health import WRONG_ENERGY
 from d2rpick.choice.question import Reference, Settings
 from d2rpick.choice.situation import examine
-from d2rpick.choice.warnings import POOR_KINETIC_SHARE, WRONG_ENERGY, end_of_flight, end_of_load
+from d2rpick.choice.warnings import POOR_KINETIC_SHARE, end_of_flight, end_of_load
 from d2rpick.deck import read_inventory
 from d2rpick.histories.digits import above, first_as_read, in_the_record
 from d2rpick.histories.surroundings import UNKNOWN

@@ -13,17 +13,19 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from d2rpick.base.tuples import NamedTuple
+from d2rpick.base.tuples import NamedTuple, Record
 from d2rpick.histories.samples import first_above, narrow
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.modes import Mode
 
+    # Measures of n times by their names, in arrays of shape (n,); NaN where unknown.
+    Columns = Mapping[str, Samples]
     # Largest residual of each tr, from its residual, tr and td: with what a fit may have missed, at worst [-].
     Bound = Callable[[Samples, Samples, Any], Samples]
 
@@ -41,54 +43,52 @@ class Deformation(Protocol):
         """V [energy]."""
 
 
-class Measured(NamedTuple):
-    """Measures of n times as tr that only known deformations give, in columns of shape (n,), NaN where unknown.
+class Measured(Record):
+    """Measures of one tr that only known deformations give, each None where it is unknown.
 
-    ``sign_match``: 1 or 0; ``residual_high``: at worst, with what a fit may have missed.
+    ``residual_high``: at worst, with what a fit may have missed.
     """
 
-    sign_match: Samples
-    lock_in_error: Samples
-    residual: Samples
-    residual_high: Samples
-    timing_tolerance: Samples
-    part_mismatch: Samples
-
-    @classmethod
-    def spread(cls, compared: NDArray[np.bool_], columns: Samples | float = np.nan) -> Measured:
-        """Put ``columns`` of shape (6, k) at the k times that were ``compared`` of all, shape (n,)."""
-        shape = len(cls._fields), compared.size
-        if not compared.any():
-            return cls(*np.broadcast_to(np.nan, shape))  # which takes no memory
-        table = np.full(shape, np.nan)
-        table[:, compared] = columns
-        return cls(*table)
-
-    @property
-    def compared(self) -> NDArray[np.bool_]:
-        """Of which times the deformation can be compared with that at td."""
-        return ~np.isnan(self.sign_match)
-
-    def of(self, place: int) -> dict[str, Any]:
-        """Measures of the time at a place by name, None where there is none; empty where it was not compared."""
-        row = {name: float(column[place]) for name, column in zip(self._fields, self, strict=True)}
-        if np.isnan(row["sign_match"]):
-            return {}
-        mismatch = row["part_mismatch"]
-        return {**row, "sign_match": row["sign_match"] > 0, "part_mismatch": None if np.isnan(mismatch) else mismatch}
+    sign_match: bool | None = None
+    lock_in_error: float | None = None
+    residual: float | None = None
+    residual_high: float | None = None
+    timing_tolerance: float | None = None
+    part_mismatch: float | None = None
 
 
 def measured(
     vibration: Deformation, tr: Samples, td: Samples | float, tolerance: Samples, bound: Bound, *, of_parts: bool
-) -> Samples:
-    """Give the columns of `Measured`, shape (6, n), of each tr (n,), for one ``td`` or each for its own.
+) -> Columns:
+    """Give a column for each field of `Measured` of each tr (n,), for one ``td`` or each for its own.
 
     ``of_parts``: the deformations are those of parts, whose energy at td the mismatch is held against.
     """
     lock_in = lock_in_error(vibration, tr, td)
     error = residual(lock_in, kinetic_share(vibration, td))
-    mismatch = part_mismatch(vibration, tr, td) if of_parts else np.full(tr.shape, np.nan)
-    return np.stack([sign_match(vibration, tr, td), lock_in, error, bound(error, tr, td), tolerance, mismatch])
+    return {
+        "sign_match": sign_match(vibration, tr, td).astype(np.float64),
+        "lock_in_error": lock_in,
+        "residual": error,
+        "residual_high": bound(error, tr, td),
+        "timing_tolerance": tolerance,
+        "part_mismatch": part_mismatch(vibration, tr, td) if of_parts else np.full(tr.shape, np.nan),
+    }
+
+
+def spread(size: int, found: Sequence[tuple[NDArray[np.intp], Columns]]) -> Columns:
+    """Put columns of `Measured` at their rows among ``size`` times; NaN at the others."""
+    nothing = np.broadcast_to(np.nan, size)  # which takes no memory
+    spread = {name: nothing.copy() if found else nothing for name in Measured._fields}
+    for rows, columns in found:
+        for name, column in columns.items():
+            spread[name][rows] = column
+    return spread
+
+
+def compared(columns: Columns) -> NDArray[np.bool_]:
+    """Of which times the deformation can be compared with that at td."""
+    return ~np.isnan(columns["sign_match"])
 
 
 # The growth of the lock-in error that ``timing_tolerance`` allows.

@@ -19,7 +19,7 @@ from d2rpick.base.errors import listing
 from d2rpick.vibration import MODELS, measures
 from d2rpick.vibration.fitting import MAX_MISFIT
 from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD, Identification, samples_per_period
-from d2rpick.vibration.measures import Measured, Profile
+from d2rpick.vibration.measures import Profile
 from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.moments import ModalEnergy, Moments, SampledEnergy, moments_of_mode
 from d2rpick.vibration.span import residual_bound
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration import SignedModel
-    from d2rpick.vibration.measures import Bound, Deformation
+    from d2rpick.vibration.measures import Bound, Columns, Deformation
     from d2rpick.vibration.part_signs import PartMatch, SignedParts
     from d2rpick.vibration.span import Span
 
@@ -142,7 +142,7 @@ class Vibration:
         crossings = self.whole.crossings(since)
         return Moments.of_level(*crossings, Moments.of("extremum", turns), Moments.of("match", matches))
 
-    def measured(self, times: Samples) -> Measured:
+    def measured(self, times: Samples) -> Columns:
         """Measures of each time as tr, as far as its deformation can be compared with that at td."""
         return measured_of([self], times, [0, times.size])[1]
 
@@ -182,8 +182,8 @@ class Vibration:
             return np.zeros(times.shape, dtype=bool)
         return (times >= self.compared.first) & (times <= self.compared.last)
 
-    def measures_of(self, tr: Samples, td: Samples | float) -> Samples:
-        """Columns of measures, (6, n), of comparable times (n,) for one ``td``; of a single mode also for a td each."""
+    def measures_of(self, tr: Samples, td: Samples | float) -> Columns:
+        """Columns of measures of comparable times (n,) for one ``td``; of a single mode also for a td each."""
         assert self.compared
         deformation = self.compared.deformation
         if isinstance(deformation, Mode):
@@ -217,25 +217,22 @@ def moments_of(vibrations: Sequence[Vibration], tolerance: float, since: Sequenc
     return [found[i] for i in range(len(vibrations))]
 
 
-def measured_of(vibrations: Sequence[Vibration], tr: Samples, ends: Sequence[int]) -> tuple[Samples, Measured]:
+def measured_of(vibrations: Sequence[Vibration], tr: Samples, ends: Sequence[int]) -> tuple[Samples, Columns]:
     """Give the energy of each tr (n,), and its measures as far as its deformation is comparable to that at its td.
 
     Those of the i-th vibration lie between the i-th of the ``ends`` and the next one.
     """
-    energy, inside, found = np.empty(tr.shape), np.zeros(tr.shape, dtype=bool), []
+    energy, found = np.empty(tr.shape), []
     for places in _alike(vibrations):
         first, each = vibrations[places[0]], [slice(ends[i], ends[i + 1]) for i in places]
         rows: Any = each[0] if len(each) == 1 else np.concatenate([np.arange(one.start, one.stop) for one in each])
         energy[rows] = first.whole.energies(tr[rows])
-        inside[rows] = here = first.comparable(tr[rows])
+        here = first.comparable(tr[rows])
         if here.any():
             seen_from = np.repeat([vibrations[i].td for i in places], [one.stop - one.start for one in each])
             td = seen_from[here] if len(each) > 1 else first.td
             found.append((np.arange(tr.size)[rows][here], first.measures_of(tr[rows][here], td)))
-    if not found:
-        return energy, Measured.spread(inside)
-    order = np.argsort(np.concatenate([rows for rows, _ in found]))
-    return energy, Measured.spread(inside, np.concatenate([columns for _, columns in found], axis=1)[:, order])
+    return energy, measures.spread(tr.size, found)
 
 
 def _alike(vibrations: Sequence[Vibration]) -> Iterable[list[int]]:

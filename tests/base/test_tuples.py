@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pickle
 import typing
+from typing import cast
 
-from d2rpick.base.tuples import NamedTuple
+from d2rpick.base.tuples import NamedTuple, Record
 
 
 class Ours(NamedTuple):
@@ -27,6 +28,19 @@ class Theirs(typing.NamedTuple):
     second: str = "two"
 
 
+class Measure(Record):
+    """What others may have too."""
+
+    share: float | None = None
+
+
+class Wide(Measure, Record):
+    """It stands between what must be given and what need not be."""
+
+    name: str
+    kind: str = "any"
+
+
 def test_fields_defaults_and_names_are_those_of_typing() -> None:
     assert (Ours._fields, Ours._field_defaults) == (Theirs._fields, Theirs._field_defaults)
     assert (Ours.__module__, Ours.__doc__) == (Theirs.__module__, Theirs.__doc__)
@@ -38,3 +52,10 @@ def test_it_is_a_tuple_with_what_its_class_defines() -> None:
     assert one == (1, "two")
     assert one._replace(first=3).both == "3 two"
     assert pickle.loads(pickle.dumps(one)) == one
+
+
+def test_a_record_has_the_fields_of_its_base_behind_those_that_must_be_given() -> None:
+    assert Wide._fields == ("name", "share", "kind")
+    assert Wide(name="x", share=0.5)._asdict() == {"name": "x", "share": 0.5, "kind": "any"}
+    assert [*cast("tuple[object, ...]", Wide(name="x"))] == ["x", None, "any"]
+    assert pickle.loads(pickle.dumps(Wide(name="x"))) == Wide(name="x")

@@ -17,9 +17,9 @@ import numpy as np
 
 from d2rpick.choice.answers import suggest
 from d2rpick.choice.question import Settings
-from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.histories.history import History
 from tests.benchmarks.promise import Truth, table
+from tests.energies import suggest_in_window
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -1,19 +1,25 @@
-"""What suggest decides and verify judges: published and computed examples, and what is recommended verifies."""
+"""What suggest decides and verify judges, and that a record is examined once: what is recommended verifies."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from d2rpick.choice.answers import suggest, suggest_at, verify, verify_at
+from d2rpick.choice.answers import suggest, suggest_at, suggest_of, verify, verify_at, verify_of
 from d2rpick.choice.candidates import Pair
-from d2rpick.choice.question import Settings
+from d2rpick.choice.judged_card import CardRequest, judged_card
+from d2rpick.choice.question import Reference, Settings, read
 from d2rpick.choice.situation import examine
-from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.histories.history import History
+from d2rpick.histories.names import Selection
+from d2rpick.histories.opening import open_run
+from d2rpick.rules.judgement import faults_of
 from tests import paper
-from tests.energies import codes, of, rollover, sure, vibration
+from tests.command import BOX as T01, ENERGY, GLSTAT
+from tests.counted_fits import CountedFits
+from tests.energies import codes, of, rollover, suggest_in_window, sure, vibration
 from tests.reading import solved
 
 PLAIN = Settings()
@@ -137,7 +143,7 @@ def histories(draw: st.DrawFn) -> History:
     energy = decay * np.sin(omega * time) ** 2 + second * decay * np.cos(1.7 * omega * time) ** 2
     energy += draw(st.sampled_from([0.0, 3.0])) * np.exp(-(((time - 1.5) / 0.6) ** 2))
     energy += draw(st.sampled_from([0.0, 0.01, 0.2])) * np.abs(rng.standard_normal(count))
-    return History(time, energy, ("made",), "made", "energy")
+    return of(energy, time)
 
 
 def holds(history: History, pair: Pair | None, asked: Settings) -> bool:
@@ -175,7 +181,7 @@ def test_a_better_td_that_does_not_verify_is_not_named(td: float) -> None:
 def test_a_limit_on_what_is_not_known_leaves_no_td_of_a_window(limit: dict[str, Any]) -> None:
     time = np.linspace(0, 10, 60)
     energy = 3 * np.exp(-(((time - 1.5) / 0.6) ** 2)) + np.sin(3 * time) ** 2 + 0.6 * np.cos(5.1 * time) ** 2
-    history = History(time, energy, ("made",), "made", "energy")
+    history = of(energy, time)
     free = suggest_in_window(history, (6.0, 9.0), Settings(replay=False))
     assert free.recommended
     assert suggest_in_window(history, (6.0, 9.0), Settings(replay=False, **limit)).recommended is None
@@ -183,8 +189,46 @@ def test_a_limit_on_what_is_not_known_leaves_no_td_of_a_window(limit: dict[str, 
 
 def test_too_few_states_per_period_recommend_nothing() -> None:
     time = np.linspace(0, 10, 141)
-    history = History(time, np.exp(-0.05 * time) * np.sin(7.3 * time) ** 2, ("made",), "made", "energy")
+    history = of(np.exp(-0.05 * time) * np.sin(7.3 * time) ** 2, time)
     answer = suggest(history, 8.0, Settings())  # six states in each period of the energy
     assert answer.situation.basis == "energy"
     assert answer.recommended is None
     assert any("states per period" in note for note in answer.candidates[0].notes)
+
+
+BOX = Selection(parts=("box",))
+
+
+def test_the_health_of_the_run_comes_with_every_answer() -> None:
+    whole = read([T01], BOX)
+    answer, in_window = suggest_of(whole, 0.37, PLAIN), suggest_of(whole, (0.3, 0.38), PLAIN)
+    verdict = verify_of(whole, sure(answer.recommended).tr, 0.37, PLAIN)
+    assert sure(answer.health) == verdict.health
+    assert sure(answer.health).window == (sure(answer.recommended).tr, 0.37)
+    assert in_window.health is not None
+    assert suggest_of(read([ENERGY]), 0.064, PLAIN).health is None  # a table of two columns tells nothing of it
+
+
+def test_the_momenta_come_with_every_history_and_know_the_chosen_part() -> None:
+    opened = open_run([T01])
+    whole, box = (Reference.of(opened, selection).history for selection in (Selection(), BOX))
+    (of_whole, *_), (of_box, *_) = whole.momenta, box.momenta
+    assert of_whole.parts == of_box.parts
+    assert of_whole.chosen == tuple(range(len(sure(of_whole.parts))))
+    assert [sure(of_whole.parts)[i].title for i in of_box.chosen] == ["box"]
+    assert of_whole.values is of_box.values  # read once
+
+
+def test_a_tr_that_suits_is_the_way_out_of_one_that_does_not() -> None:
+    verdict = verify_of(read([GLSTAT]), 0.02, 0.0687, PLAIN)
+    assert any("suits this td" in fault.message for fault in faults_of(verdict))
+
+
+def test_a_card_is_judged_by_what_the_choice_found_in_the_record() -> None:
+    reference, fits = read([T01], BOX), CountedFits()
+    box = suggest_of(reference, 0.37, PLAIN, fits=fits)
+    before = fits.made
+    assert before > 0
+    judge = partial(verify_of, reference, settings=PLAIN, known=box.situation)
+    assert judged_card([sure(box.recommended)[:2]], box.situation.history, judge, CardRequest("ls-dyna"))
+    assert fits.made == before

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from d2rpick.choice.answers import suggest
-from d2rpick.choice.candidates import find_candidates, judged_of
+from d2rpick.choice.candidates import judged_of
+from d2rpick.choice.quality import candidates_at, ranked
 from d2rpick.choice.question import Settings
-from d2rpick.choice.ranking import rank
 from d2rpick.choice.situation import looking
 from d2rpick.vibration import measures
 from tests import paper
@@ -70,9 +70,9 @@ def test_energies_that_do_not_vibrate_give_no_candidate(energy: np.ndarray) -> N
 def test_candidates_of_many_td_are_those_of_each_also_where_few_fit_together() -> None:
     look = looking(paper.history(), PLAIN)
     situations = [look(td) for td in (0.02, 0.0335, 0.064, 0.0687, 0.11)]
-    alone = [find_candidates(one)[:] for one in situations]
+    alone = [next(candidates_at([one]))[:] for one in situations]
     for together in (judged_of(situations), judged_of(situations, most=15)):
-        assert [one[:] for judged in together for one in judged.each()] == alone
+        assert [one[:] for judged in together for one in ranked(judged)] == alone
     assert list(judged_of([])) == []
 
 
@@ -80,7 +80,7 @@ def test_candidates_of_many_td_are_those_of_each_also_where_few_fit_together() -
 def test_a_candidate_alone_is_the_one_among_all(noise: float) -> None:
     clean = vibration()
     energy = clean.energy + noise * np.random.default_rng(1).random(clean.energy.size)
-    found = rank(find_candidates(looking(of(energy, clean.time), PLAIN)(3.2)))
+    found = next(candidates_at([looking(of(energy, clean.time), PLAIN)(3.2)]))
     assert len(found) > 3
     assert [found[i] for i in range(len(found))] == list(found) == list(found[:])
     assert (found[-1], found[1:3]) == (found[:][-1], found[:][1:3])

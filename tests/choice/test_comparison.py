@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.answers import Verdict
+from d2rpick.choice.answers import Verdict, compare_with, verify_of
 from d2rpick.choice.comparison import MOST_MOMENTUM_ERROR, Comparison, compare_runs
-from d2rpick.choice.of_run import compare_with, verify_of
 from d2rpick.choice.question import Settings
 from d2rpick.choice.switched_run import rigid_parts, switched_history
 from d2rpick.histories.history import History, Samples, Track
@@ -118,35 +117,30 @@ def test_the_table_sets_the_switched_run_beside_the_reference() -> None:
     assert result.exit_code == 1
 
 
+RIGHT = ("--part", "box", BOX, "--switched", LEGS)
+AT_20 = ("--energy", "boxIE_J", ROLLOVER, "--switched", stored("rollover_r20.csv.gz"))
+
+
 @pytest.mark.parametrize(
-    ("pair", "said"),
+    ("tr", "td", "runs", "said"),
     [
-        (("0.2", "0.37"), "is rigid from 0.1 to 0.370008 by its energy, not from tr 0.2"),
-        (("0.1", "0.36"), "not from tr 0.1 to td 0.36"),
-        (("0.18", "0.37"), "is not that of the reference at tr 0.18"),
+        ("0.2", "0.37", RIGHT, "is rigid from 0.1 to 0.370008 by its energy, not from tr 0.2"),
+        ("0.1", "0.36", RIGHT, "not from tr 0.1 to td 0.36"),
+        ("0.18", "0.37", RIGHT, "is not that of the reference at tr 0.18"),
+        ("0.1", "0.37", (*RIGHT[:-1], BOX), "does not stand still"),  # it was never rigid
+        ("0.02", "0.37", AT_20, "locked in, 11.1"),
     ],
 )
-def test_a_run_that_was_switched_at_other_times_is_an_objection(pair: tuple[str, str], said: str) -> None:
-    times = ("--tr", pair[0], "--td", pair[1])
-    found = answer("verify", "--no-verify", *times, "--part", "box", BOX, "--switched", LEGS)
+def test_a_run_that_was_not_switched_so_is_an_objection(tr: str, td: str, runs: tuple[str, ...], said: str) -> None:
+    found = answer("verify", "--no-verify", "--tr", tr, "--td", td, *runs)
     assert found["verified"] is False
     assert any(said in reason for reason in found["reasons"])
 
 
-def test_a_run_that_was_never_rigid_is_an_objection() -> None:
-    found = answer(*VERIFY, BOX, "--switched", BOX)
-    assert found["verified"] is False
-    assert any("does not stand still" in reason for reason in found["reasons"])
-
-
-def test_the_energy_that_was_locked_in_is_judged() -> None:
-    pair = ("--tr", "0.02", "--td", "0.37", "--no-verify", "--energy", "boxIE_J")
-    found = answer("verify", *pair, ROLLOVER, "--switched", stored("rollover_r20.csv.gz"))
-    assert found["verified"] is False
-    assert any("locked in, 11.1" in reason for reason in found["reasons"])
-    csv = run("verify", *pair, ROLLOVER, "--switched", stored("rollover_r20.csv.gz"), "-f", "csv").stdout
-    (row,) = DictReader(StringIO(csv))
-    assert row["switched_objections"] == "; ".join(found["switched"]["objections"]) != ""
+def test_csv_has_the_objections_as_one_text() -> None:
+    asked = ("verify", "--no-verify", "--tr", "0.02", "--td", "0.37", *AT_20)
+    (row,) = DictReader(StringIO(run(*asked, "-f", "csv").stdout))
+    assert row["switched_objections"] == "; ".join(answer(*asked)["switched"]["objections"]) != ""
 
 
 def test_the_option_is_repeated_for_further_files_of_the_switched_run() -> None:
@@ -327,15 +321,20 @@ def test_what_has_come_to_rest_is_not_off_by_its_noise() -> None:
     assert not any("momentum" in one for one in found.objections)
 
 
-def test_before_td_and_at_its_first_state_the_momentum_does_not_count() -> None:
-    silent = np.where(TIME <= 0.5, 0.0, 10.0)
-    assert held((track(0 * TIME + 10), track(silent))).momentum_error == 0
-
-
-@pytest.mark.parametrize("momenta", [NONE, (track(TIME), None), (None, track(TIME)), (track(0 * TIME), track(TIME))])
-def test_a_momentum_that_one_run_does_not_have_is_no_error(momenta: tuple[Track | None, Track | None]) -> None:
+@pytest.mark.parametrize(
+    ("momenta", "error"),
+    [
+        # before td and at its first state it does not count
+        ((track(0 * TIME + 10), track(np.where(TIME <= 0.5, 0.0, 10.0))), 0),
+        (NONE, None), ((track(TIME), None), None), ((None, track(TIME)), None),
+        ((track(0 * TIME), track(TIME)), None),
+    ],
+)  # fmt: skip
+def test_a_momentum_that_is_right_or_that_one_run_does_not_have_is_no_error(
+    momenta: tuple[Track | None, Track | None], error: float | None
+) -> None:
     found = held(momenta)
-    assert found.momentum_error is None
+    assert found.momentum_error == error
     assert not any("momentum" in one for one in found.objections)
 
 

@@ -13,11 +13,10 @@ import pytest
 from d2rpick.choice.answers import Verdict, suggest, verify, verify_at
 from d2rpick.choice.plan import plan_of
 from d2rpick.choice.question import Reference, Settings
-from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.choice.windows import acceptable_windows
 from d2rpick.flight.flight import all_seen, seen_flight
 from d2rpick.histories.digits import as_read
-from d2rpick.histories.history import History, Samples
+from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
 from d2rpick.report.suggestion import acceptable
 from d2rpick.rules.judgement import faults_of
@@ -25,7 +24,7 @@ from tests.choice.test_same_answers import made
 from tests.command import BOX, run
 from tests.computed import stored
 from tests.drops import drop, written
-from tests.energies import codes, of, sure
+from tests.energies import codes, of, reference, suggest_in_window, sure
 from tests.reading import read
 
 PLAIN = Settings()
@@ -42,11 +41,6 @@ def resting() -> History:
     """Constant energy over times of many digits."""
     time = 0.10005206614732742 + np.linspace(0, 1, 101)
     return of(np.ones(time.size), time)
-
-
-def save(file: Path, time: Samples, energy: Samples) -> None:
-    table = np.stack([time, energy], axis=1)
-    np.savetxt(file, table, delimiter=",", header="time,internal_energy", comments="", fmt="%.17g")
 
 
 def read_again(history: History, tr: float, td: float, asked: Settings) -> Verdict:
@@ -152,35 +146,31 @@ def test_an_error_that_is_refused_reads_as_too_large() -> None:
 
 
 @pytest.mark.slow
-def test_a_plan_knows_a_flight_as_surely_as_the_td_in_it(tmp_path: Path) -> None:
+def test_a_plan_knows_a_flight_as_surely_as_the_td_in_it() -> None:
     """An oscillator is seen around some td of the flight, but not around the one that is chosen."""
     rng, time = np.random.default_rng(0), np.linspace(0, 1, 1500)
     load, contact, omega, alpha = rng.uniform(0.05, 0.3), rng.uniform(0.6, 0.9), rng.uniform(20, 60), rng.uniform(0, 3)
     energy = np.exp(-alpha * time) * np.sin(omega * time + omega) ** 2
     energy += np.where(time < load, 6 * np.sin(np.pi * time / load) ** 2, 0)
     energy += np.where(time > contact, 20 * ((time - contact) / (1 - contact)) ** 2, 0)
-    file = tmp_path / "energy.csv"
-    save(file, time, energy)
-    reference = read([str(file)])
-    rows = [row for row in plan_of(reference, PLAIN).flights if row.window]
+    record = reference(of(energy, time))
+    rows = [row for row in plan_of(record, PLAIN).flights if row.window]
     assert rows
     for row in rows:
-        flight = verify(reference.history, *sure(row.window), PLAIN).situation.flight
+        flight = verify(record.history, *sure(row.window), PLAIN).situation.flight
         assert (row.flight.source, row.flight.certain, row.start) == (flight.source, flight.certain, flight.start)
 
 
-def test_a_flight_whose_start_is_given_ends_where_the_oscillator_does(tmp_path: Path) -> None:
+def test_a_flight_whose_start_is_given_ends_where_the_oscillator_does() -> None:
     time = np.linspace(0, 1, 1500)
     energy = np.exp(-time) * np.sin(40 * time) ** 2 + np.where(time > 0.8, 30 * (time - 0.8), 0)
-    file, asked = tmp_path / "energy.csv", Settings(after=0.1)
-    save(file, time, energy)
-    reference = read([str(file)])
-    (row,) = plan_of(reference, asked).flights
-    flight = verify(reference.history, *sure(row.window), asked).situation.flight
+    record, asked = reference(of(energy, time)), Settings(after=0.1)
+    (row,) = plan_of(record, asked).flights
+    flight = verify(record.history, *sure(row.window), asked).situation.flight
     assert row.flight == flight
     assert row.end == pytest.approx(0.8, abs=0.01)
     assert row.margin.source == "flight"
-    assert suggest_in_window(reference.history, None, asked).td_window == (0.1, row.end)
+    assert suggest_in_window(record.history, None, asked).td_window == (0.1, row.end)
 
 
 @pytest.mark.slow
@@ -204,14 +194,12 @@ def test_a_card_says_the_same_of_a_pair_whoever_prints_it(tmp_path: Path) -> Non
     assert "hourglass: " in unescape(page.read_text("utf-8")).partition("/RUN/")[0].rpartition("Judged by")[2]
 
 
-def test_a_plan_keeps_the_margin_that_it_lists(tmp_path: Path) -> None:
+def test_a_plan_keeps_the_margin_that_it_lists() -> None:
     """To a td in it the energy alone shows no end of that flight."""
     rng, time = np.random.default_rng(277), np.linspace(0, 1, 200)
     omega, phase = rng.uniform(20, 80, 2), rng.uniform(0, 6, 2)
     energy = np.sin(omega[0] * time + phase[0]) ** 2 + 0.5 * np.sin(omega[1] * time + phase[1]) ** 2 + 0.6
-    file = tmp_path / "energy.csv"
-    save(file, time, energy)
-    rows = [row for row in plan_of(read([str(file)]), LEVEL).flights if row.window and row.flight.end]
+    rows = [row for row in plan_of(reference(of(energy, time)), LEVEL).flights if row.window and row.flight.end]
     assert rows
     for row in rows:
         assert sure(row.window)[1] <= row.end - row.margin.time

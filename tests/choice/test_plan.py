@@ -9,16 +9,15 @@ import pytest
 from hypothesis import example, given, settings, strategies as st
 
 from d2rpick.base.errors import RangeError
-from d2rpick.choice.of_run import suggest_of
+from d2rpick.choice.answers import suggest_of
 from d2rpick.choice.plan import Plan, plan_of
 from d2rpick.choice.question import Reference, Settings
-from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.choice.trade_off import explored_flights
 from d2rpick.histories.digits import first_as_read
 from d2rpick.histories.opening import Selection
 from tests.computed import stored
 from tests.drops import drop, written
-from tests.energies import sure
+from tests.energies import of, reference as made, suggest_in_window, sure
 from tests.reading import read, solved
 
 PLAIN = Settings(replay=False)  # no oscillator describes these runs, and none is sought
@@ -180,12 +179,16 @@ def test_a_run_that_was_not_switched_is_not_taken_for_one(reference: Reference, 
 
 @pytest.mark.slow
 def test_the_flights_and_windows_of_the_computed_box() -> None:
-    """Contacts as the solver wrote them, openradioss/car_drop/drop2_runs.csv."""
+    """Contacts as the solver wrote them, openradioss/car_drop/drop2_runs.csv.
+
+    A window of more than half the longest comes first: one after the other both are had with one more run.
+    """
     found = plan_of(solved("drop2T01.gz"), PLAIN)
     flights = [(0, 0.2858), (0.3022, 0.3386), (0.3394, 0.4196), (0.4206, 0.4800), (0.5020, 0.5966), (0.619, 0.6614)]
     for row, (start, end) in zip(found.flights, flights, strict=False):
         assert (row.start, row.end) == pytest.approx((start, end), abs=1e-3)
     assert statuses(found) == ["supported", "left-out", "supported", "re-plan", "re-plan", "left-out", "re-plan"]
+    assert found.flights[4].rigid_time == pytest.approx(0.0906, abs=4e-4)  # a state each 0.4 ms; flight 3: 0.071
 
 
 def test_a_landing_while_rigid_is_told() -> None:
@@ -226,29 +229,27 @@ def test_flights_of_the_energy_alone_end_before_the_next_begins(tmp_path: Path) 
     assert all(one[1] < other[0] for one, other in pairwise(windows))
 
 
-def bouncing(seed: int, folder: Path) -> list[str]:
-    """Write the energy of a run of two to five impacts, after each of which another vibration sets in."""
-    made = np.random.default_rng(seed)
-    time = np.linspace(0.0, 1.0, int(made.integers(300, 900)))
+def bouncing(seed: int) -> Reference:
+    """The energy of a run of two to five impacts, after each of which another vibration sets in."""
+    rng = np.random.default_rng(seed)
+    time = np.linspace(0.0, 1.0, int(rng.integers(300, 900)))
     plastic, elastic = np.zeros_like(time), np.zeros_like(time)
-    for impact in np.sort(made.uniform(0.05, 0.95, int(made.integers(2, 6)))):
-        rate, damping, size = made.uniform((40, 0, 0.3), (300, 10, 2))
+    for impact in np.sort(rng.uniform(0.05, 0.95, int(rng.integers(2, 6)))):
+        rate, damping, size = rng.uniform((40, 0, 0.3), (300, 10, 2))
         since = np.clip(time - impact, 0, None)
-        pushed = np.clip(since / made.uniform(0.01, 0.05), 0, 1)
+        pushed = np.clip(since / rng.uniform(0.01, 0.05), 0, 1)
         elastic += size * np.exp(-damping * since) * np.sin(rate * since) * pushed
-        plastic += made.uniform(0, 2) * pushed
-    table = folder / f"{seed}.csv"
-    np.savetxt(table, np.stack([time, plastic + elastic**2], axis=1), "%.17g", ",", header="time,energy", comments="")
-    return [str(table)]
+        plastic += rng.uniform(0, 2) * pushed
+    return made(of(plastic + elastic**2, time))
 
 
 @pytest.mark.slow
 @settings(max_examples=8)
 @given(seed=st.integers(0, 100_000))
 @example(seed=204)  # at the end of this flight the energy shows none
-def test_a_window_of_the_energy_alone_lies_in_its_flight(seed: int, tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_a_window_of_the_energy_alone_lies_in_its_flight(seed: int) -> None:
     """The energy shows another beginning of the flight to each td; a window began before the flight of its row."""
-    reference = read(bouncing(seed, tmp_path_factory.getbasetemp()))
+    reference = bouncing(seed)
     plan = plan_of(reference, PLAIN)
     for row in plan.flights:
         assert row.window is None or first_as_read(row.start) <= row.window[0] < row.window[1] <= row.end
@@ -260,9 +261,9 @@ def test_a_window_of_the_energy_alone_lies_in_its_flight(seed: int, tmp_path_fac
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [33, 72])
-def test_no_other_td_of_a_flight_reaches_back_beyond_a_landing(seed: int, tmp_path: Path) -> None:
+def test_no_other_td_of_a_flight_reaches_back_beyond_a_landing(seed: int) -> None:
     """The page of a plan offered pairs that were rigid while the flight before had not landed."""
-    reference = read(bouncing(seed, tmp_path))
+    reference = bouncing(seed)
     plan = plan_of(reference, PLAIN)
     landings = {row.number: row.end for row in plan.flights}
     rows = [row for row in plan.flights if row.window]
@@ -308,11 +309,3 @@ def test_a_minimal_rigid_time_that_is_given_plans_both_one_after_the_other(car: 
     assert statuses(found) == ["supported", "re-plan"]
     assert found.flights[0].rigid_time == pytest.approx(0.0142, abs=1e-4)
     assert [one.code for one in found.cautions][-1] == "longer-window-later"
-
-
-@pytest.mark.slow
-def test_a_window_of_more_than_half_the_longest_comes_first() -> None:
-    """One after the other both are had with one more run; DROP2: 0.071 and then 0.091."""
-    found = plan_of(solved("drop2T01.gz"), PLAIN)
-    assert statuses(found) == ["supported", "left-out", "supported", "re-plan", "re-plan", "left-out", "re-plan"]
-    assert found.flights[4].rigid_time == pytest.approx(0.0906, abs=4e-4)  # a state each 0.4 ms

@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
-from d2rpick.choice.answers import Suggestion, suggest
-from d2rpick.choice.of_run import suggest_of
+from d2rpick.choice.answers import Suggestion, suggest, suggest_of
 from d2rpick.choice.question import Settings, read
-from d2rpick.choice.suggest_td import suggest_in_window
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Selection
 from tests.command import ROOT
 from tests.computed import stored
+from tests.energies import suggest_in_window
 
 SAMPLES = {
     "paper": ("energy.csv", Selection()),

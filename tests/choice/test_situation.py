@@ -11,6 +11,7 @@ from d2rpick.choice.situation import examine
 from d2rpick.flight.position_error import RigidBody
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
+from d2rpick.vibration import measures
 from d2rpick.vibration.oscillator import to_mode
 from d2rpick.vibration.span import Fits
 from tests import chain, paper
@@ -38,12 +39,13 @@ def test_every_model_answers_alike() -> None:
         found = vibration.moments(situation.settings.tolerance)
         times = found.tr
         measured = vibration.measured(times)
-        assert measured.compared.size == len(found) == vibration.reach(found).size > 0
+        compared = measures.compared(measured)
+        assert compared.size == len(found) == vibration.reach(found).size > 0
         assert np.all(times < situation.td)
-        assert (vibration.kinetic_share is None) == (vibration.unknown is not None) == (not measured.compared.any())
+        assert (vibration.kinetic_share is None) == (vibration.unknown is not None) == (not compared.any())
         # what a tolerance is held against is the lock-in error, where the sign is right
-        wanted = np.where(measured.sign_match > 0, measured.lock_in_error, np.inf)[measured.compared]
-        np.testing.assert_allclose(vibration.errors(times)[measured.compared], wanted)
+        wanted = np.where(measured["sign_match"] > 0, measured["lock_in_error"], np.inf)[compared]
+        np.testing.assert_allclose(vibration.errors(times)[compared], wanted)
         assert situation.energy_td == pytest.approx(situation.history.energy_at(situation.td), rel=0.05)
 
 

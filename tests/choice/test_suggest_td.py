@@ -7,12 +7,11 @@ import pytest
 from hypothesis import given, strategies as st
 
 from d2rpick.choice.answers import suggest, suggest_at
-from d2rpick.choice.candidates import find_candidates
-from d2rpick.choice.expectation import expectation, shortfall
+from d2rpick.choice.quality import candidates_at
 from d2rpick.choice.question import Settings
-from d2rpick.choice.ranking import rank
 from d2rpick.choice.situation import Situation, examine
-from d2rpick.choice.suggest_td import longest_rigid_times, suggest_in_window
+from d2rpick.choice.suggest_td import longest_rigid_times
+from d2rpick.choice.warnings import expectation, shortfall
 from d2rpick.histories.history import EXACT, Given, History, Momenta, Samples
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection
@@ -23,7 +22,7 @@ from tests import paper
 from tests.command import ENERGY, ROLLOVER, answer, run
 from tests.computed import results
 from tests.counted_fits import CountedFits
-from tests.energies import of, sure
+from tests.energies import of, suggest_in_window, sure
 from tests.reading import read, solved
 
 PLAIN = Settings()
@@ -46,7 +45,7 @@ def test_both_times_of_the_published_oscillator() -> None:
 
 def test_of_equally_good_peaks_the_longest_rigid_window_wins() -> None:
     time = np.arange(0, 4, 0.01)
-    history = History(time, np.sin(2 * np.pi * time) ** 2, source=("test",), format="csv", channel="E")
+    history = of(np.sin(2 * np.pi * time) ** 2, time)
     found = suggest_in_window(history, (2.1, 3.6), PLAIN)
     # peaks at 2.25, 2.75, 3.25; the first with the sign of each at 0.25, 0.75, 0.25
     assert (sure(found.recommended).tr, sure(found.recommended).td) == pytest.approx((0.25, 3.25), abs=1e-6)
@@ -85,7 +84,7 @@ def test_what_is_given_up_for_a_higher_level_is_told() -> None:
     time = np.arange(0, 10, 0.01)
     high = (time > 0.5) & (time < 6)
     energy = np.where(high, 1 + 0.3 * np.sin(5 * np.pi * time), 0.1 + 0.05 * np.sin(5 * np.pi * time))
-    history = History(time, energy, source=("test",), format="csv", channel="E")
+    history = of(energy, time)
     found = suggest_in_window(history, (1.0, 9.5), Settings(after=0.05, replay=False))
     assert sure(found.longer).rigid_time > 1.5 * sure(found.recommended).rigid_time
     lines = dict(outlook(found))
@@ -121,7 +120,7 @@ def test_peaks_above_all_vibration_energy_are_not_locked_in() -> None:
     rng = np.random.default_rng(2)
     energy = sum(np.sin(w * time + rng.uniform(0, 6)) ** 2 for w in rng.uniform(4, 20, 15))
     energy = np.asarray(energy) + 30 * np.exp(-(((time - 8.5) / 0.1) ** 2))  # a burst that is no vibration
-    history = History(time, energy, source=("test",), format="csv", channel="E")
+    history = of(energy, time)
     found = suggest_in_window(history, (8.0, 9.0), Settings(after=0.5))
     for t in (sure(found.recommended).tr, sure(found.recommended).td):
         assert history.energy_at(t) <= 2 * sure(found.expected).mean_energy
@@ -146,7 +145,7 @@ def test_no_td_is_taken_before_a_window_that_the_margin_cuts_off() -> None:
 def test_the_record_ends_before_the_flight_of_an_oscillator_is_left() -> None:
     time = np.arange(0, 3, 0.01)
     energy = np.sin(2 * np.pi * time) ** 2 + np.where(time > 2.5, 40 * (time - 2.5), 0)
-    history = History(time, energy, source=("test",), format="csv", channel="E")
+    history = of(energy, time)
     found = suggest_in_window(history, (2.0, 2.9), PLAIN)
     assert sure(found.recommended).td == pytest.approx(2.25, abs=1e-3)
 
@@ -235,7 +234,7 @@ def test_the_expected_run_time_is_told_by_suggest_and_verify() -> None:
 
 
 def rigid_time(situation: Situation) -> float:
-    best = rank(find_candidates(situation)).chosen
+    best = next(candidates_at([situation])).chosen
     return best.rigid_time if best and not best.same_swing else 0.0
 
 

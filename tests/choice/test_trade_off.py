@@ -1,37 +1,25 @@
 """Every td of a trade-off is answered as ``suggest`` answers it, and what is marked as unbeaten is."""
 
 from itertools import pairwise
-from pathlib import Path
-from types import SimpleNamespace
-from typing import cast
 
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from d2rpick.choice.answers import suggest, suggest_at
-from d2rpick.choice.candidates import find_candidates
-from d2rpick.choice.of_run import suggest_of
-from d2rpick.choice.question import Reference, Settings
-from d2rpick.choice.ranking import rank
+from d2rpick.choice.answers import suggest, suggest_at, suggest_of
+from d2rpick.choice.quality import candidates_at
+from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.trade_off import Offer, TradeOff, explore_of
 from d2rpick.histories.digits import as_read
 from d2rpick.histories.history import History
 from d2rpick.histories.names import Selection
-from d2rpick.histories.run import Run
 from d2rpick.vibration.span import Fits
 from tests.command import ROOT
-from tests.energies import sure
+from tests.energies import of, reference, sure
 from tests.reading import read
 
 SAMPLES = {"energy.csv": Selection(), "rollover_box.matsum": Selection(parts=("box",))}
-
-
-def reference(history: History) -> Reference:
-    """Give a record that was made in memory as if it had been read: a run without databases."""
-    bare = SimpleNamespace(databases=(), parts=(), sources=("made",))
-    return Reference(cast("Run", bare), history)
 
 
 def check(found: TradeOff, history: History, asked: Settings, offers: list[Offer]) -> None:
@@ -98,11 +86,11 @@ def histories(draw: st.DrawFn) -> History:
     energy[time > draw(st.floats(0.8, 1.2))] += draw(st.floats(0.0, 5.0))
     noise = np.random.default_rng(draw(st.integers(0, 99))).standard_normal(states)
     share = draw(st.sampled_from([0.0, 0.003, 0.1]))
-    return History(time, energy + share * noise, ("made",), "made", "E")
+    return of(energy + share * noise, time)
 
 
 @pytest.mark.parametrize("seed", [9, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 6, 10))])
-def test_no_td_beats_the_one_that_is_chosen_by_the_level_alone(seed: int, tmp_path: Path) -> None:
+def test_no_td_beats_the_one_that_is_chosen_by_the_level_alone(seed: int) -> None:
     """Of forty modes, for whose td an oscillator is not sought everywhere."""
     rng, time = np.random.default_rng(seed), np.linspace(0, 1, 900)
     energy = sum(
@@ -110,9 +98,7 @@ def test_no_td_beats_the_one_that_is_chosen_by_the_level_alone(seed: int, tmp_pa
         for cycles in rng.uniform(6, 30, 40)
     )
     energy = energy * np.exp(-0.8 * time) + 60 * np.exp(-(((time - 0.06) / 0.01) ** 2))
-    file = tmp_path / "modes.csv"
-    np.savetxt(file, np.column_stack([time, energy]), delimiter=",", header="time,internal_energy", comments="")
-    found = explore_of(read([str(file)]), Settings(), None, steps=40)
+    found = explore_of(reference(of(energy, time)), Settings(), None, steps=40)
     assert (sure(found.recommended).basis, found.suggestion.situation.flight.source) == ("energy", "energy")
     assert sure(found.recommended).unbeaten
 
@@ -146,7 +132,7 @@ def test_candidates_before_the_flight_never_change_what_is_best(
     history: History, td: float, after: float, replay: bool
 ) -> None:
     situation = examine(history, td, Settings(after=after, replay=replay))
-    every, flying = (rank(find_candidates(situation, in_flight=one)) for one in (False, True))
+    every, flying = (next(candidates_at([situation], in_flight=one)) for one in (False, True))
     assert flying.chosen == every.chosen
     if situation.basis == "energy":
         assert sorted(flying.tr) == sorted(every.tr[every.tr >= after])
@@ -156,7 +142,7 @@ def test_the_flight_beside_a_td_is_the_one_that_suggest_names() -> None:
     """The energy alone shows another flight to each td; that of the window's start was shown."""
     time = np.linspace(0.0, 1.0, 2001)
     energy = np.exp(-6 * time) * np.sin(250 * time) ** 2 + 0.4 * np.exp(-3 * time) * np.sin(611 * time) ** 2
-    history = History(time, energy + 5 * np.exp(-(((time - 0.01) / 0.006) ** 2)), ("made",), "made", "energy")
+    history = of(energy + 5 * np.exp(-(((time - 0.01) / 0.006) ** 2)), time)
     asked = Settings(replay=False)
     alone = suggest(history, 0.37, asked).situation.flight
     assert alone.source == "energy"
@@ -200,6 +186,6 @@ def test_a_level_that_stays_the_same_is_graded_alike_at_each_td() -> None:
     """Plastic energy with a vibration of a ten-thousandth: about half of it is kinetic, whichever side of it td is."""
     time = np.linspace(0, 1, 2001)
     energy = 1000 + 0.05 * np.sin(400 * time) * np.sin(731 * time)
-    found = explore_of(reference(History(time, energy, ("made",), "made", "E")), Settings(after=0.1, replay=False))
+    found = explore_of(reference(of(energy, time)), Settings(after=0.1, replay=False))
     grades = {one.quality.grade for one in found.offers if one.quality and one.best and not one.best.same_swing}
     assert grades == {"fair"}

@@ -28,7 +28,7 @@ from d2rpick.vibration.modes import Mode, Modes
 from tests import chain
 from tests.command import ROLLOVER
 from tests.computed import results
-from tests.energies import sure
+from tests.energies import of, sure
 from tests.paper import OMEGA_2
 from tests.reading import read_history, solved
 from tests.records import ENERGY, MODE, TIME, noisy
@@ -73,7 +73,7 @@ def test_the_larger_of_share_and_spread_counts() -> None:
 def test_without_a_contact_or_energies_nothing_is_made_up() -> None:
     history, flight = flying_oscillator(10.0, 1.0, 1.0, 2.0)
     assert margin_before_contact(history, flight._replace(end=None)) == (0.0, "no-contact", None)
-    bare = History(history.time, history.energy, source=("test",), format="csv", channel="E")
+    bare = of(history.energy, history.time)
     assert margin_before_contact(bare, flight) == (SHARE * history.time[-1], "flight", None)
 
 
@@ -109,7 +109,7 @@ def test_the_landings_of_the_switched_box_lie_within_the_margin(run: str, column
 
 
 TD = 0.064
-PAPER = History(TIME, ENERGY, ("paper",), "made", "energy")
+PAPER = of(ENERGY, TIME)
 
 
 def windows_of(answer: Suggestion) -> Samples:
@@ -157,7 +157,7 @@ def test_windows_of_an_oscillator_hold_what_verifies(
     after: float | None, limit: float | None, seed: int,
 ) -> None:  # fmt: skip
     mode = Mode(omega, alpha, 10 * np.cos(phase), 10 * np.sin(phase), 0.0, plastic, preload)
-    history = History(TIME[::3], mode.energy(TIME[::3]), ("made",), "made", "energy")
+    history = of(mode.energy(TIME[::3]), TIME[::3])
     answer = suggest(history, td, Settings(tolerance=tolerance, after=after, max_residual=limit))
     check(answer, seed)
 
@@ -173,7 +173,7 @@ def test_windows_of_any_energy_hold_what_verifies(
     energy: list[float], share: float, tolerance: float, after: float | None, seed: int, uneven: bool, margin: float
 ) -> None:
     time = np.linspace(0, 1, len(energy)) ** (1.5 if uneven else 1.0)
-    history = History(time, np.array(energy), ("made",), "made", "energy")
+    history = of(np.array(energy), time)
     asked = Settings(tolerance=tolerance, after=after and after * time[-2], margin=margin, replay=False)
     assume(share > float(asked.after or 0))
     check(suggest(history, share, asked), seed)
@@ -182,7 +182,7 @@ def test_windows_of_any_energy_hold_what_verifies(
 @pytest.mark.slow
 @pytest.mark.parametrize("tolerance", [0.05, 0.6])
 def test_windows_of_a_record_with_noise_and_of_a_real_one_hold_what_verifies(tolerance: float) -> None:
-    record = History(TIME, noisy(ENERGY, 0.002, 5), ("noisy",), "made", "energy")
+    record = of(noisy(ENERGY, 0.002, 5), TIME)
     rollover = read_history([ROLLOVER], Selection(energy=("boxIE_J",)))
     for history, td in ((record, TD), (rollover, 0.37)):
         answer = suggest(history, td, Settings(tolerance=tolerance, replay=tolerance < 0.5))
@@ -195,7 +195,7 @@ def test_windows_of_a_record_with_noise_and_of_a_real_one_hold_what_verifies(tol
 def test_windows_of_several_parts_and_modes_hold_what_verifies(td: float) -> None:
     two = Modes((Mode(100.0, 4.0, 2.0, 3.0, 0.0), Mode(261.0, 4.0, -1.5, 1.0, 0.0)))
     time = np.linspace(0.0, 0.3, 3001)
-    modes = suggest(History(time, two.energy(time), ("made",), "made", "energy"), td, Settings(tolerance=0.4))
+    modes = suggest(of(two.energy(time), time), td, Settings(tolerance=0.4))
     assert isinstance(modes.situation.vibration.whole.mode, Modes)
     check(modes, 1)
     parts = suggest(chain.history(), td, Settings())
@@ -218,7 +218,7 @@ def test_the_swing_of_td_counts_only_where_the_own_tr_lies_on_it() -> None:
     late = suggest(PAPER, 0.068, Settings(after=0.0655))
     assert late.recommended is None
     assert not windows_of(late).size
-    flat = History(np.linspace(0, 1, 50), 1 + 1e-3 * np.cos(np.arange(50) * 2.0), ("flat",), "made", "energy")
+    flat = of(1 + 1e-3 * np.cos(np.arange(50) * 2.0), np.linspace(0, 1, 50))
     quiet = suggest(flat, 0.9, Settings(after=0.1, replay=False))
     assert quiet.recommended
     (window,) = windows_of(quiet)
@@ -256,7 +256,7 @@ def test_what_is_alike_reaches_as_far_as_the_timing_tolerance_and_no_error_in_it
 
 def test_a_profile_is_short_where_the_error_is_smooth() -> None:
     time = np.linspace(0, 0.15, 10_001)
-    answer = suggest(History(time, MODE.energy(time), ("fine",), "made", "energy"), 0.0687534, Settings())
+    answer = suggest(of(MODE.energy(time), time), 0.0687534, Settings())
     windows = windows_of(answer)
     profile = error_profile(answer.situation, answer.candidates, windows)
     assert profile.shape[1] < 20 * len(windows)
@@ -267,7 +267,7 @@ def test_a_profile_is_short_where_the_error_is_smooth() -> None:
 @pytest.mark.slow
 def test_two_oscillators_of_different_rate_share_what_both_verify() -> None:
     other = Mode(1.004 * OMEGA_2, MODE.alpha, MODE.cosine, MODE.sine, MODE.origin)
-    histories = [PAPER, History(TIME, other.energy(TIME), ("other",), "made", "energy")]
+    histories = [PAPER, of(other.energy(TIME), TIME)]
     both = common_windows([windows_of(suggest(history, 0.0687534, Settings())) for history in histories])
     times = np.linspace(0.01, 0.06, 400)
     seen = [examine(history, 0.0687534, Settings()) for history in histories]

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from d2rpick.base.errors import D2RPickError
-from d2rpick.choice.answers import suggest, verify
+from d2rpick.choice.answers import suggest, suggest_of, verify
 from d2rpick.choice.flights import flights_of
-from d2rpick.choice.of_run import suggest_of
 from d2rpick.choice.question import Reference, Settings
 from d2rpick.histories.opening import Selection, open_run
 from tests.real.files import real

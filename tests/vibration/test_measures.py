@@ -29,6 +29,16 @@ def test_measures_by_formula_are_those_of_the_motion(mode: Mode, tr: float, wind
     assert float(replayed_residual(mode, np.array([tr]), td)[0]) == pytest.approx(replay.residual(), abs=1e-6, rel=1e-7)
 
 
+def test_each_measure_has_a_column() -> None:
+    mode, tr = to_mode(paper.OSCILLATOR, 6.0), np.array([0.01, 0.02])
+    found = measures.measured(mode, tr, paper.TD, tr, lambda error, *_: error, of_parts=True)
+    assert (*found,) == measures.Measured._fields
+    assert {column.shape for column in found.values()} == {tr.shape}
+    spread = measures.spread(5, [(np.array([3, 1]), found)])
+    assert measures.compared(spread).tolist() == [False, True, False, True, False]
+    assert spread["timing_tolerance"][[1, 3]].tolist() == [0.02, 0.01]
+
+
 def test_the_published_pair_loses_nearly_all_vibration() -> None:
     mode = to_mode(paper.OSCILLATOR, 6.0)
     assert measures.kinetic_share(mode, paper.TD) == pytest.approx(paper.KINETIC_SHARE, rel=1e-10)

@@ -73,7 +73,7 @@ def test_a_td_at_which_two_modes_set_in_has_nothing_before_it_to_compare() -> No
     assert crossings.are("crossing").all()
     assert (crossings.tr < 2.0).all()
     assert np.isfinite(vibration.reach(crossings)).all()
-    assert not vibration.measured(crossings.tr).compared.any()
+    assert not measures.compared(vibration.measured(crossings.tr)).any()
 
 
 def test_crossings_of_a_level_come_before_the_other_moments() -> None:

@@ -7,14 +7,13 @@ import pytest
 
 from d2rpick.choice.answers import suggest_at, verify_at
 from d2rpick.choice.candidates import judge
-from d2rpick.choice.expectation import MOST_KEPT, expectation, most_energy
 from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import Situation, examine
 from d2rpick.choice.trade_off import offers_of
+from d2rpick.choice.warnings import MOST_KEPT, expectation, most_energy
 from d2rpick.choice.windows import acceptable_windows
-from d2rpick.histories.history import History
 from d2rpick.rules.judgement import faults_of
-from tests.energies import sure
+from tests.energies import of, sure
 
 TIME = np.linspace(0, 1, 2001)
 # Two modes in flight up to 0.8, and a crash of which nothing is told; the mean up to td is far below the energy there.
@@ -23,7 +22,7 @@ ENERGY = (2 + np.sin(90 * TIME) + 0.8 * np.sin(173 * TIME)) * np.where(TIME > 0.
 
 def situation_at(td: float, energy: np.ndarray = ENERGY) -> Situation:
     """See the record from a td in a flight from 0.1 of which no end is known."""
-    found = examine(History(TIME, energy, ("made",), "made", "E"), td, Settings(after=0.1, replay=False))
+    found = examine(of(energy, TIME), td, Settings(after=0.1, replay=False))
     return replace(found, flight=found.flight._replace(start=0.1, end=None, refusal=None))
 
 

@@ -8,17 +8,25 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from d2rpick.choice.answers import suggest, verify
-from d2rpick.choice.candidates import find_candidates
-from d2rpick.choice.quality import GRADES, Quality, quality_of, states_per_period
+from d2rpick.choice.quality import (
+    EQUALLY_GOOD,
+    GRADES,
+    Quality,
+    candidates_at,
+    order,
+    over_limits,
+    quality_of,
+    ranked,
+    states_per_period,
+)
 from d2rpick.choice.question import Settings
-from d2rpick.choice.ranking import EQUALLY_GOOD, order, over_limits, rank
 from d2rpick.choice.situation import examine
 from d2rpick.histories.history import History
 from d2rpick.report.formats import Shown
 from d2rpick.report.suggestion import as_table
 from d2rpick.vibration.span import Fits
 from tests import paper
-from tests.energies import rollover, sure
+from tests.energies import of, rollover, sure
 from tests.reading import solved
 from tests.records import ENERGY, TIME, vibration
 
@@ -66,7 +74,7 @@ def test_tr_does_not_jump_when_td_moves_a_little(parts: str) -> None:
     history, known, found = solved("carT01.gz", parts).history, Fits(), []
     for td in np.arange(0.141, 0.1502, 0.0015).tolist():
         situation = examine(history, td, Settings(), known)
-        best = sure(rank(find_candidates(situation)).chosen)
+        best = sure(next(candidates_at([situation])).chosen)
         assert sure(best.level_error) < 0.06
         found.append(best.tr)
     assert max(found) - min(found) < 3e-3
@@ -75,14 +83,17 @@ def test_tr_does_not_jump_when_td_moves_a_little(parts: str) -> None:
 
 def test_of_times_alike_the_one_that_leaves_the_body_in_place_is_recommended() -> None:
     situation = examine(solved("carT01.gz", "1-17").history, 0.12, Settings())
-    ranked = rank(find_candidates(situation))
     assert situation.bodies is not None
-    judged, tr = ranked.judged, ranked.judged.moments.tr
-    off = replace(ranked, judged=replace(judged, position_error=np.where(tr < 0.0395, 1.0, 0.0)))
-    first, second = ranked[0], rank(off)[0]
-    assert first.tr < 0.0395 < second.tr < first.tr + 0.1 * (0.12 - first.tr)
-    nothing_near = replace(ranked, judged=replace(judged, position_error=np.where(tr < 0.09, 1.0, 0.0)))
-    assert rank(nothing_near)[0].tr == first.tr
+    found = next(candidates_at([situation]))
+
+    def first(until: float) -> float:
+        """The best where those before a time leave the body out of place."""
+        off = np.where(found.judged.moments.tr < until, 1.0, 0.0)
+        return next(ranked(replace(found.judged, columns={**found.judged.columns, "position_error": off})))[0].tr
+
+    best = found[0].tr
+    assert best < 0.0395 < first(0.0395) < best + 0.1 * (0.12 - best)
+    assert first(0.09) == best
 
 
 @cache
@@ -95,7 +106,7 @@ def fits(_: float) -> Fits:
 @pytest.mark.parametrize(("history", "td"), [(paper.history(), paper.TD), (rollover(), 0.37)])
 def test_candidates_are_kept_together_as_one_by_one(history: History, td: float, limits: dict[str, float]) -> None:
     situation = examine(history, td, Settings(**limits), fits(td))  # type: ignore[arg-type]
-    ranked = rank(find_candidates(situation))
+    ranked = next(candidates_at([situation]))
     assert len(ranked) > 3
     kept = ranked.kept.tolist()
     assert kept == [one.acceptable and not over_limits(situation, one) for one in ranked]
@@ -107,7 +118,7 @@ def test_candidates_are_kept_together_as_one_by_one(history: History, td: float,
     assert ranked[-1].tr == ranked.tr[-1]
 
 
-RECORD = History(TIME, ENERGY, ("paper",), "made", "E")
+RECORD = of(ENERGY, TIME)
 
 
 def grade(history: History, td: float, **asked: float | bool) -> str | None:
@@ -129,7 +140,7 @@ def test_the_residual_of_a_known_vibration_decides(td: float) -> None:
 
 def test_the_energy_alone_is_fair_at_best() -> None:
     mode = vibration(np.array([200.0, 2.0, 1.0, 0.0]))
-    record = History(TIME, mode.energy(TIME), ("one",), "made", "E")
+    record = of(mode.energy(TIME), TIME)
     at_a_peak = float(mode.peaks(0.06, 0.08)[0])
     assert grade(record, at_a_peak) == "good"
     assert grade(record, at_a_peak, replay=False, after=0.005) == "fair"
@@ -151,7 +162,7 @@ def test_a_td_near_the_zero_of_the_energy_is_poor_by_the_energy_alone() -> None:
     ids=["a velocity", "a coarse output"],
 )
 def test_a_record_that_no_level_can_be_read_from_is_poor(energy: np.ndarray, reason: str) -> None:
-    history = History(np.linspace(0, 1, 400), energy, ("x",), "made", "E")
+    history = of(energy, np.linspace(0, 1, 400))
     answers = [suggest(history, td, Settings(after=0.1, replay=False)) for td in np.linspace(0.7, 0.9, 3)]
     found = [answer.quality for answer in answers if answer.quality]
     assert found
@@ -162,14 +173,9 @@ def test_a_flight_that_is_not_certain_is_no_better_than_fair() -> None:
     time = np.linspace(0, 1, 500)
     waves = sum((np.sin(rate * time + rate) ** 2 for rate in (30, 47, 71, 103, 151, 199)), np.zeros(500))
     energy = np.where(time < 0.2, 50 * (0.2 - time), 0) + waves
-    answer = suggest(History(time, energy, ("x",), "made", "E"), 0.8, Settings())
+    answer = suggest(of(energy, time), 0.8, Settings())
     assert answer.situation.flight.source == "energy"
     assert sure(answer.quality).grade in ("poor", "fair")
-
-
-def test_rest_is_good() -> None:
-    history = History(TIME, np.full(TIME.size, 3.0), ("x",), "made", "E")
-    assert grade(history, 0.1, after=0.01) == "good"
 
 
 def test_a_pair_is_graded_the_same_whether_it_is_suggested_or_verified() -> None:
@@ -200,7 +206,7 @@ def test_without_a_period_there_are_no_states_of_one() -> None:
 def test_rest_is_good_only_in_a_flight_that_is_certain() -> None:
     time = np.linspace(0, 1, 201)
     energy = np.where(time < 0.2, 50 * time, 10.0) + 1e-5 * np.random.default_rng(1).random(201)
-    found = suggest(History(time, energy, ("made",), "made", "E"), 0.9, Settings(after=0.25))
+    found = suggest(of(energy, time), 0.9, Settings(after=0.25))
     assert found.situation.at_rest
     assert found.quality == Quality("good")
     guessed = replace(found.situation, flight=found.situation.flight._replace(source="energy"))
@@ -208,37 +214,43 @@ def test_rest_is_good_only_in_a_flight_that_is_certain() -> None:
     assert quality_of(guessed, sure(found.chosen), None) == Quality("fair", ("the flight is not certain",))
 
 
-@pytest.mark.parametrize("vibration", [0.05, 2.6])
-def test_plastic_work_hides_no_vibration(vibration: float) -> None:
+UNIT, FINE = np.linspace(0, 1, 401), np.linspace(0, 1, 2001)
+DAMPED = 100 + 2.6 * np.exp(-40 * FINE) * (1 + np.cos(150 * FINE) * np.cos(97 * FINE))
+STATES = np.arange(400)
+EARLY = np.where(STATES < 12, 1e-12, 1.0 + np.sin(STATES) ** 2)
+
+
+def crushed(vibration: float) -> np.ndarray:
     """Of 100 J of which little vibrates, the level says nothing: a frozen tr may be wrong by all of the vibration."""
-    time = np.linspace(0, 1, 401)
-    swinging = sum(np.sin(rate * time + rate) ** 2 for rate in (31.0, 47.0, 66.0)) / 3
-    energy = 100 * np.minimum(time / 0.1, 1) ** 2 + vibration * np.where(time > 0.1, swinging, 0)
-    found = suggest(History(time, energy, ("made",), "made", "E"), 0.9, Settings(after=0.15))
-    assert not found.situation.at_rest
-    assert found.quality is None or found.quality.grade != "good"
-    still = suggest(
-        History(time, energy - energy * (time > 0.1) + 100.0 * (time > 0.1), ("made",), "made", "E"),
-        0.9,
-        Settings(after=0.15),
-    )
-    assert still.situation.at_rest
+    swinging = sum(np.sin(rate * UNIT + rate) ** 2 for rate in (31.0, 47.0, 66.0)) / 3
+    return np.asarray(100 * np.minimum(UNIT / 0.1, 1) ** 2 + vibration * np.where(UNIT > 0.1, swinging, 0))
 
 
-@pytest.mark.slow
-def test_a_vibration_that_was_damped_out_is_rest() -> None:
-    time = np.linspace(0, 1, 2001)
-    energy = 100 + 2.6 * np.exp(-40 * time) * (1 + np.cos(150 * time) * np.cos(97 * time))
-    record = History(time, energy, ("made",), "made", "E")
-    assert suggest(record, 0.9, Settings(after=0.5)).situation.at_rest
-    assert not suggest(record, 0.9, Settings(after=0.05)).situation.at_rest
+@pytest.mark.parametrize(
+    ("energy", "time", "td", "after", "rest"),
+    [
+        (np.full(TIME.size, 3.0), TIME, 0.1, 0.01, True),
+        (crushed(0.05), UNIT, 0.9, 0.15, False), (crushed(2.6), UNIT, 0.9, 0.15, False),
+        (crushed(0.0), UNIT, 0.9, 0.15, True),
+        (DAMPED, FINE, 0.9, 0.5, True), (DAMPED, FINE, 0.9, 0.05, False),
+        # one state and td in the same output interval say nothing of what happens between them
+        (np.tile([1.5, 2.5, 1.0, 2.5], 10), np.linspace(0, 3.9, 40), 2.2, 2.15, False),
+        (EARLY, 0.1 * STATES, 0.85, 0.0, False), (EARLY, 0.1 * STATES, 1.05, 0.0, True),
+    ],
+)  # fmt: skip
+def test_rest_is_told_from_a_vibration_which_is_not_good(
+    energy: np.ndarray, time: np.ndarray, td: float, after: float, rest: bool
+) -> None:
+    found = suggest(of(energy, time), td, Settings(after=after))
+    assert found.situation.at_rest is rest
+    assert rest or found.quality != Quality("good")
 
 
 def test_what_a_wrong_sign_would_cost_is_told() -> None:
     """Of sqrt((4 E + T)/(E + T)): twice the vibration at most, what moves at td less."""
     time = np.linspace(0, 1, 801)
     energy = np.sum([np.sin(rate * time + rate) ** 2 for rate in (31.0, 47.0, 66.0)], axis=0)
-    answer = suggest(History(time, energy, ("made",), "made", "E"), 0.9, Settings(replay=False, after=0.0))
+    answer = suggest(of(energy, time), 0.9, Settings(replay=False, after=0.0))
     cost = f"{(4 - 3 * sure(answer.expected).kinetic_share) ** 0.5:.0%}"
     told = f"the sign of the deformation is unknown, and with a wrong one the vibration after td is off by {cost}"
     assert sure(answer.quality).reasons == (told,)
@@ -264,34 +276,17 @@ def test_a_flight_that_vibrates_later_was_never_at_rest() -> None:
     """A structure that rings in many modes is quiet for moments; free flight excites nothing anew."""
     time = np.linspace(0, 1, 201)
     energy = np.where(time < 0.2, 50 * time, 10.0) + 1.5 * (time > 0.5) * np.sin(200 * time) ** 2
-    quiet = suggest(History(time, energy, ("made",), "made", "E"), 0.4, Settings(after=0.25)).situation
+    quiet = suggest(of(energy, time), 0.4, Settings(after=0.25)).situation
     assert quiet.at_rest  # of what comes after td nothing is known
     assert not replace(quiet, flight=quiet.flight._replace(end=0.9)).at_rest
     assert replace(quiet, flight=quiet.flight._replace(end=0.5)).at_rest
-
-
-def test_between_few_states_nothing_is_called_at_rest() -> None:
-    """One state and td in the same output interval say nothing of what happens between them."""
-    energy = np.tile([1.5, 2.5, 1.0, 2.5], 10)
-    record = History(np.linspace(0, 3.9, 40), energy, ("coarse",), "made", "E")
-    found = suggest(record, 2.2, Settings(after=2.15))
-    assert not found.situation.at_rest
-    assert found.quality is None or found.quality.grade != "good"
-
-
-def test_between_few_states_not_even_round_off_is_called_rest() -> None:
-    energy = np.where(np.arange(400) < 12, 1e-12, 1.0 + np.sin(np.arange(400)) ** 2)
-    record = History(np.linspace(0, 39.9, 400), energy, ("early",), "made", "E")
-    early, later = (suggest(record, td, Settings(after=0.0)).situation for td in (0.85, 1.05))
-    assert not early.at_rest
-    assert later.at_rest
 
 
 def test_where_nothing_vibrates_there_is_no_residual() -> None:
     """What is left of a vibration when its energy is round-off is described by the oscillator, and is nothing."""
     time = np.linspace(0, 1, 4001)
     energy = (np.exp(-25 * time) * np.sin(120 * time)) ** 2
-    found = suggest(History(time, energy, ("decayed",), "made", "E"), 0.95, Settings(after=0.6))
+    found = suggest(of(energy, time), 0.95, Settings(after=0.6))
     assert found.situation.vibration.unknown is None
     assert found.situation.at_rest
     assert found.situation.kinetic_share is None
