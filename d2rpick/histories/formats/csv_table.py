@@ -139,9 +139,11 @@ class Table(Database):
         if wanted in self._columns and wanted not in self._layout.names:
             return wanted
         column = named_column(self.source, self._layout, wanted)
-        if column == self._time:
-            raise FormatError(f"{self.source}: {wanted!r} is the time column; choose another one as energy")
-        return next(label for label, own in self._columns.items() if own == column)
+        label = next((label for label, own in self._columns.items() if own == column), None)
+        if label is None:
+            article = "the" if column == self._time else "a"
+            raise FormatError(f"{self.source}: {wanted!r} is {article} time column; choose another one as energy")
+        return label
 
     @cached_property
     def time(self) -> Samples:

@@ -165,6 +165,7 @@ def test_curves_side_by_side_have_times_of_their_own() -> None:
         (FOUR, ["0"], "no column '0'"),
         (FOUR, ["KE", "ke"], "given twice"),
         (FOUR, ["1"], "'1' is the time column; choose"),
+        (SIDE_BY_SIDE, ["IE", "3"], "'3' is a time column; choose"),
         ("time,IE,ie\n0,1,2\n1,2,3\n", ["Ie"], "'Ie' may be any of these columns: 2 'IE', 3 'ie'"),
         ("time,IE,IE\n0,1,2\n1,2,3\n", [], "2 columns are named"),
         ("time,3,2\n0,1,2\n1,2,3\n", ["2"], "may be any of these"),
