@@ -1,8 +1,4 @@
-"""Readers of energy histories: one module per format, one table of formats.
-
-A reader is a module with the two functions of `Reader`; a new format is a new module and a line in `READERS`.  It is
-imported when a file may be its own: start-up is part of the product.
-"""
+"""From the files of a run to what they hold: the reader of each is found by its content."""
 
 from __future__ import annotations
 
@@ -11,18 +7,18 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Final, Protocol, cast
 
 from d2rpick.base.errors import FormatError
-from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.companions import check_companions, check_legs
 from d2rpick.histories.database import Database, Legs
+from d2rpick.histories.formats import READERS
 from d2rpick.histories.names import Selection
 from d2rpick.histories.run import Run
 from d2rpick.histories.source import Source, open_files
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
 
-__all__ = ["READERS", "Reader", "Run", "Selection", "Source", "open_run", "open_sources", "reader"]
+__all__ = ["Reader", "Run", "Selection", "Source", "open_run", "open_sources", "reader"]
 
 # Enough of a file for its head and more than one state of the longest blocks.
 _HEAD = 8192
@@ -51,25 +47,6 @@ class Reader(Protocol):
 
     def open_legs(self, sources: Sequence[Source], selection: Selection) -> Sequence[Database]:
         """Open files of this format as the legs of one run; FormatError when one is none."""
-
-
-class Listed(NamedTuple):
-    """Module of a reader, and what its files have in their head: a regular expression that is found there."""
-
-    module: str
-    hint: bytes
-
-
-# In the order they are asked, and in which they are preferred as sources of one quantity: binary before text, since it
-# holds more digits; csv takes any text, so it comes last.
-READERS: Final[Mapping[str, Listed]] = {
-    "binout": Listed("binout", rb"\A[\x08-\x40].{5}\0"),
-    "radioss-th": Listed("radioss_th", rb"\A\0\0\0T|ZZZZZEOR"),
-    "glstat": Listed("glstat", rb" time\.|ls-dyna"),
-    "matsum": Listed("matsum", rb" time =|{BEGIN LEGEND}"),
-    "hdf5": Listed("hdf5_file", rb"\x89HDF"),
-    "csv": Listed("csv_table", b""),
-}
 
 
 def reader(kind: str) -> Reader:
@@ -126,7 +103,7 @@ def _refuse_unknown_channels(databases: Sequence[Legs], selection: Selection) ->
 
 def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:
     """Refuse ``--time`` where it would be passed over: solvers have one time and call it so."""
-    if time is not None and time.strip().casefold() != "time" and not {"csv", "hdf5"} & {*kinds}:
+    if time is not None and time.strip().casefold() != "time" and all(READERS[kind].solver for kind in kinds):
         raise FormatError(f"no time {time!r} in {' and '.join(kinds)}, the time is 'time'; leave `time` out")
 
 
