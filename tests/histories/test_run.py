@@ -11,11 +11,10 @@ import pytest
 
 from d2rpick.base.errors import FormatError
 from d2rpick.choice.overview import survey
-from d2rpick.histories.companions import check_companions
 from d2rpick.histories.database import Legs
 from d2rpick.histories.formats import READERS, binout, csv_table, glstat, matsum, radioss_th
 from d2rpick.histories.history import Samples
-from d2rpick.histories.opening import Run, Selection, open_run, reader
+from d2rpick.histories.opening import Run, Selection, check_companions, open_run, reader
 from d2rpick.histories.source import Source
 from tests.command import put
 from tests.computed import stored
