@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from functools import cached_property
 from itertools import chain, islice
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -26,28 +26,22 @@ _UTF8: Final = b"\xef\xbb\xbf"
 HEAD: Final = 10_000
 
 
-class Portions(NamedTuple):
-    """How much of a text is looked at together."""
-
-    head: int = HEAD  # lines that tell its form
-    piece: int = 1 << 17  # bytes: their cells stay in the processor's cache
-    short: int = 1 << 16  # a text of no more bytes is looked at as a whole to judge the printed format
-    sample: int = 100  # of others so many lines from the start, the end and between
-    large: int = 1 << 21  # bytes of a large text: each call of pandas takes a millisecond
-
-
-_PORTIONS: Final = Portions()
-
-
 class Text:
     """Lines of a file, line ends as line feeds; ``unended`` is the last one when it has no end, else empty.
 
     A big file in plain ASCII stays on its disk.  FormatError for binary data, and for a line beyond the bound.
     """
 
-    def __init__(self, source: Source, portions: Portions = _PORTIONS) -> None:
-        self.name, self._portions = source.name, portions
-        self._data, self._encoding = _plain(source, portions.piece)
+    # How much is looked at together.
+    top = HEAD  # lines that tell its form
+    piece = 1 << 17  # bytes: their cells stay in the processor's cache
+    short = 1 << 16  # a text of no more bytes is looked at as a whole to judge the printed format
+    some = 100  # of others so many lines from the start, the end and between
+    large = 1 << 21  # bytes of a large text: each call of pandas takes a millisecond
+
+    def __init__(self, source: Source) -> None:
+        self.name = source.name
+        self._data, self._encoding = _plain(source, self.piece)
         self._check_lines()
         self._end = self._data.rfind(b"\n", 0, len(self._data)) + 1  # behind the last line that counts
         self.unended = self._text(self._data[self._end :])
@@ -55,16 +49,16 @@ class Text:
     @property
     def head(self) -> list[str]:
         """The first lines that have an end, as many as tell its form."""
-        return self._first[: self._portions.head]
+        return self._first[: self.top]
 
     @property
     def is_short(self) -> bool:
         """Whether ``head`` holds all lines but the last one without end."""
-        return len(self._first) <= self._portions.head
+        return len(self._first) <= self.top
 
     @cached_property
     def _first(self) -> list[str]:
-        return list(islice(self.lines(0), self._portions.head + 1))
+        return list(islice(self.lines(0), self.top + 1))
 
     def place(self, line: int) -> int:
         """Where a line begins, counted from 0 [byte]; the end of the lines where there are fewer."""
@@ -87,7 +81,7 @@ class Text:
 
         FormatError behind the last of them where the file was written anew meanwhile.
         """
-        size = self._portions.large if large else self._portions.piece
+        size = self.large if large else self.piece
         while begin < self._end:
             piece = self._data[begin : min(begin + size, self._end)]
             end = piece.rfind(b"\n") + 1
@@ -109,8 +103,8 @@ class Text:
 
     def sample(self, begin: int) -> list[str]:
         """Lines behind byte ``begin`` from the start, the end and evenly between; all of a short text."""
-        data, end, count = self._data, self._end, self._portions.sample
-        if end - begin <= self._portions.short:
+        data, end, count = self._data, self._end, self.some
+        if end - begin <= self.short:
             return [] if begin >= end else self._text(data[begin:end]).removesuffix("\n").split("\n")
         starts, first, last = [], begin, end
         for _ in range(count):

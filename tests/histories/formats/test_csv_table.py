@@ -9,7 +9,7 @@ from hypothesis import example, given, strategies as st
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.content import OnDisk
 from d2rpick.histories.formats import csv_table
-from d2rpick.histories.formats.text import Portions, Text
+from d2rpick.histories.formats.text import Text
 from d2rpick.histories.history import EXACT, History, Precision
 from d2rpick.histories.opening import Selection
 from d2rpick.histories.source import Source
@@ -274,7 +274,8 @@ LINES = [*ROWS, *(f"{{}},{cell}" for cell in CELLS), "# comment", "# {},1", "", 
 def in_pieces(data: bytes | OnDisk, size: int) -> object:
     """States of a table that is read in pieces of so many bytes, or what is wrong with it."""
     try:
-        table = csv_table.Table(Text(Source("table", data), Portions(piece=size, large=size)), Selection())
+        sized = type("Sized", (Text,), {"piece": size, "large": size})
+        table = csv_table.Table(sized(Source("table", data)), Selection())
         return table.time.tolist(), table.channel(table.energy_channel).tolist()
     except FormatError as error:
         return str(error)
