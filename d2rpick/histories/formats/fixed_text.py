@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 _RECENT: Final = 12  # layouts tried before a block is taken apart
 _LINE: Final = 1 << 10  # no first line of a block is longer
-_NEAR: Final = 1 << 12  # fields closer than this are compared in one piece
 
 
 class Blocks(Database):
@@ -295,7 +294,7 @@ class Blocks(Database):
         return count
 
     def _alike(self, names: Sequence[Hashable], anchors: Sequence[Hashable]) -> bool:
-        """Tell whether in all blocks the text from anchors to numbers is that of their examples.
+        """Tell whether in all blocks the text from the first anchor to the last number is that of their examples.
 
         False without a look where that is most of a block: to compare all of it costs no more.
         """
@@ -305,18 +304,9 @@ class Blocks(Database):
         if run.repeats == 1 and run.start == run.example:
             return True
         layout = self.layout(run.example, run.stride)
-        first = np.array([layout.fields[anchor] for anchor in anchors])
-        order = np.argsort(first)
-        behind = offsets[order] + self._grammar.width + 1  # what follows a number is compared, too
-        first, last = first[order], np.maximum.accumulate(behind)
-        gaps = np.flatnonzero(first[1:] - last[:-1] > _NEAR) + 1
-        pieces = [
-            (int(firsts[0]), int(lasts[-1]))
-            for firsts, lasts in zip(np.split(first, gaps), np.split(last, gaps), strict=True)
-        ]
-        return 2 * sum(high - low for low, high in pieces) <= run.stride and all(
-            like_example(self._data, run, low, layout.literal[low:high]) == run.repeats for low, high in pieces
-        )
+        first = min(layout.fields[anchor] for anchor in anchors)
+        text = layout.literal[first : int(offsets.max()) + self._grammar.width + 1]  # with what follows a number
+        return 2 * text.size <= run.stride and like_example(self._data, run, first, text) == run.repeats
 
     def _is_even(self) -> bool:
         """Tell whether all blocks but the last have one size, and look alike at both ends of the file."""
