@@ -86,13 +86,6 @@ def test_legs_are_ordered_by_their_start_and_the_newer_one_wins() -> None:
     assert "time steps back once (restart); where legs overlap the newer one counts" in history.notes[0]
 
 
-def test_legs_of_time_histories_may_overlap_too() -> None:
-    first, second = bytes(t01(6).data), bytes(t01(4, start=3).data)
-    run = run_of(radioss_th, second, first)
-    assert run.history(Selection()).time.tolist() == [state / 8 for state in range(7)]
-    assert "where legs overlap the newer one counts" in run.notes[0]
-
-
 def test_a_leg_that_gives_no_state_is_named() -> None:
     """Two runs that start alike are hardly legs."""
     history = history_of(glstat, glstat_text([1, 2], [1, 2]), glstat_text([1, 2], [3, 4]))
