@@ -8,7 +8,7 @@ from pathlib import Path
 from d2rpick.base.errors import FormatError
 from d2rpick.base.files import at_rest
 from d2rpick.choice.question import Reference
-from d2rpick.histories.content import OnDisk, Portions
+from d2rpick.histories.content import OnDisk
 from d2rpick.histories.database import Legs
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Reader, Run, Selection, open_run, open_sources
@@ -16,7 +16,11 @@ from d2rpick.histories.source import Source
 from tests.command import ROOT
 from tests.computed import stored
 
-SMALL = Portions(block=256, gap=32, window=64)
+
+class InPieces(OnDisk):
+    """Read in pieces that are small even beside the files of tests."""
+
+    block, gap, window = 256, 32, 64
 
 
 def run_of(reader: Reader, *contents: bytes | str, selection: Selection | None = None, name: str = "run") -> Run:
@@ -56,12 +60,12 @@ def read_history(names: Sequence[str], selection: Selection | None = None, input
     return read(names, selection, input_format).history
 
 
-def on_disk(file: Path, portions: Portions = SMALL, of: type[OnDisk] = OnDisk) -> OnDisk:
-    """Content of a file that stays on its disk and is read in small pieces, however small it is itself."""
+def on_disk(file: Path, of: type[OnDisk] = InPieces) -> OnDisk:
+    """Content of a file that stays on its disk, however small it is itself."""
     with file.open("rb", buffering=0) as opened:
         state = at_rest(str(file), opened, FormatError, may_grow=True)
         assert not isinstance(state, bytes)
-        return of(str(file), os.dup(opened.fileno()), state, portions)
+        return of(str(file), os.dup(opened.fileno()), state)
 
 
 def run_of_file(file: Path) -> Run:

@@ -14,7 +14,7 @@ import pytest
 
 import d2rpick
 from d2rpick.cli import COMMANDS
-from d2rpick.histories.opening import READERS
+from d2rpick.histories.formats import READERS
 from d2rpick.rules import RULES, read_configuration
 from tests.command import DECK, ENERGY, GLSTAT, ROOT, run
 from tests.examples import PAGES, blocks, folder_of_a_reader, languages, printed, prose, rounded, sessions, text_of

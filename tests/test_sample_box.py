@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from d2rpick.histories.formats import READERS
 from d2rpick.histories.history import History
-from d2rpick.histories.opening import READERS, Selection, open_run
+from d2rpick.histories.opening import Selection, open_run
 from d2rpick.models.box_model import Parameters
 from d2rpick.models.box_run import Record, simulate
 from tests import sample_box

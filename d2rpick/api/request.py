@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import ArgumentError
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.histories.formats import READERS
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
@@ -35,8 +36,6 @@ TIME, POSITIVE, NOT_NEGATIVE, FRACTION = Number(), Number(0.0, above=True), Numb
 MIN_MEAN_ENERGY: Final = 0.7  # of the reference's; in computed runs that were switched well it was 0.77 and more
 AT_LEAST_ONE: Final = Number(1.0)  # elements that are rigid no longer limit the step: it cannot become smaller
 UNLIMITED: Final = 2**63  # the end of a range of whole numbers that has none
-# of d2rpick.histories.opening, which is too heavy to be imported for --help; a test holds them together
-FORMATS: Final = ("binout", "radioss-th", "glstat", "matsum", "hdf5", "csv")
 
 
 class Option(NamedTuple):
@@ -98,7 +97,7 @@ class Request:
         *("file", "HISTORY"), many=True,
     )  # fmt: skip
     input_format: str = option(
-        "Format of the history; auto recognises it by content.", ("auto", *FORMATS), default="auto", short=("-F",)
+        "Format of the history; auto recognises it by content.", ("auto", *READERS), default="auto", short=("-F",)
     )
     time: str | None = option("Time column, by name, number or HDF5 path.", metavar="NAME|NUMBER")
     energy: tuple[str, ...] = option(

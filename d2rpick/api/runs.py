@@ -264,7 +264,7 @@ def _opened(sources: list[Source], chosen: Selection, input_format: str) -> Run:
 
 def known_format(input_format: str) -> str:
     """Give the name of a format, or ``"auto"``; ValueError for any other."""
-    from d2rpick.histories.opening import READERS
+    from d2rpick.histories.formats import READERS
 
     if input_format not in ("auto", *READERS):
         raise ValueError(f"input_format is {input_format!r}, one of auto, {', '.join(READERS)} was expected")

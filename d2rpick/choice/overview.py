@@ -16,7 +16,7 @@ from d2rpick.choice.switched_run import Times, by_the_model, rigid_times
 from d2rpick.flight.momentum import with_parts_by_number
 from d2rpick.flight.window import FreeFlight
 from d2rpick.histories.balance import balance_of
-from d2rpick.histories.companions import doubts
+from d2rpick.histories.database import doubts
 from d2rpick.histories.history import History, rows_of
 from d2rpick.histories.names import Part, Selection, select_parts
 from d2rpick.histories.samples import median

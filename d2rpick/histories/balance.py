@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.errors import FormatError, if_written
+from d2rpick.histories.formats import READERS
 from d2rpick.histories.history import Balance, Momenta, Samples
 from d2rpick.histories.names import Part, is_internal_energy, normalised
 from d2rpick.histories.samples import median
@@ -185,10 +186,8 @@ def _hourglass_of(
     return ()
 
 
-# Radioss; glstat of LS-DYNA and its branch of a binout.
+# Radioss; glstat of LS-DYNA and its branch of a binout.  In a table the names may mean anything.
 _SPRINGS: Final = frozenset({"springenergy", "springanddamperenergy"})
-# Formats in which these names mean that.
-_SOLVERS: Final = frozenset({"radioss-th", "glstat", "binout"})
 # Below this share of the peak internal energy springs have none: single precision and glstat print six digits.
 _NONE: Final = 1e-6
 # LS-DYNA begins to count at 1e-20.
@@ -202,7 +201,7 @@ _HALF: Final = 0.5
 def spring_energy(database: Legs) -> tuple[str, Samples] | None:
     """Give name and values (n,) of the energy of all springs and dampers; None where there is none, or no other."""
     total = database.energy_channel
-    if database.format not in _SOLVERS or total is None:
+    if not READERS[database.format].solver or total is None:
         return None
     name = next((name for name in database.channels if normalised(name) in _SPRINGS), None)
     if name is None:

@@ -16,7 +16,6 @@ import numpy as np
 
 from d2rpick.base.errors import ChangedError, FormatError
 from d2rpick.base.files import FileState, at_rest, settled_state
-from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,17 +26,6 @@ if TYPE_CHECKING:
 _HELD: Final = 1 << 24  # a file up to this size is held in memory
 _LINES: Final = 1 << 16  # bytes in which line ends are counted at a time
 _END: Final = 1 << 12  # bytes at both ends of what counts, by which a file that has grown is known again
-
-
-class Portions(NamedTuple):
-    """How many bytes of a file are read at a time."""
-
-    block: int = 1 << 19  # where many are wanted, a power of 2: they stay in the cache meanwhile
-    gap: int = 1 << 13  # between two that are read together: a call of the system costs more than these
-    window: int = 1 << 16  # where few are wanted: more will be, mostly behind them
-
-
-_PORTIONS: Final = Portions()
 
 
 class Content:
@@ -91,14 +79,17 @@ class OnDisk(Content):
         Its descriptor, which is closed with this object.
     state : FileState
         Its state at rest.
-    portions : Portions
     """
 
-    def __init__(self, name: str, file: int, state: FileState, portions: Portions = _PORTIONS) -> None:
+    # How many bytes are read at a time.
+    block = 1 << 19  # where many are wanted, a power of 2: they stay in the cache meanwhile
+    gap = 1 << 13  # between two that are read together: a call of the system costs more than these
+    window = 1 << 16  # where few are wanted: more will be, mostly behind them
+
+    def __init__(self, name: str, file: int, state: FileState) -> None:
         from threading import Lock, local  # not above: most files are small
 
         self._name, self._number = name, file
-        self._block, self._gap, self._window = portions
         self._file = FileIO(file, closefd=False)
         self._lock, self._own = Lock(), local()  # of each thread: its buffer and its window
         self._state, self._size = state, state.size
@@ -123,26 +114,26 @@ class OnDisk(Content):
         begin, end, _ = where.indices(self._size)
         window, first = getattr(self._own, "window", (b"", 0))
         if begin < end and (begin < first or end > first + len(window)):
-            if end - begin > self._window:
+            if end - begin > self.window:
                 return self.view(begin, end).tobytes()
             # who goes backwards will want more before it
-            first = begin if begin >= first else max(0, end - self._window)
-            window = self.view(first, min(first + self._window, self._size)).tobytes()
+            first = begin if begin >= first else max(0, end - self.window)
+            window = self.view(first, min(first + self.window, self._size)).tobytes()
             self._own.window = window, first
         return bytes(window[begin - first : end - first]) if begin < end else b""
 
     def find(self, wanted: bytes, begin: int = 0) -> int:
         """Address of the first ``wanted`` from ``begin`` on, -1 where there is none."""
-        for at in range(begin, self._size, self._gap):
-            found = self[at : at + self._gap + len(wanted) - 1].find(wanted)
+        for at in range(begin, self._size, self.gap):
+            found = self[at : at + self.gap + len(wanted) - 1].find(wanted)
             if found >= 0:
                 return at + found
         return -1
 
     def rfind(self, wanted: bytes, begin: int, end: int) -> int:
         """Address of the last byte ``wanted`` from ``begin`` on and before ``end``, -1 where there is none."""
-        for stop in range(end, begin, -self._gap):
-            first = max(begin, stop - self._gap)
+        for stop in range(end, begin, -self.gap):
+            first = max(begin, stop - self.gap)
             found = self[first:stop].rfind(wanted)
             if found >= 0:
                 return first + found
@@ -165,17 +156,17 @@ class OnDisk(Content):
 
     def _room(self, size: int) -> Bytes:
         """Room for so many bytes, that of few used again and again: fresh memory costs more than reading."""
-        if size > 2 * self._block:
+        if size > 2 * self.block:
             return np.empty(size, np.uint8)
         if not hasattr(self._own, "buffer"):
-            self._own.buffer = np.empty(2 * self._block, np.uint8)
+            self._own.buffer = np.empty(2 * self.block, np.uint8)
         buffer: Bytes = self._own.buffer
         return buffer[:size]
 
     def _in_order(self, addresses: Addresses, width: int) -> Bytes:
         """Read what lies close together in one piece, and what lies alone by itself."""
         found = np.empty((addresses.size, width), np.uint8)
-        apart = (np.diff(addresses) > self._gap) | (np.diff(addresses & -self._block) > 0)
+        apart = (np.diff(addresses) > self.gap) | (np.diff(addresses & -self.block) > 0)
         firsts = np.flatnonzero(np.append(True, apart)) if addresses.size else np.empty(0, np.int64)
         ends = np.append(firsts[1:], addresses.size)
         several = ends - firsts > 1
@@ -194,8 +185,8 @@ class OnDisk(Content):
             import hashlib
 
             digest = hashlib.sha256()
-            for begin in range(0, self._size, self._block):
-                digest.update(self.view(begin, min(begin + self._block, self._size)).data)
+            for begin in range(0, self._size, self.block):
+                digest.update(self.view(begin, min(begin + self.block, self._size)).data)
             self.check()
             self._digest = digest.hexdigest()
         return self._digest

@@ -1,10 +1,14 @@
-"""Database: what a file of a run offers, its columns read only when they are asked for; several legs as one."""
+"""Database: what a file of a run offers, its columns read only when they are asked for; several legs as one.
+
+Databases of different formats that one run wrote are companions: whether they can be of one run is seen here, too.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
 from contextlib import suppress
 from functools import cached_property
+from itertools import combinations
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -12,13 +16,14 @@ import numpy as np
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.history import Precision, Samples
 from d2rpick.histories.names import Part, quantity_of, resolve, with_namesakes
-from d2rpick.histories.samples import newest_states
+from d2rpick.histories.samples import newest_states, window
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
+    Indices = NDArray[np.intp]
 
 # A restart steps back once; times that do so in more than this share of their states are none.
 _MOST_BACK: Final = 0.1
@@ -284,3 +289,81 @@ def _holes(time: Samples) -> tuple[str, ...]:
     steps = np.diff(time)
     holes = np.flatnonzero(steps > _LONG * np.sort(steps)[steps.size // 2])
     return tuple(f"no states between {time[i]:.6g} and {time[i + 1]:.6g}; is a leg missing?" for i in holes[:3])
+
+
+# Output intervals may differ, but a solver writes at its own cycles: unless less than this share of the states of the
+# coarser database are at times of the other one, both may be of one run.
+_FEWEST = 0.5
+
+# A run ends in all its databases within their output intervals; so many of the longest one are left for what a run that
+# is killed has not written yet.
+_ENDS_APART = 2.0
+
+# Parts have no more internal energy than the model they belong to.  In files of solvers their sum exceeds it by less
+# than 0.1 % of the largest; beyond this share, and round-off beside the kinetic energy, they are of another run.
+_MORE, _ROUND_OFF = 0.1, 1e-6
+
+
+def check_sum(whole: Legs, holder: Legs, energies: Samples) -> None:
+    """Refuse parts that have more internal energy than the whole model has at the same times.
+
+    ``energies``: those of some parts of ``holder``, shape (n, parts) [energy].
+    """
+    try:
+        if whole is holder or whole.energy_channel is None:
+            return
+    except FormatError:  # which column it is, is not asked here
+        return
+    here, there = _coincident(holder.part_time, whole.time, _room((holder, whole), (holder.part_time, whole.time)))
+    if not here.size:
+        return
+    parts, model = energies[here].sum(axis=1), whole.channel(whole.energy_channel)[there]
+    kinetic = whole.quantities.get("kinetic_energy")
+    moving = float(np.abs(whole.channel(kinetic)[there]).max()) if kinetic else 0.0
+    room, most = _MORE * float(np.abs(model).max()) + _ROUND_OFF * moving, int(np.argmax(parts - model))
+    if parts[most] - model[most] > room > 0:
+        found = (
+            f"at {holder.part_time[here][most]:.6g} the parts of {holder.source} have an energy of {parts[most]:.6g}"
+        )
+        what = f"{found}, the whole model of {whole.source} has {model[most]:.6g}: files of one run were expected"
+        raise FormatError(f"{what}; give those of one run")
+
+
+def doubts(databases: Sequence[Legs]) -> Iterator[str]:
+    """Say which databases have hardly a state at the same time, within their printed digits, or end apart."""
+    for one, other in combinations(databases, 2):
+        if not (one.span and other.span):
+            continue
+        times = [_times(database)[0] for database in (one, other)]
+        if abs(times[0][-1] - times[1][-1]) > _ENDS_APART * max(np.diff(t).max(initial=0.0) for t in times):
+            found = f"{one.source} ends at {times[0][-1]:.6g} and {other.source} at {times[1][-1]:.6g}"
+            yield f"{found}; are they from the same run, or is one cut?"
+        low, high = max(t[0] for t in times), min(t[-1] for t in times)
+        coarse, fine = sorted((t[window(t, low, high)] for t in times), key=np.size)
+        shared = _coincident(coarse, fine, _room((one, other), times))[0].size
+        if shared < _FEWEST * coarse.size:
+            found = f"{one.source} and {other.source} have only {shared} of {coarse.size} states at the same times"
+            yield f"{found}; are they from the same run?"
+
+
+def _coincident(times: Samples, others: Samples, room: float) -> tuple[Indices, Indices]:
+    """Indices of the times that lie within ``room`` [time] of one of the others, and of the nearest of these.
+
+    Examples
+    --------
+    >>> _coincident(np.array([0.0, 0.0048730, 0.0099579]), np.array([0.0, 0.00487301, 0.00995]), 5e-7)
+    (array([0, 1]), array([0, 1]))
+    """
+    if not others.size:
+        return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp)
+    behind = np.searchsorted(others, times)
+    before, after = (np.clip(behind - step, 0, others.size - 1) for step in (1, 0))
+    nearest = np.where(np.abs(others[before] - times) < np.abs(others[after] - times), before, after)
+    here = np.flatnonzero(np.abs(others[nearest] - times) <= room)
+    return here, nearest[here]
+
+
+def _room(databases: Sequence[Legs], times: Sequence[Samples]) -> float:
+    """By how much a time may differ in two databases, as they print it [time]."""
+    ends = zip(databases, times, strict=True)
+    return sum(database.precisions(())[0].quantum(float(time[-1])) for database, time in ends if time.size) / 2

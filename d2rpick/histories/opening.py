@@ -1,28 +1,29 @@
-"""Readers of energy histories: one module per format, one table of formats.
-
-A reader is a module with the two functions of `Reader`; a new format is a new module and a line in `READERS`.  It is
-imported when a file may be its own: start-up is part of the product.
-"""
+"""From the files of a run to what they hold: the reader of each is found by its content."""
 
 from __future__ import annotations
 
 import re
 from importlib import import_module
+from itertools import combinations
 from typing import TYPE_CHECKING, Final, Protocol, cast
 
+import numpy as np
+
 from d2rpick.base.errors import FormatError
-from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.companions import check_companions, check_legs
 from d2rpick.histories.database import Database, Legs
+from d2rpick.histories.formats import READERS
 from d2rpick.histories.names import Selection
 from d2rpick.histories.run import Run
 from d2rpick.histories.source import Source, open_files
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
+
+    from d2rpick.histories.database import Indices
+    from d2rpick.histories.history import Samples
 
 
-__all__ = ["READERS", "Reader", "Run", "Selection", "Source", "open_run", "open_sources", "reader"]
+__all__ = ["Reader", "Run", "Selection", "Source", "open_run", "open_sources", "reader"]
 
 # Enough of a file for its head and more than one state of the longest blocks.
 _HEAD = 8192
@@ -51,25 +52,6 @@ class Reader(Protocol):
 
     def open_legs(self, sources: Sequence[Source], selection: Selection) -> Sequence[Database]:
         """Open files of this format as the legs of one run; FormatError when one is none."""
-
-
-class Listed(NamedTuple):
-    """Module of a reader, and what its files have in their head: a regular expression that is found there."""
-
-    module: str
-    hint: bytes
-
-
-# In the order they are asked, and in which they are preferred as sources of one quantity: binary before text, since it
-# holds more digits; csv takes any text, so it comes last.
-READERS: Final[Mapping[str, Listed]] = {
-    "binout": Listed("binout", rb"\A[\x08-\x40].{5}\0"),
-    "radioss-th": Listed("radioss_th", rb"\A\0\0\0T|ZZZZZEOR"),
-    "glstat": Listed("glstat", rb" time\.|ls-dyna"),
-    "matsum": Listed("matsum", rb" time =|{BEGIN LEGEND}"),
-    "hdf5": Listed("hdf5_file", rb"\x89HDF"),
-    "csv": Listed("csv_table", b""),
-}
 
 
 def reader(kind: str) -> Reader:
@@ -126,7 +108,7 @@ def _refuse_unknown_channels(databases: Sequence[Legs], selection: Selection) ->
 
 def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:
     """Refuse ``--time`` where it would be passed over: solvers have one time and call it so."""
-    if time is not None and time.strip().casefold() != "time" and not {"csv", "hdf5"} & {*kinds}:
+    if time is not None and time.strip().casefold() != "time" and all(READERS[kind].solver for kind in kinds):
         raise FormatError(f"no time {time!r} in {' and '.join(kinds)}, the time is 'time'; leave `time` out")
 
 
@@ -153,3 +135,81 @@ def _format(source: Source) -> str:
         raise FormatError(f"{source.name}: {what}; name the glstat, matsum or binout of the run")
     found = f"{source.name}: binary data of no known format, one of {', '.join(READERS)} was expected"
     raise FormatError(f"{found}; export the energy history as text")
+
+
+# Energies of two legs at a time that both have are the same within this share of the largest, else the runs differ.
+_SAME = 0.01
+# Parts that are compared.
+_COMPARED = 50
+
+
+def check_companions(databases: Sequence[Legs]) -> None:
+    """Refuse databases that have no time in common."""
+    for one, other in combinations(databases, 2):
+        if one.span and other.span and (one.span[0] > other.span[1] or other.span[0] > one.span[1]):
+            raise FormatError(f"{one.source} and {other.source} have no time in common, files of one run were expected")
+
+
+def check_legs(legs: Sequence[Database]) -> None:
+    """Refuse files of one format that are not of one run.
+
+    All legs of a run hold the same quantities.  A restart repeats the state it begins with.  Files that begin at the
+    same time are copies, or of different runs: then all states that they share are compared.
+    """
+    for one, other in combinations(legs, 2):
+        here, there = _held(one), _held(other)
+        if here and there and not here & there:
+            found = f"{one.source} and {other.source} have neither a column nor a part in common"
+            raise FormatError(f"{found}, legs of one run were expected; give the files of one run")
+        for times, columns in ((_own_times, _energies), (_part_times, _part_energies)):
+            try:
+                shared = _shared(times(one), times(other))
+                values = [columns(leg, at) for leg, at in zip((one, other), shared, strict=True)] if shared else []
+            except FormatError:  # said when it is read
+                continue
+            if values and not _alike(*values):
+                found = f"{one.source} and {other.source} have different energies at the same times"
+                raise FormatError(f"{found}, legs of one run were expected; give the files of one run")
+
+
+def _held(leg: Database) -> set[str | int]:
+    """Columns and parts of a leg."""
+    return {*leg.channels, *(part.id for part in leg.parts)}
+
+
+def _own_times(leg: Database) -> Samples:
+    return leg.time if leg.channels else np.empty(0)
+
+
+def _part_times(leg: Database) -> Samples:
+    return leg.part_time if leg.parts else np.empty(0)
+
+
+def _energies(leg: Database, states: Indices) -> Samples:
+    name = leg.energy_channel
+    return leg.channel(name)[states] if name else np.empty((states.size, 0))
+
+
+def _part_energies(leg: Database, states: Indices) -> Samples:
+    ids = [part.id for part in leg.parts][:_COMPARED]
+    return leg.part_channel("internal_energy", ids)[states]
+
+
+def _shared(one: Samples, other: Samples) -> tuple[Indices, Indices] | None:
+    """States at the same times: all where both begin alike, else the first of the later one; None without any."""
+    _, here, there = np.intersect1d(one, other, return_indices=True)
+    if not here.size:
+        return None
+    if here[0] == there[0] == 0:
+        return here, there
+    begins = there == 0 if other[0] > one[0] else here == 0
+    return (here[begins], there[begins]) if begins.any() else None
+
+
+def _alike(one: Samples, other: Samples) -> bool:
+    """Whether energies are the same up to what a restart on other processors changes; NaN is none."""
+    if one.shape != other.shape:
+        return True
+    known = np.isfinite(one) & np.isfinite(other)
+    largest = np.maximum(np.abs(one), np.abs(other)).max(initial=0.0, where=known)
+    return bool(np.all(np.abs(one - other)[known] <= _SAME * largest))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.errors import FormatError, if_written, listing
-from d2rpick.histories.companions import check_sum, doubts
+from d2rpick.histories.database import check_sum, doubts
 from d2rpick.histories.history import Balance, Given, History, Momenta, Samples, Track
 from d2rpick.histories.names import QUANTITIES, Part, Selection, menu, quantity_note, select_parts
 from d2rpick.histories.samples import median

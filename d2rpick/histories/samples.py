@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.errors import FormatError
 from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:
@@ -109,6 +110,48 @@ def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
         dropped = "1 older state was" if lost == 1 else f"{lost} older states were"
         notes.append(f"time steps back {steps} (restart); where legs overlap the newer one counts, {dropped} dropped")
     return keep, tuple(notes)
+
+
+# A restarted run goes on with its output interval; another curve or an unsorted table has another one.
+_ALIKE = 2.0
+
+
+def of_one_run(time: Samples, place: Callable[[int], str]) -> Samples:
+    """Give times (n,) back; FormatError, with the place of the state, where they are not those of one run."""
+    state = _not_a_restart(time)
+    if state is None:
+        return time
+    raise FormatError(
+        f"{place(state)}: time steps back from {time[state - 1]:g} to {time[state]:g}, increasing times or one restart "
+        "were expected; sort the rows, or put each curve into its own file"
+    )
+
+
+def _not_a_restart(time: Samples) -> int | None:
+    """Find the first state at which times (n,) step back as those of one run do not; None where they never do.
+
+    One step back is a restart: it does not go back to the start, and the interval behind it, as the median of all
+    behind it, is half to twice the median of those before.
+
+    Examples
+    --------
+    >>> _not_a_restart(np.array([0.0, 1.0, 2.0, 3.0, 1.5, 2.5])), _not_a_restart(np.array([0.0, 1.0, 0.0, 1.0]))
+    (None, 2)
+    """
+    back = np.flatnonzero(time[1:] < time[:-1]) + 1
+    if back.size == 0:
+        return None
+    first = int(back[0])
+    if back.size > 1 or time[first] <= time[0]:
+        return first
+    before, behind = (np.diff(one) for one in np.split(time, [first]))
+    ratios = [_median(steps) / _median(before) for steps in (behind, behind[:1])]
+    return first if any(ratio < 1 / _ALIKE or ratio > _ALIKE for ratio in ratios) else None
+
+
+def _median(steps: Samples) -> float:
+    steps = steps[steps > 0]  # equal printed times are no interval
+    return float(median(steps)) if steps.size else np.nan  # which is neither too small nor too large
 
 
 def find_crossings(time: Samples, energy: Samples, level: float) -> tuple[Samples, NDArray[np.bool_]]:

@@ -12,6 +12,7 @@ from d2rpick.base.errors import FormatError, listing
 from d2rpick.base.files import STDIN, FileState, bound, unpacked_beyond
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.content import OnDisk, stored
+from d2rpick.histories.formats import READERS
 from d2rpick.histories.names import in_seconds, near_miss
 
 if TYPE_CHECKING:
@@ -24,9 +25,6 @@ _BLOCK = 1 << 16  # packed bytes at a time, which become 68 MB at most
 # Files of a folder often share their suffix, and have it in common with any name that has it.
 _LIKENESS = 0.8
 _NUMBER = r"\d+\.?\d*|\.\d+"  # compiled where it is needed, as the next one
-
-# What solvers call their databases in the folder of a run.
-_DATABASE = r"(?:(?i:binout[\d%]*|glstat|matsum)|(?P<root>.*)T\d\d)(?:\.gz)?"
 
 
 class Source(NamedTuple):
@@ -131,17 +129,25 @@ def _files(name: str) -> Sequence[str]:
 
 
 def _databases(folder: Path) -> list[str]:
-    matches = {file: re.fullmatch(_DATABASE, file.name) for file in sorted(folder.iterdir()) if file.is_file()}
-    found = {file: match["root"] for file, match in matches.items() if match}
+    found = {file: run for file in sorted(folder.iterdir()) if (run := _run_of(file))}
     if not found:
-        inner = any(re.fullmatch(_DATABASE, file.name) for file in folder.glob("*/*") if file.is_file())
+        inner = any(map(_run_of, folder.glob("*/*")))
         cure = f"its folders are runs: give one, or all to study as '{folder}/*'" if inner else "give the file"
         raise FormatError(f"{folder}: no glstat, matsum, binout or T01 in this folder; {cure}")
-    runs = sorted({"one of LS-DYNA" if root is None else f"{root}T01" for root in found.values()})
+    runs = sorted({*found.values()})
     if len(runs) > 1:
         what = f"{folder}: this folder holds several runs ({listing(runs, most=5)}), one was expected"
         raise FormatError(f"{what}; name the files of one")
     return [str(file) for file in found]
+
+
+def _run_of(file: Path) -> str:
+    """Say to which run a file belongs that has the name of a solver's database; nothing of any other."""
+    for one in READERS.values():
+        match = re.fullmatch(rf"{one.files}(?:\.gz)?", file.name) if one.files else None
+        if match and file.is_file():
+            return f"{match['root']}T01" if match.groupdict() else f"one of {one.solver}"
+    return ""
 
 
 def _read_stdin() -> bytes:

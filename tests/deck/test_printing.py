@@ -12,7 +12,7 @@ from d2rpick.api.arguments import read_windows
 from d2rpick.base.errors import DeckError
 from d2rpick.deck.printed_card import LONGEST, Printing, check_windows, shortest
 from d2rpick.deck.printing import SOLVERS, cards, solver_of
-from d2rpick.histories.opening import READERS
+from d2rpick.histories.formats import READERS
 from d2rpick.rules import check_deck
 from tests.command import refused, run
 from tests.decks import found, read, spans, write

@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from d2rpick.base.errors import RangeError
 from d2rpick.histories.history import History, Precision, Samples
-from d2rpick.histories.samples import find_turns
 
 
 def history(energy: ArrayLike, time: ArrayLike | None = None) -> History:
@@ -45,14 +44,6 @@ def test_many_energies_are_those_of_single_times(energy: list[float], shares: li
     found = history(energy, np.arange(len(energy)) * 0.5)
     times = np.array([*shares, 0.0, 1.0]) * found.time[-1]
     assert found.energies_at(times).tolist() == pytest.approx([found.energy_at(t) for t in times.tolist()])
-
-
-@given(st.lists(st.integers(-2, 2), min_size=2, max_size=20))
-def test_turns_and_peaks_are_the_extrema(energy: list[int]) -> None:
-    found = history(energy)
-    at, peak = find_turns(found.energy)
-    assert found.turns.tolist() == found.time[at].tolist()
-    assert found.peaks.tolist() == found.time[at[peak]].tolist()
 
 
 @pytest.mark.parametrize("precision", [Precision(6), Precision(decimals=4), Precision()])

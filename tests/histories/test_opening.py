@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from d2rpick.base.errors import FormatError
-from d2rpick.histories.opening import READERS, Selection
+from d2rpick.histories.formats import READERS
+from d2rpick.histories.opening import Selection
 from tests.command import put
 from tests.reading import read_history
 

@@ -11,11 +11,10 @@ import pytest
 
 from d2rpick.base.errors import FormatError
 from d2rpick.choice.overview import survey
-from d2rpick.histories.companions import check_companions
 from d2rpick.histories.database import Legs
-from d2rpick.histories.formats import binout, csv_table, glstat, matsum, radioss_th
+from d2rpick.histories.formats import READERS, binout, csv_table, glstat, matsum, radioss_th
 from d2rpick.histories.history import Samples
-from d2rpick.histories.opening import READERS, Run, Selection, open_run, reader
+from d2rpick.histories.opening import Run, Selection, check_companions, open_run, reader
 from d2rpick.histories.source import Source
 from tests.command import put
 from tests.computed import stored
@@ -85,13 +84,6 @@ def test_legs_are_ordered_by_their_start_and_the_newer_one_wins() -> None:
     history = history_of(glstat, *legs)
     assert states_of(history) == [(1, 1), (2, 2), (3, 30), (4, 40), (5, 50), (5.5, 55)]
     assert "time steps back once (restart); where legs overlap the newer one counts" in history.notes[0]
-
-
-def test_legs_of_time_histories_may_overlap_too() -> None:
-    first, second = bytes(t01(6).data), bytes(t01(4, start=3).data)
-    run = run_of(radioss_th, second, first)
-    assert run.history(Selection()).time.tolist() == [state / 8 for state in range(7)]
-    assert "where legs overlap the newer one counts" in run.notes[0]
 
 
 def test_a_leg_that_gives_no_state_is_named() -> None:

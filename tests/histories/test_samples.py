@@ -100,13 +100,6 @@ def test_extrema_are_where_the_slope_changes_sign(energy: list[int]) -> None:
     assert (not at.size) == bool(monotone)
 
 
-@given(st.floats(1e-3, 1e3), st.floats(-1e3, 1e3))
-def test_a_straight_line_is_crossed_where_it_is(slope: float, offset: float) -> None:
-    time = np.linspace(0, 1, 11)
-    (one,) = find_crossings(time, offset + slope * time, offset + 0.437 * slope)[0].tolist()
-    assert one == pytest.approx(0.437, abs=1e-12 + 1e-15 * abs(offset) / slope * 4)
-
-
 @given(st.integers(3, 3000), st.integers(0, 100), st.integers(1, 200))
 def test_an_outline_keeps_ends_and_extremes_and_stays_small(states: int, seed: int, stretches: int) -> None:
     energy = np.random.default_rng(seed).standard_normal(states)

@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 from d2rpick.base.errors import FormatError
-from d2rpick.histories.opening import READERS, Selection, open_run
+from d2rpick.histories.formats import READERS
+from d2rpick.histories.opening import Selection, open_run
 from d2rpick.histories.source import expand, later_legs, open_files
 from tests.command import refused
 from tests.computed import stored

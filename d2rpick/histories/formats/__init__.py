@@ -1,1 +1,40 @@
-"""A module for each format of `d2rpick.histories.opening.READERS`, and what several of them share."""
+"""The formats of histories, each a line of `READERS` and a module, and what several of the modules share.
+
+Readers are loaded when a file may be their own, and the help shows the names without them: start-up is part of the
+product.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from d2rpick.base.tuples import NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+class Listed(NamedTuple):
+    """What is known of a format before its reader, the ``module``, is loaded.
+
+    Regular expressions tell its files: ``hint`` is found in the head of each, ``files`` is what a ``solver`` calls
+    them, with the name of the run as ``root`` where it tells them by that.  Energies of a solver can be balanced, and
+    its files have one time; a format of no solver holds columns that somebody named.
+    """
+
+    module: str
+    hint: bytes
+    solver: str = ""
+    files: str = ""
+
+
+# In the order they are asked, and in which they are preferred as sources of one quantity: binary before text, since it
+# holds more digits; csv takes any text, so it comes last.
+READERS: Final[Mapping[str, Listed]] = {
+    "binout": Listed("binout", rb"\A[\x08-\x40].{5}\0", "LS-DYNA", r"(?i:binout[\d%]*)"),
+    "radioss-th": Listed("radioss_th", rb"\A\0\0\0T|ZZZZZEOR", "Radioss", r"(?P<root>.*)T\d\d"),
+    "glstat": Listed("glstat", rb" time\.|ls-dyna", "LS-DYNA", "(?i:glstat)"),
+    "matsum": Listed("matsum", rb" time =|{BEGIN LEGEND}", "LS-DYNA", "(?i:matsum)"),
+    "hdf5": Listed("hdf5_file", rb"\x89HDF"),
+    "csv": Listed("csv_table", b""),
+}

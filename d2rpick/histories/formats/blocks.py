@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from functools import cache
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -9,12 +11,12 @@ import numpy as np
 from d2rpick.base import __version__
 
 if TYPE_CHECKING:
-    import re
     from collections.abc import Callable, Hashable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from d2rpick.histories.content import Bytes, Content
+    from d2rpick.histories.history import Samples
 
 
 UNSURE: Final = -1  # in place of an offset: the field is cut, or stands in the block twice
@@ -225,3 +227,89 @@ def _decimals(blocks: Bytes, places: Sequence[tuple[int, int]]) -> NDArray[np.in
         number = digits @ 10 ** np.arange(width - 1, -1, -1, dtype=np.int64)
         numbers[:, column] = np.where(((digits < 0) | (digits > 9)).any(axis=1), -1, number)
     return numbers
+
+
+_NUMBER: Final = re.compile(rb" *([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]\d+)|[EeDd](\d+))?")
+_EXACT: Final = 22  # 10**22 is the largest power of ten that a double holds exactly
+_SHRINKS, _NEGATIVE = 1 << 8, 1 << 9  # beside the two digits of an exponent, which fill a byte
+
+
+@cache
+def _scales(decimals: int) -> tuple[Samples, Samples]:
+    """Factors and divisors of mantissas without point, one of both 1, by exponent and signs; NaN for none exact."""
+    exponent = np.arange(_SHRINKS) * [[1], [-1]] - decimals
+    powers = np.array([float(f"1e{size}") for size in range(_EXACT + 1)] + [np.nan])[
+        np.minimum(abs(exponent), _EXACT + 1)
+    ]
+    factors = np.where(exponent > 0, powers, 1.0)
+    return np.stack([factors, -factors]).ravel(), np.tile(np.where(exponent < 0, powers, 1.0).ravel(), 2)
+
+
+def number(text: bytes) -> float:
+    """Value of one right-justified Fortran field, NaN if it does not hold a finite number.
+
+    Examples
+    --------
+    >>> [number(text) for text in (b"   4.87301E-03", b"   1.23457-100", b"   1.00000D+00", b"     1447")]
+    [0.00487301, 1.23457e-100, 1.0, 1447.0]
+    >>> [number(text) for text in (b"**************", b"      NaN", b"  1.0E+00 ", b"   1.0E+999")]
+    [nan, nan, nan, nan]
+    """
+    match = _NUMBER.fullmatch(text)
+    if match is None:
+        return np.nan
+    mantissa, signed, unsigned = match.groups()
+    value = float(mantissa + b"E" + (signed or unsigned or b"0"))
+    return value if np.isfinite(value) else np.nan
+
+
+def decode(fields: NDArray[np.bytes_], decimals: int) -> Samples:
+    """Values of fixed-width fields, each the very double that ``float()`` gives; NaN for what is no number.
+
+    Fields of the usual shape, ``-d.dddddE+dd`` right-justified, are converted together: mantissa and power
+    of ten are both exact doubles, so their one product or quotient is correctly rounded.  All others go
+    through ``number``.
+
+    Parameters
+    ----------
+    fields : array of bytes of one width, shape (n,)
+        As written in the file.
+    decimals : int
+        Places behind the point in the usual shape.
+
+    Returns
+    -------
+    array of shape (n,)
+
+    Examples
+    --------
+    >>> decode(np.array([b"   4.87301E-03", b"  -8.05000E+02", b"   2.00000E-20"]), decimals=5).tolist()
+    [0.00487301, -805.0, 2e-20]
+    """
+    if not fields.size:
+        return np.empty(0)
+    width = fields.dtype.itemsize
+    column = np.ascontiguousarray(np.ascontiguousarray(fields).view(np.uint8).reshape(-1, width).T)
+    point, mark = width - 5 - decimals, width - 4
+    negative, shrinks = column[point - 2] == ord("-"), column[mark + 1] == ord("-")
+    # wraps around for what is below "0", so one comparison is enough
+    digits = column[[point - 1, *range(point + 1, mark), mark + 2, mark + 3]] - np.uint8(ord("0"))
+    usual = digits.max(axis=0) <= 9
+    usual &= (column[point] == ord(".")) & (column[mark] == ord("E"))
+    usual &= negative | (column[point - 2] == ord(" "))
+    usual &= shrinks | (column[mark + 1] == ord("+"))
+    usual &= np.all(column[: point - 2] == ord(" "), axis=0)
+
+    weights = np.array([float(10**place) for place in range(decimals, -1, -1)])
+    values: Samples = weights @ digits[:-2].astype(np.float64)  # exact
+    tens, ones = digits[-2:]
+    scale = tens * np.uint8(10) + ones + shrinks * np.uint16(_SHRINKS) + negative * np.uint16(_NEGATIVE)
+    factors, divisors = (table.take(scale) for table in _scales(decimals))
+    values *= factors
+    values /= divisors
+
+    far = usual & np.isnan(values)
+    values[far] = [float(text) for text in fields[far].tolist()]
+    for row in np.flatnonzero(~usual):
+        values[row] = number(fields[row : row + 1].tobytes())
+    return values

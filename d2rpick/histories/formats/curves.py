@@ -17,10 +17,10 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.database import Database
-from d2rpick.histories.formats import printed_numbers
 from d2rpick.histories.formats.layout import as_number, unique
-from d2rpick.histories.formats.printed_numbers import of_one_run
+from d2rpick.histories.formats.text import is_whole, precisions
 from d2rpick.histories.names import Selection, internal_energies, is_time, refuse_other_quantity, resolve, unit_of
+from d2rpick.histories.samples import of_one_run
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -118,7 +118,7 @@ class Curves(Database):
             notes.append(f"the x axis is called {found.x_label!r}; it was taken for the time")
         last = found.curves[-1]
         breaks_off = found.unended and bool(last.times) and last.lines[-1] == found.last
-        cut = breaks_off and not printed_numbers.is_whole(last.values[-1], last.values[:-1])
+        cut = breaks_off and not is_whole(last.values[-1], last.values[:-1])
         if cut:
             for cells in (last.times, last.values, last.lines):
                 cells.pop()
@@ -167,7 +167,7 @@ class Curves(Database):
         curves = [self._curves[name] for name in names or self.channels[:1]]
         times = [cell for curve in curves for cell in curve.times]
         values = [cell for curve in curves for cell in curve.values]
-        return printed_numbers.precisions(times, values, self.time)
+        return precisions(times, values, self.time)
 
     def _numbers(self, name: str, axis: str) -> Samples:
         curve = self._curves[name]

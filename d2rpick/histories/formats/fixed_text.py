@@ -11,15 +11,14 @@ from __future__ import annotations
 
 from array import array
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.content import content_of, line_at
 from d2rpick.histories.database import Database
-from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, Stretch, head, like_example
-from d2rpick.histories.formats.printed_numbers import decode
+from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, Stretch, decode, head, like_example
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Iterator, Sequence
@@ -33,17 +32,6 @@ if TYPE_CHECKING:
 
 _RECENT: Final = 12  # layouts tried before a block is taken apart
 _LINE: Final = 1 << 10  # no first line of a block is longer
-_NEAR: Final = 1 << 12  # fields closer than this are compared in one piece
-
-
-class Portions(NamedTuple):
-    """How much of a text is looked at together."""
-
-    many: int = 64  # of so many blocks it is remembered what differs between them, a small share of the file
-    batch: int = 1 << 14  # numbers that are converted: they stay in the cache
-
-
-PORTIONS: Final = Portions()
 
 
 class Blocks(Database):
@@ -59,7 +47,6 @@ class Blocks(Database):
         What a block looks like.
     ahead : sequence of names, optional
         Numbers that will be asked for first, together: they are taken while all blocks are compared.
-    portions : Portions
 
     Attributes
     ----------
@@ -71,10 +58,11 @@ class Blocks(Database):
         The last block, when the file ends within it: it is no state unless ``admit_rest`` makes it one.
     """
 
-    def __init__(
-        self, data: bytes | Content, source: str, grammar: Grammar, portions: Portions, ahead: Sequence[Hashable] = ()
-    ) -> None:
-        self.source, self._portions = source, portions
+    many = 64  # of so many blocks it is remembered what differs between them, a small share of the file
+    batch = 1 << 14  # numbers that are converted together: they stay in the cache
+
+    def __init__(self, data: bytes | Content, source: str, grammar: Grammar, ahead: Sequence[Hashable] = ()) -> None:
+        self.source = source
         self.title, self.version, self._begin = head(data)
         self._data = content_of(data)
         self._grammar = grammar
@@ -129,9 +117,9 @@ class Blocks(Database):
             else:  # each address gives way to the number found there
                 np.add(_starts(run, 0, run.repeats), offsets, out=values[rows].view(np.int64))
         together = values if few.all() else values[few]
-        flat, batch = together.reshape(-1), self._portions.batch
-        for at in range(0, flat.size, batch):
-            flat[at : at + batch] = self._decoded(flat[at : at + batch].view(np.int64))
+        flat = together.reshape(-1)
+        for piece in np.split(flat, range(self.batch, flat.size, self.batch)):
+            piece[:] = self._decoded(piece.view(np.int64))
         if together is not values:
             values[few] = together
         self._data.check()
@@ -162,7 +150,7 @@ class Blocks(Database):
         if still.view(np.int64).any():
             values[:, ~moves] = still
         moving = slice(None) if moves.all() else np.flatnonzero(moves)  # without copies, as mostly
-        step = max(1, self._portions.batch // max(1, offsets[moving].size))
+        step = max(1, self.batch // max(1, offsets[moving].size))
         for at in range(0, run.repeats if moves.any() else 0, step):
             end = min(at + step, run.repeats)
             if taken is None:
@@ -276,7 +264,7 @@ class Blocks(Database):
         """Count the blocks from ``position`` on that look like the example and have another behind them."""
         literal, start = self.layout(example, stride).literal, self._grammar.start
         run = Stretch(position, stride, (self._end - position) // stride, example)
-        if self._compared and run.repeats >= self._portions.many:
+        if self._compared and run.repeats >= self.many:
             count = self._count_and_take(run, literal)
         elif self._compared:
             count = like_example(self._data, run, 0, literal)
@@ -299,14 +287,14 @@ class Blocks(Database):
             ahead.append(starts[:, offsets])
 
         count = like_example(self._data, run, 0, literal, varied, take if sure else None)
-        if count > self._portions.many:
+        if count > self.many:
             self._varied[run.start] = varied
             if sure:
                 self._ahead[run.start] = np.concatenate(ahead)
         return count
 
     def _alike(self, names: Sequence[Hashable], anchors: Sequence[Hashable]) -> bool:
-        """Tell whether in all blocks the text from anchors to numbers is that of their examples.
+        """Tell whether in all blocks the text from the first anchor to the last number is that of their examples.
 
         False without a look where that is most of a block: to compare all of it costs no more.
         """
@@ -316,18 +304,9 @@ class Blocks(Database):
         if run.repeats == 1 and run.start == run.example:
             return True
         layout = self.layout(run.example, run.stride)
-        first = np.array([layout.fields[anchor] for anchor in anchors])
-        order = np.argsort(first)
-        behind = offsets[order] + self._grammar.width + 1  # what follows a number is compared, too
-        first, last = first[order], np.maximum.accumulate(behind)
-        gaps = np.flatnonzero(first[1:] - last[:-1] > _NEAR) + 1
-        pieces = [
-            (int(firsts[0]), int(lasts[-1]))
-            for firsts, lasts in zip(np.split(first, gaps), np.split(last, gaps), strict=True)
-        ]
-        return 2 * sum(high - low for low, high in pieces) <= run.stride and all(
-            like_example(self._data, run, low, layout.literal[low:high]) == run.repeats for low, high in pieces
-        )
+        first = min(layout.fields[anchor] for anchor in anchors)
+        text = layout.literal[first : int(offsets.max()) + self._grammar.width + 1]  # with what follows a number
+        return 2 * text.size <= run.stride and like_example(self._data, run, first, text) == run.repeats
 
     def _is_even(self) -> bool:
         """Tell whether all blocks but the last have one size, and look alike at both ends of the file."""

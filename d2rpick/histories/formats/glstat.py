@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, head, written_head
-from d2rpick.histories.formats.fixed_text import PORTIONS, Blocks, Portions
+from d2rpick.histories.formats.fixed_text import Blocks
 from d2rpick.histories.history import Samples, frozen
 
 if TYPE_CHECKING:
@@ -62,11 +62,9 @@ class Glstat(Blocks):
     format, digits = "glstat", 6
     no_parts = "a glstat has no parts; add the matsum of the run"
 
-    def __init__(
-        self, data: bytes | Content, source: str, needed: Sequence[str] = (), portions: Portions = PORTIONS
-    ) -> None:
+    def __init__(self, data: bytes | Content, source: str, needed: Sequence[str] = ()) -> None:
         springs = [_SPRINGS] if _SPRINGS.encode() in data[:_NEAR] else []
-        super().__init__(data, source, _GRAMMAR, portions, (_TIME, _ENERGY, *springs))
+        super().__init__(data, source, _GRAMMAR, (_TIME, _ENERGY, *springs))
         self.channels = self._names()
         names = [_TIME]
         with suppress(FormatError):  # that there is no such line is said when it is read

@@ -1,15 +1,20 @@
-"""Columns of an HDF5 file: those of datasets, matrices, compound types and tables of pandas, and their values."""
+"""Columns of an HDF5 file: those of datasets, matrices, compound types and tables of pandas, and their values.
+
+The library gives zeros for data that are not there, and says nothing of a damaged type: both are looked for.  What
+cannot be seen is a changed byte in data that is stored without a checksum: `fletcher32`, or that of gzip.
+"""
 
 from __future__ import annotations
 
 import math
 import re
+from functools import cache
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from d2rpick.base.errors import FormatError
-from d2rpick.histories.formats.hdf5_damage import check_data
+from d2rpick.base.files import unpacked_beyond
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -66,6 +71,55 @@ class Column(NamedTuple):
             axis, index = self.place
             values = whole[index, :] if axis == 0 else whole[:, index]
         return finite(values, self.path, source).reshape(self.size)
+
+
+def check_data(dataset: h5py.Dataset, source: str) -> None:
+    """FormatError if data of a dataset are not there, which would read as zeros, or of a type that nothing writes."""
+    _check_type(dataset, source)
+    stored = dataset.id.get_storage_size()
+    if too_much := unpacked_beyond(stored, dataset.nbytes):
+        raise FormatError(f"{source}: {dataset.name} becomes {too_much}")
+    if dataset.size and not stored:
+        raise FormatError(f"{source}: {dataset.name} was never written; choose another dataset or copy the file again")
+    if dataset.chunks and dataset.size:
+        chunks: set[tuple[int, ...]] = set()
+        dataset.id.chunk_iter(lambda chunk: chunks.add(tuple(chunk.chunk_offset)))
+        expected = math.prod(-(-extent // length) for extent, length in zip(dataset.shape, dataset.chunks, strict=True))
+        inside = sum(all(at < extent for at, extent in zip(chunk, dataset.shape, strict=True)) for chunk in chunks)
+        if inside < expected:
+            found = f"{source}: {dataset.name} has {inside} of {expected} chunks of its data"
+            raise FormatError(f"{found}; the file is damaged or was not written to its end")
+
+
+def _check_type(dataset: h5py.Dataset, source: str) -> None:
+    """FormatError for numbers of a type that HDF5 does not define: a changed byte in it would change them all."""
+    for kind in _numbers(dataset.id.get_type()):
+        if not any(kind.equal(standard) for standard in _standard_types()):
+            found = f"{source}: {dataset.name} has numbers of {kind.get_size()} bytes that are no standard type of HDF5"
+            raise FormatError(f"{found}; the file is damaged, copy it again, or write it with a standard type")
+
+
+def _numbers(kind: h5py.h5t.TypeID) -> Iterator[h5py.h5t.TypeID]:
+    """Types of the numbers in a type, which may be made of others."""
+    import h5py
+
+    if isinstance(kind, h5py.h5t.TypeCompoundID):
+        for member in range(kind.get_nmembers()):
+            yield from _numbers(kind.get_member_type(member))
+    elif isinstance(kind, h5py.h5t.TypeArrayID | h5py.h5t.TypeEnumID):
+        yield from _numbers(kind.get_super())
+    elif isinstance(kind, h5py.h5t.TypeAtomicID) and kind.get_class() in (h5py.h5t.INTEGER, h5py.h5t.FLOAT):
+        yield kind
+
+
+@cache
+def _standard_types() -> tuple[h5py.h5t.TypeID, ...]:
+    import h5py
+
+    names = [f"IEEE_F{bits}" for bits in (16, 32, 64)] + [
+        f"STD_{sign}{bits}" for sign in "IU" for bits in (8, 16, 32, 64)
+    ]
+    return tuple(getattr(h5py.h5t, name + order) for name in names for order in ("LE", "BE"))
 
 
 # Of a file: smaller data are copied out of it, or what a column keeps in memory would be far more than itself.

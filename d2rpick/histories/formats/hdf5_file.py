@@ -7,20 +7,23 @@ only ones that fit are taken, and the candidates listed where more than one does
 from __future__ import annotations
 
 import io
-from contextlib import contextmanager
+import os
+import signal
+import struct
+from contextlib import contextmanager, suppress
 from functools import cached_property
 from importlib import import_module
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, BinaryIO, Final
 
 import numpy as np
 
 from d2rpick.base.errors import FormatError, listing, printable
+from d2rpick.base.files import beyond, unpacked_beyond
 from d2rpick.histories.database import DIGITS, Database
-from d2rpick.histories.formats.hdf5_columns import Column, columns_of, finite
-from d2rpick.histories.formats.hdf5_damage import check_data, check_file
-from d2rpick.histories.formats.printed_numbers import of_one_run
+from d2rpick.histories.formats.hdf5_columns import Column, check_data, columns_of, finite
 from d2rpick.histories.history import Precision, Samples
 from d2rpick.histories.names import Part, Selection, near_miss, refuse_other_quantity
+from d2rpick.histories.samples import of_one_run
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -275,6 +278,105 @@ def _opened(file: io.BytesIO, source: str) -> Iterator[h5py.File]:
     except _DAMAGED as error:
         reason = printable(" ".join(str(error).split()))
         raise FormatError(f"{source}: HDF5 cannot be read ({reason}); the file is damaged or needs a filter") from error
+
+
+# Damage of which the library crashes or goes round in a circle.
+
+# Place of the end-of-file address in superblocks of version 0 to 3, of addresses of eight bytes, as all writers use.
+_END_OF_FILE: Final = {0: 40, 1: 44, 2: 28, 3: 28}
+_VERSION, _SIZE, _ADDRESS_SIZE = 8, {0: 13, 1: 13, 2: 9, 3: 9}, 8
+# A reading that takes longer than these seconds and one for so many bytes goes round in a circle [s], [bytes].
+_SECONDS: Final = 60
+_SLOWEST: Final = 100_000
+_USER_BLOCK: Final = 512  # MATLAB puts it before the file
+
+
+def check_file(file: BinaryIO, source: str, seconds: int = _SECONDS) -> None:
+    """FormatError where a file has not the size it says, is beyond the bounds, or the library would crash on it.
+
+    It is read once in a child process, of limited time, so many seconds and one for each 100 kB: what ends that one
+    would end this one, or never end.
+    """
+    _check_size_of_file(file, source)
+    if not hasattr(os, "fork"):
+        return
+    reading, told = os.pipe()
+    child = os.fork()
+    if child == 0:
+        _read_and_exit(file, source, seconds, told)
+    os.close(told)
+    with os.fdopen(reading, encoding="utf-8", errors="surrogateescape") as pipe:
+        message = pipe.read()
+    _, status = os.waitpid(child, 0)
+    if message:
+        raise FormatError(message)
+    if os.WIFSIGNALED(status):
+        number = os.WTERMSIG(status)
+        what = "did not finish reading it" if number == signal.SIGXCPU else f"crashed on it (signal {number})"
+        raise FormatError(f"{source}: the HDF5 library {what}; the file is damaged, copy it again")
+
+
+def _check_size_of_file(file: BinaryIO, source: str) -> None:
+    head, size = _head_and_size(file)
+    base = 0 if head.startswith(b"\x89HDF") else _USER_BLOCK
+    head = head[base:]
+    version = head[_VERSION] if len(head) > _VERSION else -1
+    place = _END_OF_FILE.get(version)
+    if place is None or len(head) < place + _ADDRESS_SIZE or head[_SIZE[version]] != _ADDRESS_SIZE:
+        return  # the library says what is wrong with it
+    (end,) = struct.unpack_from("<Q", head, place)
+    if size not in (end, end + base):
+        found = f"{source}: the file has {size} bytes, {end} by its own header"
+        raise FormatError(f"{found}; it is damaged or cut, copy it again")
+
+
+def _head_and_size(file: BinaryIO) -> tuple[bytes, int]:
+    file.seek(0)
+    head = file.read(2 * _USER_BLOCK)
+    return head, file.seek(0, os.SEEK_END)
+
+
+def _read_and_exit(file: BinaryIO, source: str, seconds: int, told: int) -> None:
+    """Read all that could crash the library; what is beyond the bounds is ``told``, other errors are not for here."""
+    try:
+        import faulthandler
+        import resource
+
+        faulthandler.disable()
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        limit = seconds + _head_and_size(file)[1] // _SLOWEST
+        _, most = resource.getrlimit(resource.RLIMIT_CPU)
+        resource.setrlimit(resource.RLIMIT_CPU, (limit if most < 0 else min(limit, most), most))
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+        _read(file, source)
+    except FormatError as error:
+        os.write(told, str(error).encode(errors="surrogateescape"))
+    finally:
+        os._exit(0)
+
+
+def _read(file: BinaryIO, source: str) -> None:
+    """Read what describes the data, and data in chunks; FormatError where there is more than the bounds allow."""
+    import h5py
+
+    size, unpacked = _head_and_size(file)[1], 0
+
+    def visit(name: bytes, info: h5py.h5o.ObjInfo) -> None:
+        nonlocal unpacked
+        if too_deep := beyond("DEPTH", name.count(b"/")):
+            raise FormatError(f"{source}: its data lie in {too_deep}")
+        if info.type == h5py.h5o.TYPE_DATASET:
+            dataset = h5py.h5d.open(opened.id, name)
+            if dataset.get_create_plist().get_layout() == h5py.h5d.CHUNKED:
+                unpacked += h5py.Dataset(dataset).nbytes
+                if too_much := unpacked_beyond(size, unpacked):
+                    raise FormatError(f"{source}: its packed data become {too_much}")
+                with suppress(Exception):
+                    check_data(h5py.Dataset(dataset), "")
+                    h5py.Dataset(dataset)[()]
+
+    with h5py.File(file, "r") as opened:
+        h5py.h5o.visit(opened.id, visit, info=True)
 
 
 def write(columns: Mapping[str, Samples]) -> bytes:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, written_head
-from d2rpick.histories.formats.fixed_text import PORTIONS, Blocks, Portions
+from d2rpick.histories.formats.fixed_text import Blocks
 from d2rpick.histories.names import Part, Selection
 
 if TYPE_CHECKING:
@@ -79,11 +79,11 @@ class Matsum(Blocks):
     format, digits = "matsum", 5
     no_channels = "a matsum has parts only; choose with `parts` or add the glstat of the run"
 
-    def __init__(self, data: bytes | Content, source: str, portions: Portions = PORTIONS) -> None:
+    def __init__(self, data: bytes | Content, source: str) -> None:
         self._legend = _legend(data)
         describe, whole = partial(_describe, self._legend), partial(_is_whole, self._legend)
         grammar = Grammar(_START, _LINE, describe, _CHANGING, _TIME, whole, width=13, decimals=4, compare_all=False)
-        super().__init__(data, source, grammar, portions)
+        super().__init__(data, source, grammar)
         self.refuse_foreign()
         self.part_time = self.numbers([_TIME])[:, 0]
         self._together: dict[tuple[str | int, ...], Samples] = {}  # read with what was asked for

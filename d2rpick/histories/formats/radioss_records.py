@@ -17,7 +17,7 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.database import DIGITS
-from d2rpick.histories.formats.printed_numbers import decode
+from d2rpick.histories.formats.blocks import decode
 
 if TYPE_CHECKING:
     from d2rpick.histories.content import Bytes, Content

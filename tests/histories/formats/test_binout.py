@@ -114,13 +114,6 @@ def test_a_family_is_one_run() -> None:
     assert run.part_channel("x_momentum", [3])[25, 0] == values("x_momentum", 26, 3)
 
 
-def test_branches_may_lie_in_the_files_of_different_ranks() -> None:
-    both = made_binout(range(1, 11))
-    parts = made_binout(range(1, 11), glstat=False)
-    run = opened(parts, b"".join([bytes(both.data)]).replace(b"matsum", b"nodout"))
-    assert run.time.size == run.part_time.size == 10
-
-
 def test_a_missing_member_of_a_family_is_noted() -> None:
     run = opened(made_binout(range(1, 11)), made_binout(range(21, 31)))
     assert not run.complete

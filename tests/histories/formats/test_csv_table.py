@@ -9,7 +9,7 @@ from hypothesis import example, given, strategies as st
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.content import OnDisk
 from d2rpick.histories.formats import csv_table
-from d2rpick.histories.formats.text import Portions, Text
+from d2rpick.histories.formats.text import Text
 from d2rpick.histories.history import EXACT, History, Precision
 from d2rpick.histories.opening import Selection
 from d2rpick.histories.source import Source
@@ -66,6 +66,7 @@ SCENARIOS: dict[str, tuple[str | bytes, str, str]] = {
     "3DEXPERIENCE": ("Time(s),Energy(J),ALLIE_Global/ALLIE\n" + table(tail=","), "Energy(J): ALLIE_Global/ALLIE", "s"),
     "comments": ("# a run\n$ more\n% more\n// more\ntime,IE\n" + table() + "# the end\n", "IE", ""),
     "comments between": ("time,IE\n" + table().replace("\n0.625", "\n# switched\n\n0.625"), "IE", ""),
+    "a comment with as many cells": ("n,time,IE\n0,0,1.5\n# 5,1,2\n1,.25,2.75\n2,.625,-3.125\n", "IE", ""),
     "names in a comment": ("# run 7\n# time internal_energy\n" + table(" "), "internal_energy", ""),
     "a comment that is no names": ("# box, drop\n" + table(), "column 2", ""),
     "a title": ("Run seven\n" + table(), "column 2: Run seven", ""),
@@ -165,6 +166,7 @@ def test_curves_side_by_side_have_times_of_their_own() -> None:
         (FOUR, ["0"], "no column '0'"),
         (FOUR, ["KE", "ke"], "given twice"),
         (FOUR, ["1"], "'1' is the time column; choose"),
+        (SIDE_BY_SIDE, ["IE", "3"], "'3' is a time column; choose"),
         ("time,IE,ie\n0,1,2\n1,2,3\n", ["Ie"], "'Ie' may be any of these columns: 2 'IE', 3 'ie'"),
         ("time,IE,IE\n0,1,2\n1,2,3\n", [], "2 columns are named"),
         ("time,3,2\n0,1,2\n1,2,3\n", ["2"], "may be any of these"),
@@ -219,43 +221,18 @@ def test_refused(text: str, reason: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "note"),
+    ("text", "asked", "note"),
     [
-        ("x,y\n0,1\n1,2\n", "no column has the name of a time; 'x', the first, was taken as the time"),
-        ("time,IE\n0,1\n0,2\n", "same printed time"),
-        ("time,IE\n0,1\n1,2\n2,3", "the last line has no line end and may be cut"),
+        ("x,y\n0,1\n1,2\n", [], "no column has the name of a time; 'x', the first, was taken as the time"),
+        ("time,IE\n0,5\n0,1\n1,2\n", [], "same printed time"),
+        ("time,IE\n0,1\n1,2\n2,3", [], "the last line has no line end and may be cut"),
+        ("time,ALLKE\n0,1\n1,2\n", ["ALLKE"], "'ALLKE' is not an internal energy by its name"),
     ],
 )
-def test_notes_say_what_was_assumed(text: str, note: str) -> None:
-    assert note in read(text).notes[0]
-
-
-def test_a_quantity_that_is_asked_for_is_taken_with_a_note() -> None:
-    history = read("time,ALLKE\n0,1\n1,2\n", "ALLKE")
+def test_notes_say_what_was_assumed(text: str, asked: list[str], note: str) -> None:
+    history = read(text, *asked)
     assert history.energy.tolist() == [1, 2]
-    assert "'ALLKE' is not an internal energy by its name" in history.notes[0]
-
-
-LONG = [f"{i},{i % 7}.5" for i in range(20_000)]  # more than a table is read in at a time
-
-
-@pytest.mark.parametrize(
-    ("row", "text", "reason"),
-    [
-        (18_000, "18000", "table:18002: 1 value,"),
-        (18_000, "18000,1,2", "table:18002: 3 values"),
-        (18_000, "18000,1_0", "table:18002: 'IE' is '1_0'"),
-        (18_000, "18000,nan", "table:18002: 'IE' is 'nan'"),
-        (18_000, "18000,inf", "table:18002: 'IE' is 'inf'"),
-        (18_000, "18000,0x10", "table:18002: 'IE' is '0x10'"),
-        (18_000, "1,2", "table:18002: time steps back from 17999 to 1"),
-        (18_000, "time,IE", "table:18002: a second header"),
-        (19_999, "19999,", "table:20001: 'IE' is ''"),
-    ],
-)
-def test_one_bad_line_of_many_is_named(row: int, text: str, reason: str) -> None:
-    with pytest.raises(FormatError, match=reason):
-        read("\n".join(["time,IE", *LONG[:row], text, *LONG[row + 1 :], ""]))
+    assert note in history.notes[0]
 
 
 @pytest.fixture(scope="module")
@@ -273,7 +250,8 @@ LINES = [*ROWS, *(f"{{}},{cell}" for cell in CELLS), "# comment", "# {},1", "", 
 def in_pieces(data: bytes | OnDisk, size: int) -> object:
     """States of a table that is read in pieces of so many bytes, or what is wrong with it."""
     try:
-        table = csv_table.Table(Text(Source("table", data), Portions(piece=size, large=size)), Selection())
+        sized = type("Sized", (Text,), {"piece": size, "large": size})
+        table = csv_table.Table(sized(Source("table", data)), Selection())
         return table.time.tolist(), table.channel(table.energy_channel).tolist()
     except FormatError as error:
         return str(error)
@@ -287,6 +265,7 @@ def in_pieces(data: bytes | OnDisk, size: int) -> object:
 )
 @example(["{},1!5"], (";", ","), "", "utf-8")
 @example(["", "0,3"], (",", "."), "", "utf-8")
+@example(["", "0,3"], (" ", "."), "", "utf-8")
 @example([" 2e-1\x0c,1", "{},1e+"], (",", "."), "", "utf-8")
 def test_rows_read_piece_by_piece_or_from_the_disk_are_those_read_line_by_line(
     file: Path, lines: list[str], form: tuple[str, str], tail: str, encoding: str
@@ -313,19 +292,6 @@ def test_numbers_from_the_disk_are_those_of_python(file: Path, texts: list[str])
     file.write_text("time,IE\n" + "".join(f"{number}.5,{text}\n" for number, text in enumerate(texts)))
     table = csv_table.Table(Text(Source("table", on_disk(file))), Selection())
     assert table.channel("IE").tolist() == [float(text) for text in texts]
-
-
-@pytest.mark.parametrize("between", ["# switched\n", "\n", " \n"])
-def test_lines_between_many_rows_are_passed_over(between: str) -> None:
-    text = "\n".join(["time,IE", *LONG, ""])
-    plain, broken = read(text), read(text.replace("\n17000,", f"\n{between}17000,"))
-    assert plain.energy.tolist() == broken.energy.tolist() == [i % 7 + 0.5 for i in range(20_000)]
-
-
-def test_a_comment_is_no_row_though_it_has_as_many_cells() -> None:
-    rows = [f"{i},{i},{i % 7}" for i in range(20_000)]
-    text = "\n".join(["n,time,IE", *rows[:15_000], "# 5,1,2", *rows[15_000:], ""])
-    assert read(text).energy.size == 20_000
 
 
 def test_words_without_numbers_are_refused_by_the_first_lines() -> None:

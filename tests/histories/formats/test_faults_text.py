@@ -9,7 +9,7 @@ from hypothesis import given
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.formats import glstat, matsum
 from tests.faults import FAULTS, Fault, cases, damage, glstat_states, is_within, matsum_states
-from tests.text_files import HEAD, glstat_text, matsum_text
+from tests.text_files import glstat_text, matsum_text
 
 IDS = [1, 12, 13]
 GLSTAT = glstat_text(np.arange(8) / 8, np.arange(8) ** 3 - 10)
@@ -75,16 +75,6 @@ def test_glstat(faults: list[Fault]) -> None:
 @given(faults=FAULTS)
 def test_matsum(lines: int, faults: list[Fault]) -> None:
     check_matsum(faults, lines)
-
-
-def test_many_blocks_that_all_differ_are_read() -> None:
-    """Each state has a controller line of another length: no two blocks in a row are alike."""
-    blocks = GLSTAT[len(HEAD) + 2 :].split(b" dt of cycle")[1:]
-    text = HEAD + b"\n\n" + b"".join(b" dt of cycle" + b"x" * (n % 7) + blocks[n % 8] for n in range(300))
-    run = glstat.Glstat(text, "glstat")
-    assert list(zip(run.time.tolist(), run.channel("internal energy").tolist(), strict=True)) == [
-        (time, energies[0]) for time, energies in glstat_states(text)
-    ]
 
 
 def test_a_first_line_longer_than_any_is_no_fault() -> None:

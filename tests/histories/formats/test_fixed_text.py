@@ -9,12 +9,13 @@ from hypothesis import given, strategies as st
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.content import Content
-from d2rpick.histories.formats.fixed_text import PORTIONS, Portions
+from d2rpick.histories.formats.blocks import decode
 from d2rpick.histories.formats.glstat import Glstat
 from d2rpick.histories.formats.matsum import Matsum
 from tests.text_files import HEAD, glstat_blocks, glstat_text, matsum_text
 
 IDS = [1, 20, 300]
+Sizes = dict[str, int]  # how many blocks and numbers are looked at together
 
 
 @st.composite
@@ -33,37 +34,37 @@ def damaged(draw: st.DrawFn, *, parts: bool) -> bytes:
     return bytes(text[: draw(st.integers(len(text) // 2, len(text)))] if draw(st.booleans()) else text)
 
 
-def energies_of_model(data: bytes, portions: Portions) -> tuple[bytes, ...]:
-    run = Glstat(data, "glstat", ["internal energy"], portions)
+def energies_of_model(data: bytes, sizes: Sizes) -> tuple[bytes, ...]:
+    run = type("Sized", (Glstat,), sizes)(data, "glstat", ["internal energy"])
     return run.time.tobytes(), run.channel("internal energy").tobytes(), run.channel("kinetic energy").tobytes()
 
 
-def energies_of_parts(data: bytes, portions: Portions) -> tuple[bytes, ...]:
-    run = Matsum(data, "matsum", portions)
+def energies_of_parts(data: bytes, sizes: Sizes) -> tuple[bytes, ...]:
+    run = type("Sized", (Matsum,), sizes)(data, "matsum")
     asked = ([20], IDS, IDS[::-1])
     return run.part_time.tobytes(), *(run.part_channel("internal_energy", ids).tobytes() for ids in asked)
 
 
-def answer(read: Callable[[bytes, Portions], tuple[bytes, ...]], data: bytes, portions: Portions) -> object:
+def answer(read: Callable[[bytes, Sizes], tuple[bytes, ...]], data: bytes, sizes: Sizes) -> object:
     """What is read; None where it is refused, for whichever of several damages."""
     try:
-        return read(data, portions)
+        return read(data, sizes)
     except FormatError:
         return None
 
 
 # Where these blocks are many, numbers are taken ahead.
-SIZES = st.builds(Portions, st.integers(1, 4), st.integers(1, 12))
+SIZES = st.fixed_dictionaries({"many": st.integers(1, 4), "batch": st.integers(1, 12)})
 
 
 @given(damaged(parts=False), SIZES)
-def test_numbers_of_a_glstat(data: bytes, portions: Portions) -> None:
-    assert answer(energies_of_model, data, portions) == answer(energies_of_model, data, PORTIONS)
+def test_numbers_of_a_glstat(data: bytes, sizes: Sizes) -> None:
+    assert answer(energies_of_model, data, sizes) == answer(energies_of_model, data, {})
 
 
 @given(damaged(parts=True), SIZES)
-def test_numbers_of_a_matsum(data: bytes, portions: Portions) -> None:
-    assert answer(energies_of_parts, data, portions) == answer(energies_of_parts, data, PORTIONS)
+def test_numbers_of_a_matsum(data: bytes, sizes: Sizes) -> None:
+    assert answer(energies_of_parts, data, sizes) == answer(energies_of_parts, data, {})
 
 
 class Noted(Content):
@@ -121,3 +122,25 @@ def test_blocks_whose_length_varies_are_read(lengths: int) -> None:
     assert run.time.tolist() == states.tolist()
     assert run.channel("internal energy").tolist() == (states**2).tolist()
     assert set(run.channel("external work").tolist()) == {7.0}
+
+
+@given(st.lists(st.floats(-1e308, 1e308), min_size=1, max_size=50), st.integers(1, 9))
+def test_numbers_are_those_of_float_bit_for_bit(values: list[float], decimals: int) -> None:
+    texts = [f"{value:.{decimals}E}" for value in values]
+    fields = np.array([text.rjust(decimals + 10).encode() for text in texts])
+    assert decode(fields, decimals).tobytes() == np.array([float(text) for text in texts]).tobytes()
+
+
+@given(st.lists(st.text("0123456789+-.EeDd *Nna", min_size=14, max_size=14), min_size=1, max_size=20))
+def test_odd_fields_are_float_or_nan(texts: list[str]) -> None:
+    found = decode(np.array([text.encode() for text in texts]), 5)
+    for text, value in zip(texts, found.tolist(), strict=True):
+        plain = text.lower().replace("d", "e")
+        try:
+            expected = float(plain)
+        except ValueError:
+            continue
+        if np.isfinite(value):
+            assert value == expected
+        else:
+            assert not np.isfinite(expected) or text.endswith(" ")

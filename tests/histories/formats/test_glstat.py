@@ -257,13 +257,6 @@ def test_a_byte_lost_or_put_between_the_columns_is_seen(damage: str) -> None:
         assert found == list(STATES)
 
 
-@given(st.lists(st.floats(-1e99, 1e99), min_size=1, max_size=5), st.sampled_from(CONTROLLERS), st.booleans())
-def test_values_equal_those_of_python(energies: list[float], controller: str, windows: bool) -> None:
-    text = HEAD + "".join(block(float(i), e, controller=controller) for i, e in enumerate(energies))
-    history = read(text.replace("\n", "\r\n") if windows else text)
-    assert history.energy.tolist() == [float(f"{e:.5E}") for e in energies]
-
-
 @given(st.binary(max_size=400))
 def test_no_bytes_raise_anything_else(data: bytes) -> None:
     glstat.recognises(data)

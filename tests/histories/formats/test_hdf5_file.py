@@ -14,8 +14,7 @@ from hypothesis import given
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.formats import hdf5_file
-from d2rpick.histories.formats.hdf5_damage import check_file
-from d2rpick.histories.formats.hdf5_file import SavedBinout
+from d2rpick.histories.formats.hdf5_file import SavedBinout, check_file
 from d2rpick.histories.history import History
 from d2rpick.histories.opening import Selection
 from d2rpick.histories.source import Source

@@ -1,8 +1,6 @@
 """Radioss T01, binary and as text: computed runs against other readings, made files of every age, damaged texts."""
 
-import gzip
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,12 +8,12 @@ import pytest
 from d2rpick.base.errors import D2RPickError, FormatError
 from d2rpick.histories.formats import csv_table, radioss_th
 from d2rpick.histories.formats.radioss_th import TimeHistory, recognises
-from d2rpick.histories.opening import Selection, open_run
-from tests.command import BOX, ROLLOVER, put
+from d2rpick.histories.opening import Selection
+from tests.command import BOX, ROLLOVER
 from tests.computed import stored, unpacked
 from tests.damaged_files import FILES, printed
 from tests.made_t01 import MadePart, T01TextWriter, T01Writer, t01, value
-from tests.reading import run_of, run_on_disk
+from tests.reading import run_of
 
 SMALL = FILES["T01 as text"]
 FORMS: dict[str, Callable[[], T01Writer]] = {
@@ -145,26 +143,6 @@ def test_legs_may_be_text_and_binary() -> None:
     run = run_of(radioss_th, bytes(text.data), bytes(binary.data))
     assert run.history(Selection()).time.tolist() == [state / 8 for state in range(6)]
     assert "where legs overlap the newer one counts" in run.notes[0]
-
-
-def test_a_packed_text_is_read_like_one_on_a_disk(tmp_path: Path) -> None:
-    plain, packed = tmp_path / "plain", tmp_path / "packed"
-    plain.write_bytes(SMALL.data)
-    packed.write_bytes(gzip.compress(SMALL.data))
-    read = [open_run([str(file)]).history(Selection(parts=("7",))) for file in (plain, packed)]
-    assert [history.format for history in read] == ["radioss-th"] * 2
-    assert read[0].energy.tolist() == read[1].energy.tolist() == [printed(value(s, 7, 1)) for s in range(SMALL.states)]
-
-
-def test_what_a_running_solver_appends_to_a_file_on_its_disk_does_not_count(tmp_path: Path) -> None:
-    file = put(tmp_path / "runT01", SMALL.data[:-10])
-    run = run_on_disk(file)
-    with file.open("ab") as end:
-        end.write(SMALL.data[-10:])
-    history = run.history(Selection(parts=("7",)))
-    assert history.energy.tolist() == [printed(value(s, 7, 1)) for s in range(SMALL.states - 1)]
-    assert not history.complete
-    assert "the file ends within state 3, which was left out" in history.notes[0]
 
 
 @pytest.mark.parametrize(

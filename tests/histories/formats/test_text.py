@@ -7,24 +7,32 @@ import pytest
 from hypothesis import example, given, strategies as st
 
 from d2rpick.base.errors import ChangedError
-from d2rpick.histories import content
 from d2rpick.histories.content import OnDisk
-from d2rpick.histories.formats.text import Portions, Text
+from d2rpick.histories.formats.text import Text
 from d2rpick.histories.source import Source
 from tests.command import put
-from tests.reading import on_disk
+from tests.reading import InPieces, on_disk
 
 CONTENTS = st.lists(st.sampled_from([b"0.125,17", b"\n", b"\r\n", b"\xc2\xb5s", b"\xb5", b""]), max_size=40).map(
     b"".join
 )
 
 
-SMALL = Portions(head=5, piece=16, short=32, sample=3)
+class Small(Text):
+    """A text of which little is looked at together."""
+
+    top, piece, short, some = 5, 16, 32, 3
+
+
+class Narrow(InPieces):
+    """Bytes of which hardly any are read together."""
+
+    gap, window = 8, 16
 
 
 def on_a_disk(file: Path) -> Text:
     """A text that stays on its disk and is taken apart in small pieces."""
-    return Text(Source("text", on_disk(file, content.Portions(gap=8, window=16))), SMALL)
+    return Small(Source("text", on_disk(file, Narrow)))
 
 
 def lines_of(data: bytes) -> list[str]:
@@ -46,7 +54,7 @@ def test_a_text_has_its_lines_from_a_disk_and_from_memory(
     skipped = min(skipped, len(ended))
     lines = [*ended, last][skipped:] if rest and last else ended[skipped:]
     samples = []
-    for found in (Text(Source("text", data), SMALL), on_a_disk(file)):
+    for found in (Small(Source("text", data)), on_a_disk(file)):
         assert (found.unended, found.head, found.is_short) == (last, ended[:5], len(ended) <= 5)
         begin = found.place(skipped)
         if rest:
@@ -65,7 +73,7 @@ def test_a_big_plain_text_is_not_taken_into_memory(tmp_path: Path) -> None:
             raise MemoryError
 
     file = put(tmp_path / "text", b"time,IE\n" + b"0.125,17\n" * 50)
-    found = Text(Source("text", on_disk(file, content.Portions(), TooBig)), SMALL)
+    found = Small(Source("text", on_disk(file, TooBig)))
     assert [*found.lines(found.place(1))] == ["0.125,17"] * 50
 
 
