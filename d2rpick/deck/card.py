@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.expression import ExpressionError, names_in, number
 from d2rpick.deck.fields import STANDARD, Field, Row, T, Value
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
-    from d2rpick.deck.parameters import Scope
+    from d2rpick.deck.fields import Scope
     from d2rpick.deck.source import Block
 
 
@@ -67,7 +67,7 @@ class Card:
     @cached_property
     def rows(self) -> tuple[Row, ...]:
         """All data lines, blank ones too; comments are left out."""
-        return tuple(Row(self.block, distance, text, self.width) for distance, text in self.block.lines())
+        return tuple([Row(self.block, distance, text, self.width) for distance, text in self.block.lines()])
 
     @cached_property
     def lines(self) -> tuple[Row, ...]:
@@ -101,22 +101,22 @@ class Card:
         """Read an integer; a real without fraction is accepted."""
         return self._number(row, position, default, int)
 
+    def numbers(self, row: Row, kinds: Sequence[type[int] | type[float]]) -> list[Any]:
+        """Read the first fields of a line, each of its kind."""
+        return [self._number(row, at, kind(), kind) for at, kind in enumerate(kinds)]
+
     def _number(self, row: Row, position: int, default: T, kind: Callable[[float], T]) -> Value[T]:
         text = row.cell(position)
         if not text:
             return Value(default, row, "", (), position)
-        names: tuple[str, ...] = ()
         try:
-            if "&" in text or text[0] == "<":
-                names = names_in(text)
-                exact = float(self.scope.value(text))
-            else:
-                exact = float(number(text))
-            if (value := kind(exact)) == exact:
-                return Value(value, row, "", names, position)
+            exact = float(self.scope.value(text) if "&" in text or text[0] == "<" else number(text))
+            value, problem = kind(exact), ""
+            if value != exact:
+                value, problem = default, f"{text!r} is not an integer"
         except (ExpressionError, OverflowError) as error:
-            return Value(default, row, str(error), names, position)
-        return Value(default, row, f"{text!r} is not an integer", names, position)
+            value, problem = default, str(error)
+        return Value(value, row, problem, names_in(text) if "&" in text else (), position)
 
     def positive(self, row: Row, position: int) -> float | None:
         """Read a positive number, or None; of an include in other units none is known."""

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 _EXTRA_LINES: Final = {"CONTACT": 1, "REPOSITION": 1, "PRINT": 1, "FIELD": 1, "INERTIA": 3}
-_WITHOUT_LINES: Final = {"AVERAGED", "TITLE"}
+_FOLLOWED: Final = {*_EXTRA_LINES, "AVERAGED", "TITLE"}  # the last two add no line
 _NO_DEFINITION: Final = {"MOVE", "MODES", "SENSOR", "STACKED", "ADAPTIVE", "ANNEAL"}
 _ROTATED = 1  # IRCS of *PART_INERTIA: one more line follows
 _SET_OPTIONS: Final = {"LIST", "TITLE", "COLLECT", "GENERATE", "COLUMN", "ADD"}
@@ -137,7 +137,7 @@ def _take_parts(card: Card, parts: Parts) -> None:
         if len(card.rows) > 1:
             _add(card, card.rows[:2], "", parts)
         return
-    if not options <= _EXTRA_LINES.keys() | _WITHOUT_LINES:
+    if not options <= _FOLLOWED:
         parts.all_known = False
         return
     rows = list(card.rows)

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 _MODULES = (reading, sets, times, switched_parts, runs)
 _ALL = (one for module in _MODULES for one in vars(module).values() if isinstance(one, Rule))
+_BY_HISTORY: Final = "D2R2"  # rules that an energy history alone can break
 RULES: Final[Mapping[str, Rule]] = {rule.id: rule for rule in sorted(_ALL, key=lambda rule: rule.id)}
 
 
@@ -210,16 +211,17 @@ def _told(windows: Iterable[Window]) -> Iterator[CheckedWindow]:
 
 
 @cache
-def _rules_for(solver: str, select: tuple[str, ...], ignore: tuple[str, ...]) -> tuple[Rule, ...]:
+def _rules_for(solver: str, select: tuple[str, ...], ignore: tuple[str, ...], judged: bool) -> tuple[Rule, ...]:
     """Give the rules that count, and look at decks of a solver: there may be thousands of those."""
     asked = Configuration(select, ignore)
-    return tuple(rule for rule in RULES.values() if solver in rule.solvers and asked.selects(rule.id))
+    wanted = (rule for rule in RULES.values() if judged or not rule.id.startswith(_BY_HISTORY))
+    return tuple(rule for rule in wanted if solver in rule.solvers and asked.selects(rule.id))
 
 
 def _findings(case: Case, configuration: Configuration) -> Iterator[Finding]:
     """Apply the rules that count to what they look at; what a comment silences is left out."""
     solver, silences = case.solver, case.deck.silences
-    for rule in _rules_for(solver, *configuration[:2]):
+    for rule in _rules_for(solver, *configuration[:2], case.judge is not None):
         for place, message in rule.check(case):
             if silences(rule.id, place.file, place.line):
                 continue

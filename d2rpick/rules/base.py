@@ -220,7 +220,7 @@ class RunCase(Case):
         """Bodies that a sensor switches whose time is not known."""
         starter = self.run.starter
         bodies = [body for body in starter.bodies if body.sensor] if starter else []
-        from d2rpick.deck.radioss_sensors import active_spans  # not above: few decks have any
+        from d2rpick.deck.radioss_run import active_spans  # not above: few decks have any
 
         found = [(body, active_spans(starter, body.sensor)) for body in bodies if starter]
         told = [(body.node.field, f"rigid body {body.id} is switched by {why}") for body, why in found

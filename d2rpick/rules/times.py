@@ -225,8 +225,7 @@ _PASSING: Final = (_pair(*_GOOD_PAIR),)
 
 def _faults(case: Case, rule_id: str) -> Iterator[Objection]:
     """Objections of one rule; those that parts of one card share are one."""
-    if case.judge is None:
-        return
+    assert case.judge is not None
     windows = case.windows.windows
     together = grouped(((one.tr, one.td), one.part) for one in windows if one.part is not None)
     found = grouped(
@@ -251,7 +250,8 @@ def _units(case: Case) -> Iterator[Objection]:
     """Decks in milliseconds and histories in seconds are a common mix. Files name no units, so the two ends are all
     there is to compare.
     """
-    if case.judge is None or case.end is None or case.end_time is None or not case.judge.end > 0:
+    assert case.judge is not None
+    if case.end is None or case.end_time is None or not case.judge.end > 0:
         return
     decades = math.log10(case.end) - math.log10(case.judge.end)
     power = round(decades / _DECADES)
@@ -276,7 +276,8 @@ def _thousand_of_history(case: Case) -> Iterator[Objection]:
     """
     windows = case.windows.windows
     times = [time for one in windows for time in (one.tr, one.td) if time is not None]
-    if case.judge is None or not case.judge.end > 0:
+    assert case.judge is not None
+    if not case.judge.end > 0:
         return
     if found := _mixed(times, case.judge.end, f"the history ends at {case.judge.end:g}"):
         yield windows[0].opened.by.time_field, found
