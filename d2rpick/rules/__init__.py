@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.base.errors import ConfigurationError
 from d2rpick.base.settings import RULE_KEYS, nearest_settings, refuse_unknown
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.deck import radioss_files
+from d2rpick.deck.radioss_files import HEAD, recognises
 from d2rpick.deck.reader import Deck, read_deck
 from d2rpick.deck.source import SourceFile
 from d2rpick.rules import reading, runs, sets, switched_parts, times
@@ -233,7 +233,7 @@ def _read(path: str, content: bytes | None, judge: Judge | None) -> Case:
     """Read a deck by what it is: a run of Radioss, or an LS-DYNA deck."""
     source = SourceFile(path, content)
     given = content is not None or os.path.isfile(path)  # noqa: PTH113  a pipe gives its bytes once
-    if given and radioss_files.recognises(source.read(0, radioss_files.HEAD)):
+    if given and recognises(source.read(0, HEAD)):
         from d2rpick.deck.radioss_run import read_run  # not above: start-up
 
         run = read_run(path, content)
