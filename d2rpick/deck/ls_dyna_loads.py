@@ -22,8 +22,7 @@ from d2rpick.deck.model import Boundary, Gravity, Hold, Joint, Joints, ids, plat
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
-    from d2rpick.deck.card import Card
-    from d2rpick.deck.fields import Row
+    from d2rpick.deck.card import Card, Row
     from d2rpick.deck.mesh import Reals
     from d2rpick.deck.model import Places
     from d2rpick.deck.reader import Deck

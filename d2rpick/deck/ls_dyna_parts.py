@@ -14,8 +14,7 @@ from d2rpick.base.tuples import NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
 
-    from d2rpick.deck.card import Card
-    from d2rpick.deck.fields import Field, Problem, Row, Value
+    from d2rpick.deck.card import Card, Field, Problem, Row, Value
     from d2rpick.deck.reader import Deck
 
 

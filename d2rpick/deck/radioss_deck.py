@@ -11,9 +11,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.graph import reached
-from d2rpick.deck.card import Card
+from d2rpick.deck.card import Card, Field, Row, Scope, Value
 from d2rpick.deck.expression import ExpressionError, number, real
-from d2rpick.deck.fields import Field, Row, Scope, Value
 from d2rpick.deck.source import Block, SourceFile
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import DeckError, are, in_rows, name_units
-from d2rpick.deck.fields import Field, Value
+from d2rpick.deck.card import Field, Value
 from d2rpick.deck.radioss_deck import (
     Body,
     Leg,

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import DeckError
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.deck.card import Card, Transform
-from d2rpick.deck.fields import LONG, STANDARD, Field, Problem, Row, Scope
+from d2rpick.deck.card import LONG, STANDARD, Card, Field, Problem, Row, Scope, Transform
 from d2rpick.deck.source import Block, SourceFile
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Final, Literal
 
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.deck.fields import Field, Row, Value
+from d2rpick.deck.card import Field, Row, Value
 from d2rpick.deck.reader import SWITCHING, Deck
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ from d2rpick.rules.base import LS_DYNA, Case, Finding, Rule, RunCase, Severity
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from d2rpick.deck.fields import Field
+    from d2rpick.deck.card import Field
     from d2rpick.deck.switching import SwitchSet, Unit, Window
     from d2rpick.rules.judgement import HistoryJudge as Judge
 

@@ -16,8 +16,7 @@ from d2rpick.deck.switching import Event, Header, SwitchSet, Window, Windows, fi
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
-    from d2rpick.deck.card import Card
-    from d2rpick.deck.fields import Field, Value
+    from d2rpick.deck.card import Card, Field, Value
     from d2rpick.deck.radioss_files import Flaw
     from d2rpick.deck.radioss_run import Run, RunWindows
     from d2rpick.deck.reader import Deck, Unread

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.files import STDIN
-from d2rpick.deck.fields import Field, Problem
+from d2rpick.deck.card import Field, Problem
 from d2rpick.deck.ls_dyna_parts import element_cards
 from d2rpick.deck.reader import UNKNOWN_KIND, cure, cuts
 from d2rpick.deck.switching import SwitchSet, misspelt

@@ -29,7 +29,7 @@ from d2rpick.rules.base import (
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
-    from d2rpick.deck.fields import Field
+    from d2rpick.deck.card import Field
     from d2rpick.deck.switching import Event, Header, Switched, SwitchSet, Unit
 
 _NEAREST = 3  # ids that are named in place of one that the deck does not have
