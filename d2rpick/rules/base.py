@@ -119,7 +119,7 @@ class Case:
     @cached_property
     def constraints(self) -> Sequence[Constraint]:
         """What holds nodes together, and may lie in a part that is switched."""
-        return read_constraints(self.deck)
+        return [*read_constraints(self.deck, "nodal rigid body", "extra nodes", "joint")]
 
     @cached_property
     def made_rigid(self) -> tuple[Event, ...]:
