@@ -78,8 +78,8 @@ def write_deck(main: str, card: PrintedCard, folder: str, *, overwrite: bool = F
 
 
 def _ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
-    deck, printed = read_deck(main), read_deck("the card", card.text.encode())
-    if len(card.files) != 1 or not read_switching(printed):
+    deck, source = read_deck(main), SourceFile("the card", card.text.encode())
+    if len(card.files) != 1 or not source.marks or not read_switching(printed := read_deck("the card", source)):
         raise DeckError(f"{main}: an LS-DYNA deck, but the cards are for another solver")
     for block, told in cuts(deck):  # what is added would hide it, and end a number that is cut
         if block.source is deck.sources[0]:

@@ -227,5 +227,7 @@ def test_a_run_that_does_not_suit_is_refused(
     refused(main, card, message)
 
 
-def test_cards_of_radioss_do_not_go_into_a_deck_of_ls_dyna(tmp_path: Path) -> None:
-    refused(write(tmp_path, HEAD + PARTS), cards(WINDOWS, LEGS, "radioss"), "no keyword was found")
+@pytest.mark.parametrize("solver", ["radioss", "radioss-sensors"])
+def test_cards_of_radioss_do_not_go_into_a_deck_of_ls_dyna(tmp_path: Path, solver: str) -> None:
+    message = r"main\.k: an LS-DYNA deck, but the cards are for another solver"
+    refused(write(tmp_path, HEAD + PARTS), cards(WINDOWS, LEGS, solver), message)
