@@ -76,7 +76,7 @@ class Value(Generic[T]):
         return self.place.field(self.position) if isinstance(self.place, Row) else self.place
 
 
-@dataclass(eq=False, repr=False)
+@dataclass(eq=False, repr=False, slots=True)
 class Row:
     """One data line of a card."""
 
