@@ -1,9 +1,7 @@
 """A Radioss run: when which part is rigid over its legs, or by sensors of times, and what stays rigid.
 
 Source: Altair's public help for /RBODY in engine files: bodies are on by default in the first run, and stay as they
-were in each later one unless it says otherwise.  A rigid body with a sensor is deformable while that is active: the
-help for /SENSOR and /RBODY, the format files of OpenRadioss (Tstop has a line of its own, since version 2023), and
-runs computed with it.
+were in each later one unless it says otherwise.
 """
 
 from __future__ import annotations
@@ -14,7 +12,7 @@ import re
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.base.errors import DeckError, are, in_rows, name_units
 from d2rpick.deck.card import Field, Value
@@ -22,13 +20,13 @@ from d2rpick.deck.radioss_deck import (
     Body,
     Leg,
     Starter,
-    below_title,
+    active_spans,
     blocks,
     card_of,
+    inactive,
     kept_off,
     keyword,
     read_legs,
-    reals,
 )
 from d2rpick.deck.radioss_files import ENGINE, HEAD, STARTER, recognises, run_files
 from d2rpick.deck.reader import Deck, Unread, why_unread
@@ -39,11 +37,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from d2rpick.deck.card import Card
-
-    Spans = tuple[tuple[float, float], ...]  # of time
-
-STOPS_SINCE: Final = 2023  # version of the format from which on a sensor of time has an end
-NEVER: Final = 1e20
 
 
 @dataclass(eq=False, repr=False)
@@ -289,53 +282,3 @@ def left_rigid(run: Run, windows: Sequence[Window]) -> LeftRigid | None:
     found = f"no leg switches /RBODY {', '.join(ids)}, so {name_units(held)} {are(held)} rigid from time 0 to the end"
     way_out = f"name main node{'s' * (len(bodies) > 1)} {', '.join(mains)} in the /RBODY/OFF of every leg"
     return LeftRigid(tuple(held), places[0] if places else run.legs[0].run.here, found, way_out)
-
-
-# Sensors of times.
-
-
-def active_spans(starter: Starter, number: int, above: tuple[int, ...] = ()) -> Spans | str:
-    """Find when a sensor is active: spans (from, to) in order, or what cannot be followed, in words.
-
-    ``above`` are sensors that ask for this one.
-    """
-    card = starter.sensors.get(number)
-    if card is None or number in above:
-        return f"sensor {number}, which {'asks for itself' if card else 'the deck has not'}"
-    rows, kind = below_title(card), card.words[1]
-    if kind not in ("TIME", "OR", "AND", "NOT"):
-        return f"sensor {number}, which is not a time sensor"
-    delay = reals(rows[0], 1)[0] if rows else 0.0
-    if kind == "TIME":
-        stop = reals(rows[1], 1)[0] if len(rows) > 1 and starter.version >= STOPS_SINCE else 0.0
-        if math.isnan(delay) or math.isnan(stop):
-            return f"sensor {number}, whose time is no number"
-        stop = stop if 0 < stop < NEVER else math.inf
-        return ((max(delay, 0.0), stop),) if delay < stop else ()
-    if delay or len(rows) < 2:
-        return f"sensor {number}, whose delay is not followed"
-    asked = [card.integer(rows[1], at).value for at in range(1 if kind == "NOT" else 2)]
-    found = [active_spans(starter, one, (*above, number)) for one in asked]
-    for one in found:
-        if isinstance(one, str):
-            return f"sensor {number}, of {one}"
-    known = [one for one in found if not isinstance(one, str)]
-    if kind == "OR":
-        return _either(known)
-    return inactive(_either([inactive(one) for one in known]) if kind == "AND" else known[0])
-
-
-def _either(several: Sequence[Spans]) -> Spans:
-    joined: list[tuple[float, float]] = []
-    for start, stop in sorted(one for spans in several for one in spans):
-        if joined and start <= joined[-1][1]:
-            start, stop = joined[-1][0], max(stop, joined.pop()[1])
-        joined.append((start, stop))
-    return tuple(joined)
-
-
-def inactive(spans: Spans) -> Spans:
-    """Spans between those in which a sensor is active."""
-    ends = [0.0, *(end for span in spans for end in span), math.inf]
-    pairs = zip(ends[::2], ends[1::2], strict=True)
-    return tuple((start, stop) for start, stop in pairs if start < stop)

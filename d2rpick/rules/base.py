@@ -217,7 +217,7 @@ class RunCase(Case):
     @property
     def untimed(self) -> tuple[tuple[Field, str], ...]:
         """Bodies that a sensor switches whose time is not known."""
-        from d2rpick.deck.radioss_run import active_spans  # not above: start-up
+        from d2rpick.deck.radioss_deck import active_spans  # not above: start-up
 
         starter, legs = self.run.starter, [leg for leg in self.run.legs[:-1] if leg.sensor]
         found = [(one, active_spans(starter, one.sensor)) for one in starter.bodies if one.sensor] if starter else []
