@@ -242,8 +242,7 @@ class RunCase(Case):
     @cached_property
     def rigid_legs(self) -> list[tuple[int, list[Window]]]:
         """Index of every leg in which something becomes or stays rigid, with its windows."""
-        found = []
-        start = 0.0
+        found, start = [], 0.0
         for index, leg in enumerate(self.run.legs):
             stop = leg.stop.value
             held = [w for w in self.windows.windows if w.tr < stop and (w.td is None or w.td > start)]
