@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.deck import formulations, ls_dyna_loads
-from d2rpick.deck.fields import LONG
+from d2rpick.deck.card import LONG
 from d2rpick.deck.ls_dyna_parts import Parts, SectionCard, material_of, read_parts, read_sections
 from d2rpick.deck.mesh import Mesh, layout, lines_of
 from d2rpick.deck.model import Formulation, Inventory, Material, PartData, Section, placed

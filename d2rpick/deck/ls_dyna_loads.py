@@ -9,26 +9,22 @@ Columns: the vendor's keyword data as published in its Python library, and Altai
 
 from __future__ import annotations
 
-from functools import cache, partial
 from math import inf
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.deck.ls_dyna_parts import Parts, material_of, node_sets, read_constraints, read_welds, rigid_materials
+from d2rpick.deck.ls_dyna_parts import Parts, material_of, nodes_of_set, read_constraints, rigid_materials
 from d2rpick.deck.mesh import layout, lines_of
 from d2rpick.deck.model import Boundary, Gravity, Hold, Joint, Joints, ids, plateaus
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Iterator, Mapping
 
-    from d2rpick.deck.card import Card
-    from d2rpick.deck.fields import Row
+    from d2rpick.deck.card import Card, Row
     from d2rpick.deck.mesh import Reals
     from d2rpick.deck.model import Places
     from d2rpick.deck.reader import Deck
-
-    Sets = Callable[[], dict[int, frozenset[int]]]
 
 _PART_ID, _NODE_SET = 3, 4  # SSTYP, MSTYP
 # Keywords that hold parts together too, by the first words of their names.
@@ -38,7 +34,6 @@ _OTHER_TIES: Final = (
     *("CONSTRAINED_MULTIPLE_GLOBAL", "CONSTRAINED_SHELL_TO_SOLID", "CONSTRAINED_NODE_SET"),
     *(f"CONSTRAINED_{one}_IN_SOLID" for one in ("BEAM", "SHELL", "SOLID", "LAGRANGE")),
 )
-_CONSTRAINTS: Final = ("CONSTRAINED_NODAL_RIGID_BODY", "CONSTRAINED_EXTRA_NODES")
 # Directions that a code of *NODE, *MAT_RIGID and *CONSTRAINED_GLOBAL fixes.
 CODES: Final = ((), (0,), (1,), (2,), (0, 1), (1, 2), (2, 0), (0, 1, 2))
 _ALONG: Final = {f"LOAD_BODY_{letter}": axis for axis, letter in enumerate("XYZ")}
@@ -52,9 +47,8 @@ _FLAT: Final = 1e-4  # of the size of the model: nodes on the plane of a *CONSTR
 
 def read(deck: Deck, parts: Parts, nodes: tuple[Places, Reals, Places]) -> Boundary:
     """Collect what acts on the model from outside; ``nodes`` are ids, coordinates and codes of translation."""
-    sets = cache(partial(node_sets, deck))
     numbers, places, codes = nodes
-    found = [*_supports(deck, sets), *_motions(deck, sets), *_of_nodes(numbers, codes), *_of_materials(deck, parts)]
+    found = [*_supports(deck), *_motions(deck), *_of_nodes(numbers, codes), *_of_materials(deck, parts)]
     found += [_of_plane(card, numbers, places) for card in deck.named("CONSTRAINED_GLOBAL")]
     return Boundary.of(found, [*_gravity(deck, parts)], whole=not deck.unread and not deck.encrypted)
 
@@ -70,7 +64,7 @@ def _not_followed(card: Card) -> str:
 # Supports.
 
 
-def _supports(deck: Deck, sets: Sets) -> Iterator[Hold | str]:
+def _supports(deck: Deck) -> Iterator[Hold | str]:
     for card in deck.named(_SPC):
         options = card.options(_SPC)
         if card.name.startswith(_SYMMETRY):
@@ -81,12 +75,12 @@ def _supports(deck: Deck, sets: Sets) -> Iterator[Hold | str]:
         step = 1 + ("ID" in options) + ("BIRTH" in options)
         for at in range("ID" in options, len(card.lines), step):
             times = card.lines[at + 1] if "BIRTH" in options and at + 1 < len(card.lines) else None
-            yield _spc(card, card.lines[at], times, sets if "SET" in options else None)
+            yield _spc(deck, card, card.lines[at], times)
 
 
-def _spc(card: Card, row: Row, times: Row | None, sets: Sets | None) -> Hold | str:
+def _spc(deck: Deck, card: Card, row: Row, times: Row | None) -> Hold | str:
     """Read a line of nodes or of a set; along the axes of a system of its own it counts in any case."""
-    nodes = _members(card, row, sets)
+    nodes = _members(deck, card, row)
     fixed = [bool(card.integer(row, at).value) for at in range(2, 8)]
     if nodes is None:
         return _not_followed(card)
@@ -102,11 +96,11 @@ def _timed(hold: Hold, card: Card, row: Row, birth: int, death: int = 1) -> Hold
     return hold._replace(start=start, end=end if end > 0 else inf)
 
 
-def _members(card: Card, row: Row, sets: Sets | None) -> Places | None:
+def _members(deck: Deck, card: Card, row: Row) -> Places | None:
+    """The node, or the nodes of the set (``_SET``), that a line begins with."""
     number = card.integer(row, 0).value
-    if sets is None:
-        return ids({number + card.transform.node})
-    found = sets().get(number + card.transform.set_)
+    single = None if "SET" in card.name.split("_") else {number + card.transform.node}
+    found = single or nodes_of_set(deck, card, number)
     return None if found is None else ids(found)
 
 
@@ -146,7 +140,7 @@ def _of_materials(deck: Deck, parts: Parts) -> Iterator[Hold]:
 # Prescribed motion.
 
 
-def _motions(deck: Deck, sets: Sets) -> Iterator[Hold | str]:
+def _motions(deck: Deck) -> Iterator[Hold | str]:
     for card in deck.named(_MOTION):
         options = card.options(_MOTION)
         if not options & {"NODE", "SET", "RIGID"} or options - {"NODE", "SET", "RIGID", "LOCAL", "ID"}:
@@ -157,13 +151,13 @@ def _motions(deck: Deck, sets: Sets) -> Iterator[Hold | str]:
             rows = rows["ID" in options :]
             row = rows[0]
             further = abs(card.integer(row, 1).value) in _OWN_CENTRE or card.integer(row, 2).value == _RELATIVE
-            yield _motion(card, row, options, sets)
+            yield _motion(deck, card, row, options)
             rows = rows[1 + further :]
 
 
-def _motion(card: Card, row: Row, options: frozenset[str], sets: Sets) -> Hold | str:
+def _motion(deck: Deck, card: Card, row: Row, options: frozenset[str]) -> Hold | str:
     part = frozenset({card.integer(row, 0).value + card.transform.part}) if "RIGID" in options else frozenset[int]()
-    nodes = ids(()) if part else _members(card, row, sets if "SET" in options else None)
+    nodes = ids(()) if part else _members(deck, card, row)
     if nodes is None:
         return _not_followed(card)
     return _timed(Hold(_name(card), nodes, part, counts=True), card, row, 7, 6)
@@ -223,22 +217,20 @@ def _curves(deck: Deck) -> Iterator[tuple[int, tuple[float, ...]]]:
 def joints_of(deck: Deck) -> Joints:
     """Collect what joins parts in an LS-DYNA deck; joints of two rigid bodies that may turn are none."""
     found, unknown = [], [_name(card) for name in _OTHER_TIES for card in deck.named(name)]
-    constraints = read_constraints(deck) if deck.named(*_CONSTRAINTS) else []
-    for one in (*constraints, *read_welds(deck)):
-        if one.kind != "joint" and one.nodes:
+    for one in read_constraints(deck, "nodal rigid body", "extra nodes", "spotweld", "rivet", "generalized weld"):
+        if one.nodes:
             found.append(Joint(one.kind, ids(one.nodes), frozenset([one.part] if one.part else [])))
-        elif one.kind != "joint":
+        else:
             unknown.append(f"{one.kind} ({one.place.at})")
-    sets = cache(partial(node_sets, deck))
     for card in deck.named("CONTACT"):
         if card.name.startswith(("CONTACT_TIED", "CONTACT_SPOTWELD")) or "TIEBREAK" in card.name:
-            tie = _of_contact(card, sets)
+            tie = _of_contact(deck, card)
             found += [tie] if tie else []
             unknown += [] if tie else [_name(card)]
     return Joints(tuple(found), tuple(unknown))
 
 
-def _of_contact(card: Card, sets: Callable[[], dict[int, frozenset[int]]]) -> Joint | None:
+def _of_contact(deck: Deck, card: Card) -> Joint | None:
     """Parts that a tied contact of two parts, or of nodes and a part, holds together; None for any other."""
     options = card.options("CONTACT")
     rows = card.lines[int(bool({"ID", "TITLE"} & options)) :]
@@ -253,5 +245,5 @@ def _of_contact(card: Card, sets: Callable[[], dict[int, frozenset[int]]]) -> Jo
         return None
     if kind == _PART_ID:
         return Joint("tied contact", ids(()), frozenset({one + moved.part, other + moved.part}))
-    nodes = sets().get(one + moved.set_)
+    nodes = nodes_of_set(deck, card, one)
     return Joint("tied contact", ids(nodes), frozenset({other + moved.part})) if nodes else None

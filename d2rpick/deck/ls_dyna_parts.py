@@ -7,25 +7,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, Literal
+from weakref import WeakKeyDictionary
 
 from d2rpick.base.graph import reached
 from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Sequence
+    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
-    from d2rpick.deck.card import Card
-    from d2rpick.deck.fields import Field, Problem, Row, Value
+    from d2rpick.deck.card import Card, Field, Problem, Row, Value
     from d2rpick.deck.reader import Deck
 
 
 _EXTRA_LINES: Final = {"CONTACT": 1, "REPOSITION": 1, "PRINT": 1, "FIELD": 1, "INERTIA": 3}
-_WITHOUT_LINES: Final = {"AVERAGED", "TITLE"}
+_FOLLOWED: Final = {*_EXTRA_LINES, "AVERAGED", "TITLE"}  # the last two add no line
 _NO_DEFINITION: Final = {"MOVE", "MODES", "SENSOR", "STACKED", "ADAPTIVE", "ANNEAL"}
 _ROTATED = 1  # IRCS of *PART_INERTIA: one more line follows
 _SET_OPTIONS: Final = {"LIST", "TITLE", "COLLECT", "GENERATE", "COLUMN", "ADD"}
 _NODE_SET_OPTIONS: Final = {"LIST", "TITLE", "GENERATE", "COLUMN"}
 _PER_LINE = 8
+_NODE_SETS: WeakKeyDictionary[Deck, Mapping[int, frozenset[int]]] = WeakKeyDictionary()  # what was found
 # Solid formulations that keep their stresses in global axes, by ELFORM; 0 and 9 co-rotate.
 NOT_TURNED: Final = {
     -2: "8 points, selectively reduced, for poor aspect ratios",
@@ -137,7 +138,7 @@ def _take_parts(card: Card, parts: Parts) -> None:
         if len(card.rows) > 1:
             _add(card, card.rows[:2], "", parts)
         return
-    if not options <= _EXTRA_LINES.keys() | _WITHOUT_LINES:
+    if not options <= _FOLLOWED:
         parts.all_known = False
         return
     rows = list(card.rows)
@@ -193,17 +194,20 @@ def _content(card: Card, options: Collection[str], values: Sequence[Value[int]])
     return PartSet(sets=ids, problems=problems) if "ADD" in options else PartSet(parts=ids, problems=problems)
 
 
-def node_sets(deck: Deck) -> dict[int, frozenset[int]]:
-    """Members of the node sets whose lines are followed."""
-    found: dict[int, frozenset[int]] = {}
-    for card in deck.named("SET_NODE"):
-        options = card.options("SET_NODE")
-        if card.data and options <= _NODE_SET_OPTIONS:
-            ids = [value.value + card.transform.node for value in _listed(card, options) if value.value > 0]
-            if "GENERATE" in options:
-                ids = [one for low, high in zip(ids[::2], ids[1::2], strict=False) for one in range(low, high + 1)]
-            found[card.integer(card.data[0], 0).value + card.transform.set_] = frozenset(ids)
-    return found
+def nodes_of_set(deck: Deck, card: Card, number: int) -> frozenset[int] | None:
+    """Members of the node set with this number on a card; None of one that the deck has not, or is not followed."""
+    if deck not in _NODE_SETS:
+        _NODE_SETS[deck] = {id_: ids for one in deck.named("SET_NODE") for id_, ids in _node_set(one)}
+    return _NODE_SETS[deck].get(number + card.transform.set_)
+
+
+def _node_set(card: Card) -> Iterator[tuple[int, frozenset[int]]]:
+    options = card.options("SET_NODE")
+    if card.data and options <= _NODE_SET_OPTIONS:
+        ids = [value.value + card.transform.node for value in _listed(card, options) if value.value > 0]
+        if "GENERATE" in options:
+            ids = [one for low, high in zip(ids[::2], ids[1::2], strict=False) for one in range(low, high + 1)]
+        yield card.integer(card.data[0], 0).value + card.transform.set_, frozenset(ids)
 
 
 def _listed(card: Card, options: Collection[str]) -> list[Value[int]]:
@@ -256,7 +260,7 @@ def element_cards(deck: Deck, *, searched: bool) -> list[Card]:
 
 
 Kind = Literal["nodal rigid body", "extra nodes", "joint", "spotweld", "rivet", "generalized weld"]
-_BODY, _EXTRA = "CONSTRAINED_NODAL_RIGID_BODY", "CONSTRAINED_EXTRA_NODES"
+_BODY: Final = "CONSTRAINED_NODAL_RIGID_BODY"
 _JOINT_NODES = 6
 
 
@@ -270,31 +274,52 @@ class Constraint(NamedTuple):
     part: int | None = None
 
 
-def read_constraints(deck: Deck) -> list[Constraint]:
-    """Collect the constraints of a deck; one whose nodes cannot be known has none."""
-    if not deck.named("CONSTRAINED"):
-        return []
-    sets = node_sets(deck)
-    bodies = (one for card in deck.named(_BODY) for one in _nodal_rigid_bodies(card, sets))
-    extra = (one for card in deck.named(_EXTRA) for one in _extra_nodes(card, sets))
-    joints = (one for card in deck.named("CONSTRAINED_JOINT") for one in _joints(card))
-    return [*bodies, *extra, *joints]
+def read_constraints(deck: Deck, *kinds: Kind) -> Iterator[Constraint]:
+    """Collect the constraints of some kinds; one whose nodes cannot be known has none."""
+    for kind in kinds:
+        keyword, read = _CONSTRAINTS[kind]
+        for card in deck.named(keyword):
+            yield from read(deck, card, kind)
 
 
-def read_welds(deck: Deck) -> Iterator[Constraint]:
-    """Collect spotwelds, rivets and generalized welds; one whose nodes cannot be known has none."""
-    kinds: tuple[tuple[str, Kind], ...] = (("CONSTRAINED_SPOTWELD", "spotweld"), ("CONSTRAINED_RIVET", "rivet"))
-    for name, kind in kinds:
-        for card in deck.named(name):  # two nodes on a line, on each where no option adds lines
-            rows = _first(card) if card.name != name else card.lines
-            yield from (_of_nodes(card, row, kind, 2) for row in rows)
-    welds = deck.named("CONSTRAINED_GENERALIZED_WELD")
-    sets = node_sets(deck) if welds else {}
-    for card in welds:
-        for row in _first(card):
-            members = card.integer(row, 0)
-            nodes = sets.get(members.value + card.transform.set_, frozenset())
-            yield Constraint("generalized weld", members.field, 0, nodes)
+def _nodal_rigid_bodies(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
+    options, rows = card.options(_BODY), card.lines
+    if options - {"TITLE"}:  # further lines follow the first: one body per keyword
+        rows = rows[:2] if "TITLE" in options else rows[:1]
+    for row in rows[1::2] if "TITLE" in options else rows:
+        body, nodes = card.integer(row, 0), card.integer(row, 2)
+        members = nodes_of_set(deck, card, nodes.value) if nodes.value else None
+        yield Constraint(kind, body.field, body.value, members or frozenset())
+
+
+def _extra_nodes(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
+    for row in card.rows:
+        part, other = card.integer(row, 0), card.integer(row, 1)
+        if row.blank or part.problem or other.problem:
+            continue
+        single = None if card.name.endswith("_SET") else frozenset({other.value + card.transform.node})
+        nodes = single or nodes_of_set(deck, card, other.value) or frozenset()
+        yield Constraint(kind, part.field, 0, nodes, part.value + card.transform.part)
+
+
+def _joints(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
+    if card.name.startswith(("CONSTRAINED_JOINT_STIFFNESS", "CONSTRAINED_JOINT_COOR", "CONSTRAINED_JOINT_USER_FORCE")):
+        return
+    for row in _first(card):
+        number = card.integer(card.lines[0], 0).value if card.name.endswith("_ID") else 0
+        yield _of_nodes(card, row, kind, _JOINT_NODES, number)
+
+
+def _of_two_nodes(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
+    """Two nodes on a line, on each where no option adds lines."""
+    rows = card.lines if card.name == _CONSTRAINTS[kind][0] else _first(card)
+    return (_of_nodes(card, row, kind, 2) for row in rows)
+
+
+def _generalized_welds(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
+    for row in _first(card):
+        members = card.integer(row, 0)
+        yield Constraint(kind, members.field, 0, nodes_of_set(deck, card, members.value) or frozenset())
 
 
 def _first(card: Card) -> tuple[Row, ...]:
@@ -309,34 +334,15 @@ def _of_nodes(card: Card, row: Row, kind: Kind, most: int, number: int = 0) -> C
     return Constraint(kind, nodes[0].field, number, ids)
 
 
-def _nodal_rigid_bodies(card: Card, sets: dict[int, frozenset[int]]) -> Iterator[Constraint]:
-    options, rows = card.options(_BODY), card.lines
-    if options - {"TITLE"}:  # further lines follow the first: one body per keyword
-        rows = rows[:2] if "TITLE" in options else rows[:1]
-    for row in rows[1::2] if "TITLE" in options else rows:
-        body, nodes = card.integer(row, 0), card.integer(row, 2)
-        members = sets.get(nodes.value + card.transform.set_, frozenset()) if nodes.value else frozenset()
-        yield Constraint("nodal rigid body", body.field, body.value, members)
-
-
-def _extra_nodes(card: Card, sets: dict[int, frozenset[int]]) -> Iterator[Constraint]:
-    for row in card.rows:
-        part, other = card.integer(row, 0), card.integer(row, 1)
-        if row.blank or part.problem or other.problem:
-            continue
-        if card.name.endswith("_SET"):
-            nodes = sets.get(other.value + card.transform.set_, frozenset())
-        else:
-            nodes = frozenset({other.value + card.transform.node})
-        yield Constraint("extra nodes", part.field, 0, nodes, part.value + card.transform.part)
-
-
-def _joints(card: Card) -> Iterator[Constraint]:
-    if card.name.startswith(("CONSTRAINED_JOINT_STIFFNESS", "CONSTRAINED_JOINT_COOR", "CONSTRAINED_JOINT_USER_FORCE")):
-        return
-    for row in _first(card):
-        number = card.integer(card.lines[0], 0).value if card.name.endswith("_ID") else 0
-        yield _of_nodes(card, row, "joint", _JOINT_NODES, number)
+# By what they are: their keyword, and the function that reads a card.
+_CONSTRAINTS: Final[Mapping[Kind, tuple[str, Callable[[Deck, Card, Kind], Iterator[Constraint]]]]] = {
+    "nodal rigid body": (_BODY, _nodal_rigid_bodies),
+    "extra nodes": ("CONSTRAINED_EXTRA_NODES", _extra_nodes),
+    "joint": ("CONSTRAINED_JOINT", _joints),
+    "spotweld": ("CONSTRAINED_SPOTWELD", _of_two_nodes),
+    "rivet": ("CONSTRAINED_RIVET", _of_two_nodes),
+    "generalized weld": ("CONSTRAINED_GENERALIZED_WELD", _generalized_welds),
+}
 
 
 _NO_CONTACTS: Final = {"ADD", "AUTO", "COUPLING", "EXCLUDE", "GEBOD", "GUIDED"}  # first words of their names

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from d2rpick.deck.card import Card
-    from d2rpick.deck.parameters import Scope
+    from d2rpick.deck.card import Card, Scope
     from d2rpick.deck.source import Block
 
     Layout = Sequence[tuple[int, int]]  # first column and width of each field

@@ -15,16 +15,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base import __version__
 from d2rpick.base.errors import DeckError
-from d2rpick.deck.printed_card import (
-    LONGEST,
-    PHYSICS,
-    PrintedCard,
-    Solver,
-    check_ids,
-    check_windows,
-    comments,
-    shortest,
-)
+from d2rpick.deck import printed_card
+from d2rpick.deck.printed_card import LONGEST, PHYSICS, PrintedCard, Solver, check_ids, comments, shortest
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -48,7 +40,6 @@ _NO_SETS: Final[PartSets] = {}
 # Of the rigid window, per step: the release is at most a thousandth of it late.  Each window has its own, so that
 # further windows leave the run up to them as it was.
 _CAP_SHARE = 1000
-_UNMERGED = ("Merge parts that share nodes (d2rpick card --merge), never loose ones.",)
 
 
 def _ls_dyna(windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()) -> PrintedCard:
@@ -59,7 +50,7 @@ def _ls_dyna(windows: Sequence[Times], printing: Printing, remarks: Sequence[str
     DeckError
         If windows do not follow each other, as given or as printed, or an id does not fit.
     """
-    windows, ids = check_windows(windows), check_ids(printing.part)
+    windows, ids = printed_card.check_windows(windows), check_ids(printing.part)
     sets = list(_sets(printing.swset, len(windows)))
     if printing.merge is not None:
         check_ids([printing.merge], LONGEST)  # stands right of an id, with a blank between them
@@ -201,7 +192,7 @@ def _warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
             if len(body) > 1
         )
     elif printing.merge is None and len(ids) > 1:
-        yield from _UNMERGED
+        yield "Merge parts that share nodes (d2rpick card --merge), never loose ones."
     elif printing.merge is not None and printing.merge not in ids:
         yield f"Part {printing.merge} is the lead: it must be rigid already."
 
@@ -261,10 +252,10 @@ def _radioss_sensors(windows: Sequence[Times], printing: Printing, remarks: Sequ
     DeckError
         As `_radioss` does.
     """
-    from d2rpick.deck.radioss_sensors import STOPS_SINCE, sensor_cards  # not above: other cards do without
+    from d2rpick.deck.radioss_deck import STOPS_SINCE  # not above: other cards do without
 
     windows, ids, end = _of_run(windows, printing)
-    sensors, last = sensor_cards(windows, printing.sensor)
+    sensors, last = _sensors(windows, printing.sensor)
     cap = min(leg.cap for leg in legs(windows, end, printing.step_cap) if leg.cap is not None)
     lines = (f"/RUN/{printing.name}/1", f"{end!r:>20}", *off(printing.off), *capped(cap))
     files = {f"{printing.name}_0001.rad": "\n".join(lines) + "\n"}
@@ -278,9 +269,24 @@ def _radioss_sensors(windows: Sequence[Times], printing: Printing, remarks: Sequ
     return replace(told, sensors=dict.fromkeys(ids, last))
 
 
+def _sensors(windows: Sequence[Times], first: int) -> tuple[str, int]:
+    """Write sensors with ids from ``first`` on, and give the id of the one that is active outside of the windows."""
+    from d2rpick.deck.radioss_deck import NEVER, inactive
+
+    spans = inactive(tuple(windows))
+    texts, last = list[str](), first
+    for number, (start, stop) in enumerate(spans, start=first):
+        until = min(stop, NEVER)
+        texts.append(f"/SENSOR/TIME/{number}\ndeformable\n{shortest(start, 20):>20}\n{shortest(until, 20):>20}\n")
+    for number, other in enumerate(range(first + 1, first + len(spans)), start=first + len(spans)):
+        texts.append(f"/SENSOR/OR/{number}\ndeformable\n{0:20d}\n{last:10d}{other:10d}\n")
+        last = number
+    return "".join(texts), last
+
+
 def _of_run(windows: Sequence[Times], printing: Printing) -> tuple[tuple[Times, ...], list[int], float]:
     """Return the windows, main nodes and end of a run; DeckError where they do not make one."""
-    windows, ids = check_windows(windows), check_ids(printing.node)
+    windows, ids = printed_card.check_windows(windows), check_ids(printing.node)
     if not _RUN_NAME.fullmatch(printing.name):
         raise DeckError(f"the name of the run is {printing.name!r}, letters, digits, '.', '_' and '-' were expected")
     if printing.end is None or not windows[-1][1] < printing.end < math.inf:

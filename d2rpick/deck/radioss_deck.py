@@ -6,23 +6,26 @@ A block is a line that begins with ``/``, and the data lines below it.  Columns 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.graph import reached
-from d2rpick.deck.card import Card
+from d2rpick.deck.card import Card, Field, Row, Scope, Value
 from d2rpick.deck.expression import ExpressionError, number, real
-from d2rpick.deck.fields import Field, Row, Value
-from d2rpick.deck.parameters import Scope
 from d2rpick.deck.source import Block, SourceFile
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+    Spans = tuple[tuple[float, float], ...]  # of time
+
 
 _INCLUDE = b"#include"
 _DIGITS = 10  # of an id
+STOPS_SINCE: Final = 2023  # version of the format from which on a sensor of time has an end
+NEVER: Final = 1e20
 
 
 def blocks(source: SourceFile) -> Iterator[Block]:
@@ -337,3 +340,55 @@ def _ids(rows: Iterable[Row]) -> tuple[int, ...]:
 def reals(row: Row, count: int) -> list[float]:
     """Read numbers of 20 columns each; a blank is 0, NaN what is none."""
     return [real(row.text[at : at + 2 * _WIDTH]) for at in range(0, count * 2 * _WIDTH, 2 * _WIDTH)]
+
+
+# Sensors of times.  A rigid body with a sensor is deformable while that is active, and rigid while it is not.  Source:
+# Altair's public help for /SENSOR and /RBODY, the format files of OpenRadioss (Tstop has a line of its own, since
+# version 2023), and runs computed with it.
+
+
+def active_spans(starter: Starter, number: int, above: tuple[int, ...] = ()) -> Spans | str:
+    """Find when a sensor is active: spans (from, to) in order, or what cannot be followed, in words.
+
+    ``above`` are sensors that ask for this one.
+    """
+    card = starter.sensors.get(number)
+    if card is None or number in above:
+        return f"sensor {number}, which {'asks for itself' if card else 'the deck has not'}"
+    rows, kind = below_title(card), card.words[1]
+    if kind not in ("TIME", "OR", "AND", "NOT"):
+        return f"sensor {number}, which is not a time sensor"
+    delay = reals(rows[0], 1)[0] if rows else 0.0
+    if kind == "TIME":
+        stop = reals(rows[1], 1)[0] if len(rows) > 1 and starter.version >= STOPS_SINCE else 0.0
+        if math.isnan(delay) or math.isnan(stop):
+            return f"sensor {number}, whose time is no number"
+        stop = stop if 0 < stop < NEVER else math.inf
+        return ((max(delay, 0.0), stop),) if delay < stop else ()
+    if delay or len(rows) < 2:
+        return f"sensor {number}, whose delay is not followed"
+    asked = [card.integer(rows[1], at).value for at in range(1 if kind == "NOT" else 2)]
+    found = [active_spans(starter, one, (*above, number)) for one in asked]
+    for one in found:
+        if isinstance(one, str):
+            return f"sensor {number}, of {one}"
+    known = [one for one in found if not isinstance(one, str)]
+    if kind == "OR":
+        return _either(known)
+    return inactive(_either([inactive(one) for one in known]) if kind == "AND" else known[0])
+
+
+def _either(several: Sequence[Spans]) -> Spans:
+    joined: list[tuple[float, float]] = []
+    for start, stop in sorted(one for spans in several for one in spans):
+        if joined and start <= joined[-1][1]:
+            start, stop = joined[-1][0], max(stop, joined.pop()[1])
+        joined.append((start, stop))
+    return tuple(joined)
+
+
+def inactive(spans: Spans) -> Spans:
+    """Spans between those in which a sensor is active."""
+    ends = [0.0, *(end for span in spans for end in span), math.inf]
+    pairs = zip(ends[::2], ends[1::2], strict=True)
+    return tuple((start, stop) for start, stop in pairs if start < stop)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:
-    from d2rpick.deck.fields import Field
+    from d2rpick.deck.card import Field
 
 THROUGH_WALL: Final = "body-through-wall"
 AT_REST: Final = "body-without-velocity"

@@ -19,8 +19,7 @@ from d2rpick.deck.radioss_files import AT_REST, NOT_FOLLOWED, THROUGH_WALL, Flaw
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
 
-    from d2rpick.deck.card import Card
-    from d2rpick.deck.fields import Field
+    from d2rpick.deck.card import Card, Field
     from d2rpick.deck.mesh import Integers, Reals
     from d2rpick.deck.radioss_run import Run
 

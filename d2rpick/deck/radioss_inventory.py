@@ -23,8 +23,7 @@ from d2rpick.deck.reader import cuts, holds_mesh
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from d2rpick.deck.card import Card
-    from d2rpick.deck.fields import Row
+    from d2rpick.deck.card import Card, Row
     from d2rpick.deck.mesh import Integers
     from d2rpick.deck.switching import Window
 

@@ -1,4 +1,4 @@
-"""A Radioss run: when which part is rigid over its legs, and what stays rigid.
+"""A Radioss run: when which part is rigid over its legs, or by sensors of times, and what stays rigid.
 
 Source: Altair's public help for /RBODY in engine files: bodies are on by default in the first run, and stay as they
 were in each later one unless it says otherwise.
@@ -15,8 +15,19 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.base.errors import DeckError, are, in_rows, name_units
-from d2rpick.deck.fields import Field, Value
-from d2rpick.deck.radioss_deck import Body, Leg, Starter, blocks, card_of, kept_off, keyword, read_legs
+from d2rpick.deck.card import Field, Value
+from d2rpick.deck.radioss_deck import (
+    Body,
+    Leg,
+    Starter,
+    active_spans,
+    blocks,
+    card_of,
+    inactive,
+    kept_off,
+    keyword,
+    read_legs,
+)
 from d2rpick.deck.radioss_files import ENGINE, HEAD, STARTER, recognises, run_files
 from d2rpick.deck.reader import Deck, Unread, why_unread
 from d2rpick.deck.source import SourceFile
@@ -200,8 +211,6 @@ def _follow(unit: Unit, node: int, sets: tuple[LegSwitch, ...], first: Leg) -> l
 
 def _by_sensor(run: Run, body: Body, parts: dict[int, set[int]]) -> Iterator[Window]:
     """Windows of a body with a sensor of times: it is rigid while the sensor is not active."""
-    from d2rpick.deck.radioss_sensors import active_spans, inactive  # not above: few decks have any
-
     active = active_spans(run.starter, body.sensor) if run.starter else ""
     if isinstance(active, str):
         return

@@ -13,9 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import DeckError
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.deck.card import Card, Transform
-from d2rpick.deck.fields import LONG, STANDARD, Field, Problem, Row
-from d2rpick.deck.parameters import Scope
+from d2rpick.deck.card import LONG, STANDARD, Card, Field, Problem, Row, Scope, Transform
 from d2rpick.deck.source import Block, SourceFile
 
 if TYPE_CHECKING:
@@ -129,17 +127,20 @@ class Deck:
 
     def named(self, *names: str) -> list[Card]:
         """Cards of a deck that was read whose keyword is one of ``names``, or one with an option behind ``_``."""
-        found = [self._places[name] for name in names if name in self._places]
-        return [self.cards[place] for place in (found[0] if len(found) == 1 else sorted({*chain(*found)}))]
+        found = [self._by_name[name] for name in names if name in self._by_name]
+        if len(found) < 2:
+            return [*chain(*found)]
+        chosen = {*chain(*found)}
+        return [card for card in self.cards if card in chosen]
 
     @cached_property
-    def _places(self) -> Mapping[str, Sequence[int]]:
-        """Places of the cards by their names, and by what stands there before an ``_``: every rule asks for some."""
-        found: defaultdict[str, list[int]] = defaultdict(list)
-        for place, card in enumerate(self.cards):
+    def _by_name(self) -> Mapping[str, Sequence[Card]]:
+        """Cards by their names, and by what stands there before an ``_``: every rule asks for some."""
+        found: defaultdict[str, list[Card]] = defaultdict(list)
+        for card in self.cards:
             end = len(name := card.name)
             while end > 0:
-                found[name[:end]].append(place)
+                found[name[:end]].append(card)
                 end = name.rfind("_", 0, end)
         return found
 

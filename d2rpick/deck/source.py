@@ -300,13 +300,22 @@ class SourceFile:
             piece = self.read(start, min(start + size, end))
             if start + len(piece) < end:
                 piece = piece[: piece.rfind(b"\n") + 1]
-            if (at := long_line(piece or self.read(start, start + size), self._longest)) >= 0:
-                raise DeckError(f"{self.name}:{self.line_at(start + at)}: the line has {beyond('LINE')}")
+            self._refuse_long_line(piece or self.read(start, start + size), start)
             if piece:
                 yield piece
                 start += len(piece)
             else:
                 size *= 2  # this line is longer
+
+    def text(self, start: int, end: int | None) -> str:
+        """Read the same at once, as Latin-1."""
+        data = self.read(start, end)
+        self._refuse_long_line(data, start)
+        return data.decode("latin-1")
+
+    def _refuse_long_line(self, data: bytes, start: int) -> None:
+        if (at := long_line(data, self._longest)) >= 0:
+            raise DeckError(f"{self.name}:{self.line_at(start + at)}: the line has {beyond('LINE')}")
 
     def sha256(self) -> str:
         """SHA-256 of the bytes; DeckError where the file was rewritten since it was read."""
@@ -367,17 +376,14 @@ class Block:
         """Number of the keyword line in its file."""
         return self.source.line_at(self.start)
 
-    def lines(self) -> Iterator[tuple[int, str]]:
+    def lines(self) -> list[tuple[int, str]]:
         """Read the data lines, with their distance to the keyword, without comments."""
-        distance, comment = -1, self._comment
-        for piece in self.source.pieces(self.start, self.end):
-            *lines, rest = piece.decode("latin-1").split("\n")
-            if rest and self.end is None:  # otherwise these are the blanks in front of the next keyword
-                lines.append(rest)
-            for line in lines:
-                distance += 1
-                if distance and not line.startswith(comment):
-                    yield distance, line.rstrip("\r")
+        comment = self._comment
+        *lines, rest = self.source.text(self.start, self.end).split("\n")
+        if rest and self.end is None:  # otherwise these are the blanks in front of the next keyword
+            lines.append(rest)
+        found = enumerate(lines[1:], start=1)
+        return [(distance, line.rstrip("\r")) for distance, line in found if not line.startswith(comment)]
 
     @cached_property
     def silenced(self) -> tuple[str, ...]:

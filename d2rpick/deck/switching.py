@@ -10,18 +10,18 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.deck.card import Card
-from d2rpick.deck.fields import Field, Row, Value
+from d2rpick.deck.card import Field, Row, Value
 from d2rpick.deck.reader import SWITCHING, Deck
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
+    from d2rpick.deck.card import Card
     from d2rpick.deck.ls_dyna_parts import Parts
 
 Kind = Literal["automatic", "plain", "inertia", "restart"]
@@ -36,9 +36,8 @@ _KINDS: Final[dict[str, Kind]] = {
     "RIGID_DEFORMABLE_R2D": "restart",
 }
 _HEADER_ROWS = 2
-_INT, _REAL = Card.integer, Card.real
-_FIRST_LINE = (_INT, _INT, _REAL, _REAL, _REAL, _INT, _INT, _INT)  # how the fields of a header are read
-_SECOND_LINE = (_INT, _INT, _REAL, _REAL, _INT, _INT, _REAL)
+_FIRST_LINE = (int, int, float, float, float, int, int, int)  # how the fields of a header are read
+_SECOND_LINE = (int, int, float, float, int, int, float)
 _COUNTS_FIELD = 4  # of the second line: D2R
 _PTYPES: Final = {"PART", "PSET"}
 _INERTIA_ROWS: Final = ("the first line (PID)", "the second line (XC to TM)", "the third line (IXX to IZZ)")
@@ -203,19 +202,17 @@ def _lines(count: int) -> str:
 
 
 def _header(card: Card, first: Row, second: Row) -> Header:
-    rows = ((first, _FIRST_LINE), (second, _SECOND_LINE))
-    values: list[Any] = [read(card, row, at) for row, kinds in rows for at, read in enumerate(kinds)]
-    found = Header(*values)
-    code, swset, time1 = found.code, found.swset, found.time1
+    values = card.numbers(first, _FIRST_LINE) + card.numbers(second, _SECOND_LINE)
+    swset, code, time1, time2, time3, entno, relsw, *others = values
     if not code.problem and not BY_TIME <= code.value <= BY_SENSOR:
-        code = code._replace(problem=f"CODE is {code.value}, {BY_TIME} to {BY_SENSOR} was expected", parameters=())
+        code = replace(code, problem=f"CODE is {code.value}, {BY_TIME} to {BY_SENSOR} was expected", parameters=())
     if not swset.problem and swset.value <= 0:
-        swset = swset._replace(problem=f"SWSET is {swset.value}, a positive number was expected", parameters=())
+        swset = replace(swset, problem=f"SWSET is {swset.value}, a positive number was expected", parameters=())
     if code.value == BY_TIME and not time1.problem and _runs_over(first):
         problem = f"TIME1 runs over its columns into TIME2 ({time1.field.text} and {first.cell(3)})"
-        time1 = time1._replace(problem=problem, parameters=())
-    swset, relsw = (_moved(one, card.transform.rest) for one in (swset, found.relsw))
-    return found._replace(swset=swset, code=code, time1=time1, relsw=relsw)
+        time1 = replace(time1, problem=problem, parameters=())
+    swset, relsw = (_moved(one, card.transform.rest) for one in (swset, relsw))
+    return Header(swset, code, time1, time2, time3, entno, relsw, *others)
 
 
 def _runs_over(row: Row) -> bool:
@@ -244,7 +241,7 @@ def _line(card: Card, row: Row, *, to_rigid: bool, ptype: bool) -> _Line:
 
 def _moved(value: Value[int], offset: int) -> Value[int]:
     """Add the offset of the include to an id; 0 stays none."""
-    return value if value.problem or not value.value or not offset else value._replace(value=value.value + offset)
+    return value if value.problem or not value.value or not offset else replace(value, value=value.value + offset)
 
 
 def _with(card: Card, kind: Kind, header: Header | None, lines: Sequence[_Line], count_problem: str = "") -> SwitchSet:
@@ -356,12 +353,15 @@ def follow(unit: Unit, events: Iterable[tuple[float, Event]]) -> tuple[list[Wind
     """Windows of a unit by its events and their times, in order; and the events that find it deformable already."""
     windows: list[Window] = []
     orphans: list[tuple[float, Event]] = []
+    opened: tuple[float, Event] | None = None
     for time, event in events:
-        rigid = bool(windows) and windows[-1].td is None
-        if event.line.to_rigid and not rigid:
-            windows.append(Window(unit, time, None, event, None))
-        elif rigid and not event.line.to_rigid:
-            windows[-1] = windows[-1]._replace(td=time, closed=event)
-        elif not event.line.to_rigid:
+        if event.line.to_rigid:
+            opened = opened or (time, event)
+        elif opened:
+            windows.append(Window(unit, opened[0], time, opened[1], event))
+            opened = None
+        else:
             orphans.append((time, event))
+    if opened:
+        windows.append(Window(unit, opened[0], None, opened[1], None))
     return windows, orphans

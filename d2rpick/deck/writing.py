@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import DeckError, name_units
 from d2rpick.base.files import write_whole
+from d2rpick.deck import radioss_deck
 from d2rpick.deck.ls_dyna_parts import read_parts
 from d2rpick.deck.printing import EngineFile, engine_lines, listed, off
-from d2rpick.deck.radioss_deck import Leg, Starter, blocks, card_of, kept_off, keyword, numbers, read_legs
+from d2rpick.deck.radioss_deck import Leg, Starter, below_title, blocks, card_of, kept_off, keyword, numbers, read_legs
 from d2rpick.deck.radioss_files import run_files
 from d2rpick.deck.radioss_run import Run, parts_off, read_run
-from d2rpick.deck.radioss_sensors import with_sensors
 from d2rpick.deck.reader import Deck, cure, cuts, read_deck
 from d2rpick.deck.source import Block, SourceFile
 from d2rpick.deck.switching import find_windows, read_switching
@@ -79,8 +79,8 @@ def write_deck(main: str, card: PrintedCard, folder: str, *, overwrite: bool = F
 
 
 def _ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
-    deck, printed = read_deck(main), read_deck("the card", card.text.encode())
-    if len(card.files) != 1 or not read_switching(printed):
+    deck, source = read_deck(main), SourceFile("the card", card.text.encode())
+    if len(card.files) != 1 or not source.marks or not read_switching(printed := read_deck("the card", source)):
         raise DeckError(f"{main}: an LS-DYNA deck, but the cards are for another solver")
     for block, told in cuts(deck):  # what is added would hide it, and end a number that is cut
         if block.source is deck.sources[0]:
@@ -146,7 +146,7 @@ def _radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     starter = run.starter.sources[0].name
     _refuse_sensors(run.starter, card)
     main_text = with_cards(run.starter.sources[0], card.starter, blocks(run.starter.sources[0]))
-    yield Path(starter).name, _sensed(starter, main_text, card)
+    yield Path(starter).name, _with_sensors(SourceFile(starter, main_text), card.sensors)
     further = list(blocks(leg.run.block.source))
     for (name, text), mine in zip(card.files.items(), printed, strict=True):
         kept = (text_of(block) for block in further if repeated(keyword(block), mine))
@@ -155,11 +155,41 @@ def _radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
         lines = listed(others) if mine.cap is None else off(others)  # its text ends with the bodies that it puts off
         yield name, (text + "".join(f"{line}\n" for line in lines)).encode() + b"".join(kept)
     for name, content in copies(run.starter.sources[1:], starter, {Path(starter).name, *card.files}):
-        yield name, _sensed(name, content, card)
+        yield name, _with_sensors(SourceFile(name, content), card.sensors)
 
 
-def _sensed(name: str, content: bytes, card: PrintedCard) -> bytes:
-    return with_sensors(SourceFile(name, content), card.sensors) if card.sensors else content
+def _with_sensors(source: SourceFile, sensors: Mapping[int, int]) -> bytes:
+    """Let bodies be switched by sensors, in a file of the starter deck: ``sensors`` by main node.
+
+    The version of its /BEGIN becomes one that knows when a sensor stops.  DeckError where a body has a sensor already.
+    """
+    content, edits = source.read(0), dict[int, tuple[int, bytes]]()
+    for block in blocks(source) if sensors else ():
+        if keyword(block)[:1] in {("BEGIN",), ("RBODY",)}:
+            edits.update(_edit(block, sensors))
+    for at in sorted(edits, reverse=True):
+        end, text = edits[at]
+        content = content[:at] + text + content[end:]
+    return content
+
+
+def _edit(block: Block, sensors: Mapping[int, int]) -> Iterator[tuple[int, tuple[int, bytes]]]:
+    """Give the bytes of the line that changes: where it begins, where it ends, and its text."""
+    card = card_of(block)
+    for row in below_title(card)[:1]:
+        lines = block.source.read(block.start, block.end).split(b"\n")
+        at = block.start + sum(len(line) + 1 for line in lines[: row.distance])
+        text = lines[row.distance].rstrip(b"\r").decode("latin-1").ljust(20)
+        first, second = (card.integer(row, place).value for place in (0, 1))
+        if card.words[0] == "BEGIN":
+            new = f"{max(first, radioss_deck.STOPS_SINCE):10d}{text[10:]}"
+        elif first in sensors:
+            if second:
+                raise DeckError(f"{row.field(1).at}: sensor {second} switches this /RBODY already; remove it first")
+            new = f"{text[:10]}{sensors[first]:10d}{text[20:]}"
+        else:
+            return
+        yield at, (at + len(lines[row.distance].rstrip(b"\r")), new.encode("latin-1"))
 
 
 def _refuse_sensors(starter: Starter, card: PrintedCard) -> None:

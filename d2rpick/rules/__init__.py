@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.base.errors import ConfigurationError
 from d2rpick.base.settings import RULE_KEYS, nearest_settings, refuse_unknown
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.deck import radioss_files
+from d2rpick.deck.radioss_files import HEAD, recognises
 from d2rpick.deck.reader import Deck, read_deck
 from d2rpick.deck.source import SourceFile
 from d2rpick.rules import reading, runs, sets, switched_parts, times
@@ -23,13 +23,14 @@ from d2rpick.rules.base import LS_DYNA, Case, Finding, Rule, RunCase, Severity
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from d2rpick.deck.fields import Field
+    from d2rpick.deck.card import Field
     from d2rpick.deck.switching import SwitchSet, Unit, Window
     from d2rpick.rules.judgement import HistoryJudge as Judge
 
 
 _MODULES = (reading, sets, times, switched_parts, runs)
 _ALL = (one for module in _MODULES for one in vars(module).values() if isinstance(one, Rule))
+_BY_HISTORY: Final = "D2R2"  # rules that an energy history alone can break
 RULES: Final[Mapping[str, Rule]] = {rule.id: rule for rule in sorted(_ALL, key=lambda rule: rule.id)}
 
 
@@ -210,16 +211,17 @@ def _told(windows: Iterable[Window]) -> Iterator[CheckedWindow]:
 
 
 @cache
-def _rules_for(solver: str, select: tuple[str, ...], ignore: tuple[str, ...]) -> tuple[Rule, ...]:
+def _rules_for(solver: str, select: tuple[str, ...], ignore: tuple[str, ...], judged: bool) -> tuple[Rule, ...]:
     """Give the rules that count, and look at decks of a solver: there may be thousands of those."""
     asked = Configuration(select, ignore)
-    return tuple(rule for rule in RULES.values() if solver in rule.solvers and asked.selects(rule.id))
+    wanted = (rule for rule in RULES.values() if judged or not rule.id.startswith(_BY_HISTORY))
+    return tuple(rule for rule in wanted if solver in rule.solvers and asked.selects(rule.id))
 
 
 def _findings(case: Case, configuration: Configuration) -> Iterator[Finding]:
     """Apply the rules that count to what they look at; what a comment silences is left out."""
     solver, silences = case.solver, case.deck.silences
-    for rule in _rules_for(solver, *configuration[:2]):
+    for rule in _rules_for(solver, *configuration[:2], case.judge is not None):
         for place, message in rule.check(case):
             if silences(rule.id, place.file, place.line):
                 continue
@@ -231,7 +233,7 @@ def _read(path: str, content: bytes | None, judge: Judge | None) -> Case:
     """Read a deck by what it is: a run of Radioss, or an LS-DYNA deck."""
     source = SourceFile(path, content)
     given = content is not None or os.path.isfile(path)  # noqa: PTH113  a pipe gives its bytes once
-    if given and radioss_files.recognises(source.read(0, radioss_files.HEAD)):
+    if given and recognises(source.read(0, HEAD)):
         from d2rpick.deck.radioss_run import read_run  # not above: start-up
 
         run = read_run(path, content)

@@ -16,8 +16,7 @@ from d2rpick.deck.switching import Event, Header, SwitchSet, Window, Windows, fi
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
-    from d2rpick.deck.card import Card
-    from d2rpick.deck.fields import Field, Value
+    from d2rpick.deck.card import Card, Field, Value
     from d2rpick.deck.radioss_files import Flaw
     from d2rpick.deck.radioss_run import Run, RunWindows
     from d2rpick.deck.reader import Deck, Unread
@@ -120,7 +119,7 @@ class Case:
     @cached_property
     def constraints(self) -> Sequence[Constraint]:
         """What holds nodes together, and may lie in a part that is switched."""
-        return read_constraints(self.deck)
+        return [*read_constraints(self.deck, "nodal rigid body", "extra nodes", "joint")]
 
     @cached_property
     def made_rigid(self) -> tuple[Event, ...]:
@@ -145,12 +144,12 @@ class Case:
         factors = [card.transform.time for card in self.deck.named("CONTROL_TERMINATION")]  # none in Radioss
         return self.end_time.value * (factors[-1] if factors else 1.0)
 
-    @cached_property
+    @property
     def unread(self) -> Sequence[Unread]:
         """Includes that were not read and may hold what is switched."""
         return self.deck.unread
 
-    @cached_property
+    @property
     def untimed(self) -> tuple[tuple[Field, str], ...]:
         """Cards that no clock switches, and what does."""
         return ()
@@ -209,25 +208,22 @@ class RunCase(Case):
         """The end of the last leg as written."""
         return self.run.legs[-1].stop if self.run.legs else None
 
-    @cached_property
+    @property
     def unread(self) -> Sequence[Unread]:
         """Includes that were not read, where a main node that is switched may stand in them."""
         bodies = {body.node.value for body in self.run.starter.bodies} if self.run.starter else set()
         return self.deck.unread if self.run.named - bodies - {0} else ()
 
-    @cached_property
+    @property
     def untimed(self) -> tuple[tuple[Field, str], ...]:
         """Bodies that a sensor switches whose time is not known."""
-        starter = self.run.starter
-        bodies = [body for body in starter.bodies if body.sensor] if starter else []
-        from d2rpick.deck.radioss_sensors import active_spans  # not above: few decks have any
+        from d2rpick.deck.radioss_deck import active_spans  # not above: start-up
 
-        found = [(body, active_spans(starter, body.sensor)) for body in bodies if starter]
-        told = [(body.node.field, f"rigid body {body.id} is switched by {why}") for body, why in found
+        starter, legs = self.run.starter, [leg for leg in self.run.legs[:-1] if leg.sensor]
+        found = [(one, active_spans(starter, one.sensor)) for one in starter.bodies if one.sensor] if starter else []
+        told = [(one.node.field, f"rigid body {one.id} is switched by {why}") for one, why in found
                 if isinstance(why, str)]  # fmt: skip
-        legs = [leg for leg in self.run.legs[:-1] if leg.sensor]
-        told += [(leg.run.here, f"leg {leg.number} ends when sensor {leg.sensor} is active") for leg in legs]
-        return tuple(told)
+        return *told, *((leg.run.here, f"leg {leg.number} ends when sensor {leg.sensor} is active") for leg in legs)
 
     @cached_property
     def unturned(self) -> Mapping[int, str]:
@@ -246,8 +242,7 @@ class RunCase(Case):
     @cached_property
     def rigid_legs(self) -> list[tuple[int, list[Window]]]:
         """Index of every leg in which something becomes or stays rigid, with its windows."""
-        found = []
-        start = 0.0
+        found, start = [], 0.0
         for index, leg in enumerate(self.run.legs):
             stop = leg.stop.value
             held = [w for w in self.windows.windows if w.tr < stop and (w.td is None or w.td > start)]
@@ -259,7 +254,6 @@ class RunCase(Case):
 
 Objection = tuple["Field", str]
 """Where, and what is wrong there."""
-
 
 MAIN_DECK: Final = "main.k"  # of an example that has no other name
 
@@ -292,18 +286,115 @@ class Rule(NamedTuple):
     solvers: tuple[str, ...] = (LS_DYNA,)  # whose decks it looks at
 
 
+# Pieces that the examples are put together from: decks of LS-DYNA, and runs of Radioss.
+
+HEAD = """\
+*KEYWORD
+*CONTROL_TERMINATION
+       0.2
+*DATABASE_GLSTAT
+    0.0001
+*DATABASE_MATSUM
+    0.0001
+"""
+PARTS = """\
+*PART
+door
+         1         1         1
+*PART
+frame
+         2         1         1
+"""
+
+
+def automatic(
+    swset: int,
+    time1: str,
+    *,
+    rigid: Sequence[str] = (),
+    deformable: Sequence[str] = (),
+    code: int = 0,
+    pair: tuple[int, int] = (0, 0),
+    counts: tuple[int, int] | None = None,
+) -> str:
+    """Write a card; ``pair`` is RELSW and PAIRED, ``counts`` D2R and R2D where they are to be wrong."""
+    d2r, r2d = counts or (len(rigid), len(deformable))
+    relsw, paired = pair
+    lines = [
+        "*DEFORMABLE_TO_RIGID_AUTOMATIC",
+        "$    swset      code     time1     time2     time3     entno     relsw    paired",
+        f"{swset:10d}{code:10d}{time1:>10s}       0.0       0.0         0{relsw:10d}{paired:10d}",
+        "$     nrbf      ncsf       rwf     dtmax       d2r       r2d    offset",
+        f"         0         0         0       0.0{d2r:10d}{r2d:10d}       0.0",
+        *(f"{line:>10s}         0      PART" if len(line) <= 10 else line for line in rigid),
+        *(f"{line:>10s}      PART" for line in deformable),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+THERE = automatic(1, "0.02", rigid=["1"])
+BACK = automatic(2, "0.09", deformable=["1"])
+END = "*END\n"
+GOOD = HEAD + PARTS + THERE + BACK + END
+
+
+def deck(*cards: str) -> Example:
+    """Put cards into a deck that has two parts."""
+    return Example(HEAD + PARTS + "".join(cards) + END)
+
+
+def window(tr: str, td: str, more: str = "") -> Example:
+    """Write a deck that switches part 1 by time."""
+    return deck(automatic(1, tr, rigid=["1"]), automatic(2, td, deformable=["1"]), more)
+
+
+PASSES = Example(GOOD)
+
+GROUP: Final = "/GRNOD/PART/7\nbox\n         1\n"
+_SHELL: Final = "/SHELL/1\n         1         1         2         3         4\n"
+_BODY: Final = "/RBODY/1\nbox\n{}         0         0         0                   0         7\n"
+
+
+def starter_deck(group: str = GROUP, body: str = "      1808", more: str = "") -> str:
+    """Write a starter deck: a part that is one rigid body, by its group of nodes, and whatever there is ``more``."""
+    head = "#RADIOSS STARTER\n/BEGIN\nbox\n      2022         0\n/TITLE\na box\n/PART/1\nbox\n         1         1\n"
+    return f"{head}{_SHELL}{_BODY.format(body)}{group}{more}/END\n"
+
+
+def engine_files(*legs: tuple[str, str], cap: str = "1e-5 1e-5", node: str = "1808") -> dict[str, str]:
+    """Write engine files: end and state of every leg."""
+    files = {}
+    for number, (stop, state) in enumerate(legs, start=1):
+        limit = f"/DTIX\n{cap}\n" if state == "ON" and cap else ""
+        switch = f"/RBODY/{state}\n{node}\n" if state else ""
+        files[f"box_{number:04d}.rad"] = f"/RUN/box/{number}\n{stop:>20}\n/VERS/2022\n{switch}{limit}"
+    return files
+
+
+def run_of(files: dict[str, str], deck: str = "") -> Example:
+    """Put a starter deck and its engine files together."""
+    return Example(deck or starter_deck(), files, name="box_0000.rad")
+
+
+WINDOW: Final = (("0.02", "OFF"), ("0.09", "ON"), ("0.2", "OFF"))
+GOOD_RUN: Final = run_of(engine_files(*WINDOW))
+
+
 def rule(
-    id_: str,
-    severity: Severity,
-    summary: str,
-    passing: Sequence[Example],
-    failing: Sequence[Example],
-    solvers: tuple[str, ...] = (LS_DYNA,),
+    id_: str, severity: Severity, summary: str, solvers: tuple[str, ...] = (LS_DYNA,)
 ) -> Callable[[Callable[[Any], Iterable[Objection]]], Rule]:
     """Make a rule of a function that finds what is wrong with a case; its docstring is the explanation."""
+    passing = (PASSES if LS_DYNA in solvers else GOOD_RUN,)
+    return lambda check: Rule(
+        id_, severity, summary, " ".join((check.__doc__ or "").split()), check, passing, (), solvers
+    )
 
-    def made(check: Callable[[Any], Iterable[Objection]]) -> Rule:
-        explanation = " ".join((check.__doc__ or "").split())
-        return Rule(id_, severity, summary, explanation, check, tuple(passing), tuple(failing), solvers)
 
-    return made
+def passes(*examples: Example) -> Callable[[Rule], Rule]:
+    """Name decks that pass a rule; without any it is that of `GOOD`, or `GOOD_RUN`."""
+    return lambda rule: rule._replace(passing=examples)
+
+
+def fails(*examples: Example) -> Callable[[Rule], Rule]:
+    """Name decks that fail a rule."""
+    return lambda rule: rule._replace(failing=examples)

@@ -5,12 +5,32 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.files import STDIN
-from d2rpick.deck.fields import Field, Problem
+from d2rpick.deck.card import Field, Problem
 from d2rpick.deck.ls_dyna_parts import element_cards
 from d2rpick.deck.reader import UNKNOWN_KIND, cure, cuts
 from d2rpick.deck.switching import SwitchSet, misspelt
-from d2rpick.rules.base import BOTH, ERROR, INFO, LS_DYNA, WARNING, Case, Example, Objection, rule
-from d2rpick.rules.examples import BACK, END, GOOD, HEAD, PARTS, PASSES, THERE, automatic, deck
+from d2rpick.rules.base import (
+    BACK,
+    BOTH,
+    END,
+    ERROR,
+    GOOD,
+    HEAD,
+    INFO,
+    LS_DYNA,
+    PARTS,
+    PASSES,
+    THERE,
+    WARNING,
+    Case,
+    Example,
+    Objection,
+    automatic,
+    deck,
+    fails,
+    passes,
+    rule,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -50,21 +70,16 @@ def _elements(keyword: str) -> Example:
     return deck(keyword + "\n       1       1       1       2       3       4\n" + cards)
 
 
-@rule(
-    "D2R001",
-    ERROR,
-    "the rows after a card do not match its D2R/R2D counts",
-    (PASSES,),
-    (
-        deck(automatic(1, "0.02", rigid=["1"], counts=(2, 0)) + BACK),
-        Example("*DEFORMABLE_TO_RIGID_AUTOMATIC\n         1\n"),
-        deck(automatic(1, "0.02", rigid=["1"], counts=(2, -1)) + BACK),
-        deck(automatic(1, "0.02")),
-        deck("\n".join(THERE.split("\n")[:3] + THERE.split("\n")[5:]) + BACK),
-        deck("\n".join(THERE.split("\n")[:5]) + "\n" + BACK),
-        Example("*DEFORMABLE_TO_RIGID_INERTIA\n         1\n"),
-    ),
+@fails(
+    deck(automatic(1, "0.02", rigid=["1"], counts=(2, 0)) + BACK),
+    Example("*DEFORMABLE_TO_RIGID_AUTOMATIC\n         1\n"),
+    deck(automatic(1, "0.02", rigid=["1"], counts=(2, -1)) + BACK),
+    deck(automatic(1, "0.02")),
+    deck("\n".join(THERE.split("\n")[:3] + THERE.split("\n")[5:]) + BACK),
+    deck("\n".join(THERE.split("\n")[:5]) + "\n" + BACK),
+    Example("*DEFORMABLE_TO_RIGID_INERTIA\n         1\n"),
 )
+@rule("D2R001", ERROR, "the rows after a card do not match its D2R/R2D counts")
 def _counts(case: Case) -> Iterator[Objection]:
     """The second line of *DEFORMABLE_TO_RIGID_AUTOMATIC counts the D2R and R2D lines that follow it, one per part.
     With wrong counts the solver reads a part from the wrong line, or a line as the next card. A card whose counts
@@ -77,25 +92,20 @@ def _counts(case: Case) -> Iterator[Objection]:
             yield card.card.here, f"{card.count_problem}; write {rows}"
 
 
-@rule(
-    "D2R002",
-    ERROR,
-    "a switching keyword, number or &parameter that cannot be read",
-    (PASSES, Example(HEAD + _PARAMETER + _BY_NAME)),
-    (
-        Example(HEAD + _BY_NAME),
-        Example("*DEFORMABLE_TO_RIGID\n         ?\n"),
-        deck(automatic(0, "0.02", rigid=["1"])),
-        Example(GOOD.replace("      0.02       0.0", "    0.0135867    0.0")),
-        Example("*SET_PART\n         3\n     &door\n*DEFORMABLE_TO_RIGID\n         3         0      PSET\n"),
-        Example(GOOD.replace("         2         1         1", "       abc         1         1")),
-        Example(HEAD + "*INCLUDE_TRANSFORM\nall.k\n" + f"{'&off':>30s}\n", {"all.k": PARTS + THERE + BACK}),
-        Example(GOOD.replace("_AUTOMATIC", "_AUTOMATC")),
-        Example(GOOD.replace("*DEFORM", "* DEFORM")),
-        Example("*DEFORMABLE_TO_RIGID\n         1         0      WALL\n"),
-    ),
-    BOTH,
+@passes(PASSES, Example(HEAD + _PARAMETER + _BY_NAME))
+@fails(
+    Example(HEAD + _BY_NAME),
+    Example("*DEFORMABLE_TO_RIGID\n         ?\n"),
+    deck(automatic(0, "0.02", rigid=["1"])),
+    Example(GOOD.replace("      0.02       0.0", "    0.0135867    0.0")),
+    Example("*SET_PART\n         3\n     &door\n*DEFORMABLE_TO_RIGID\n         3         0      PSET\n"),
+    Example(GOOD.replace("         2         1         1", "       abc         1         1")),
+    Example(HEAD + "*INCLUDE_TRANSFORM\nall.k\n" + f"{'&off':>30s}\n", {"all.k": PARTS + THERE + BACK}),
+    Example(GOOD.replace("_AUTOMATIC", "_AUTOMATC")),
+    Example(GOOD.replace("*DEFORM", "* DEFORM")),
+    Example("*DEFORMABLE_TO_RIGID\n         1         0      WALL\n"),
 )
+@rule("D2R002", ERROR, "a switching keyword, number or &parameter that cannot be read", BOTH)
 def _fields(case: Case) -> Iterator[Objection]:
     """Fields are 10 columns wide (20 in long format) unless the line has commas. A text in a number's columns, or an
     undefined parameter, stops the run or, worse, is read as something else. So is a keyword that begins like a
@@ -123,14 +133,9 @@ def _unreadable_members(case: Case) -> Iterator[Problem]:
         yield from content.problems if content else ()
 
 
-@rule(
-    "D2R003",
-    ERROR,
-    "an include file is missing or cannot be read",
-    (Example(HEAD + "*INCLUDE\nswitch.k\n" + END, {"switch.k": PARTS + _INNER}),),
-    (Example(HEAD + "*INCLUDE\nnowhere.k\n" + END), Example(HEAD + "*INCLUDE_AUTO_OFFSET\nswitch.k\n" + END)),
-    BOTH,
-)
+@passes(Example(HEAD + "*INCLUDE\nswitch.k\n" + END, {"switch.k": PARTS + _INNER}))
+@fails(Example(HEAD + "*INCLUDE\nnowhere.k\n" + END), Example(HEAD + "*INCLUDE_AUTO_OFFSET\nswitch.k\n" + END))
+@rule("D2R003", ERROR, "an include file is missing or cannot be read", BOTH)
 def _includes(case: Case) -> Iterator[Objection]:
     """Looked for in the main deck's folder, in the *INCLUDE_PATH folders and in the including file's folder. A file
     that includes itself or cannot be read is reported too; one that a Radioss starter deck asks for, only where a
@@ -143,13 +148,9 @@ def _includes(case: Case) -> Iterator[Objection]:
         yield missing.name, f"{found}; switching cards may hide in it: {cure}"
 
 
-@rule(
-    "D2R109",
-    WARNING,
-    "a parameter used by a card is defined twice with different values",
-    (Example(HEAD + _PARAMETER + _PARAMETER + _BY_NAME),),
-    (Example(HEAD + _PARAMETER + "*PARAMETER\nR tr           0.03\n" + _BY_NAME),),
-)
+@passes(Example(HEAD + _PARAMETER + _PARAMETER + _BY_NAME))
+@fails(Example(HEAD + _PARAMETER + "*PARAMETER\nR tr           0.03\n" + _BY_NAME))
+@rule("D2R109", WARNING, "a parameter used by a card is defined twice with different values")
 def _ambiguous(case: Case) -> Iterator[Objection]:
     """LS-DYNA by default warns and keeps the first definition; *PARAMETER_DUPLICATION and _MUTABLE change that, and
     other readers of decks keep the last. A switching time should not depend on it.
@@ -169,13 +170,9 @@ def _ambiguous(case: Case) -> Iterator[Objection]:
                 yield value.field, f"{found}; which one counts depends on the solver: keep one"
 
 
-@rule(
-    "D2R110",
-    WARNING,
-    "the card is in a transformed include whose FCTTIM is not 1",
-    (_transformed("1.0"), _transformed("0.0")),
-    (_transformed("0.5"),),
-)
+@passes(_transformed("1.0"), _transformed("0.0"))
+@fails(_transformed("0.5"))
+@rule("D2R110", WARNING, "the card is in a transformed include whose FCTTIM is not 1")
 def _scaled(case: Case) -> Iterator[Objection]:
     """*INCLUDE_TRANSFORM multiplies the times of a file by FCTTIM (0 means 1). d2rpick applies it to the switching
     times too, but whether the solver does is not confirmed by any source that was available.
@@ -188,13 +185,8 @@ def _scaled(case: Case) -> Iterator[Objection]:
             yield card.card.here, f"{found}; {why}: move the card to the main deck"
 
 
-@rule(
-    "D2R303",
-    INFO,
-    "encrypted block: cards may hide in it",
-    (PASSES,),
-    (Example(GOOD.replace(END, "-----BEGIN PGP MESSAGE-----\nhQEMA\n-----END PGP MESSAGE-----\n") + END),),
-)
+@fails(Example(GOOD.replace(END, "-----BEGIN PGP MESSAGE-----\nhQEMA\n-----END PGP MESSAGE-----\n") + END))
+@rule("D2R303", INFO, "encrypted block: cards may hide in it")
 def _encrypted(case: Case) -> Iterator[Objection]:
     """Vendor models hold blocks between BEGIN PGP MESSAGE and END PGP MESSAGE that only the solver can read."""
     for block in case.deck.encrypted:
@@ -202,14 +194,9 @@ def _encrypted(case: Case) -> Iterator[Objection]:
         yield Field("", block, 0, 1), told
 
 
-@rule(
-    "D2R011",
-    WARNING,
-    "a file of the deck seems to be cut",
-    (Example(GOOD.removesuffix(END)),),
-    (Example(GOOD.removesuffix("      PART\n" + END)), Example(GOOD.removesuffix(END) + "*NODE\n       1\n")),
-    BOTH,
-)
+@passes(Example(GOOD.removesuffix(END)))
+@fails(Example(GOOD.removesuffix("      PART\n" + END)), Example(GOOD.removesuffix(END) + "*NODE\n       1\n"))
+@rule("D2R011", WARNING, "a file of the deck seems to be cut", BOTH)
 def _cut(case: Case) -> Iterator[Objection]:
     """A file without *END (Radioss: /END) whose last line has no line end may have lost the end of a number, and all
     that came after it; so may a main deck without *END whose last lines are nodes or elements. Switching cards,
@@ -219,7 +206,8 @@ def _cut(case: Case) -> Iterator[Objection]:
         yield Field("", block, 0, 1), f"{told} What is missing was not checked: {cure(block)}"
 
 
-@rule("D2R301", INFO, "a card disabled by *COMMENT", (PASSES,), (deck("*COMMENT c:" + THERE),))
+@fails(deck("*COMMENT c:" + THERE))
+@rule("D2R301", INFO, "a card disabled by *COMMENT")
 def _disabled(case: Case) -> Iterator[Objection]:
     """Everything from *COMMENT to the next keyword is a comment, the rest of the keyword line too. Below it a
     switching card looks alive and is not.
@@ -228,18 +216,12 @@ def _disabled(case: Case) -> Iterator[Objection]:
         yield card.here, f"the keyword line {card.block.head.strip()!r} is a comment: this card does nothing"
 
 
-@rule(
-    "D2R302",
-    INFO,
-    "not judged by time: CODE 1-5, restart cards, plain *DEFORMABLE_TO_RIGID",
-    (PASSES,),
-    (
-        deck(automatic(1, "0.0", rigid=["1"], code=2)),
-        Example("*RIGID_DEFORMABLE_R2D\n         1\n"),
-        Example("*DEFORMABLE_TO_RIGID\n         1\n"),
-    ),
-    BOTH,
+@fails(
+    deck(automatic(1, "0.0", rigid=["1"], code=2)),
+    Example("*RIGID_DEFORMABLE_R2D\n         1\n"),
+    Example("*DEFORMABLE_TO_RIGID\n         1\n"),
 )
+@rule("D2R302", INFO, "not judged by time: CODE 1-5, restart cards, plain *DEFORMABLE_TO_RIGID", BOTH)
 def _untimed(case: Case) -> Iterator[Objection]:
     """CODE 1 to 4 switch by a contact or wall force, CODE 5 by a sensor, restart cards when the restart begins,
     plain cards at the start, a Radioss body by a sensor other than /SENSOR/TIME: no time on the card can be compared
@@ -253,13 +235,9 @@ def _untimed(case: Case) -> Iterator[Objection]:
             yield card.card.here, f"*{card.card.name} {reason}; not judged by time"
 
 
-@rule(
-    "D2R304",
-    INFO,
-    "elements of a kind that is not searched for shared nodes",
-    (PASSES, _elements("*ELEMENT_SHELL_COMPOSITE"), Example(GOOD.replace(END, "*ELEMENT_SHELL_DOF\n"))),
-    (_elements("*ELEMENT_SHELL_DOF"), _elements("*ELEMENT_BEAM_PID")),
-)
+@passes(PASSES, _elements("*ELEMENT_SHELL_COMPOSITE"), Example(GOOD.replace(END, "*ELEMENT_SHELL_DOF\n")))
+@fails(_elements("*ELEMENT_SHELL_DOF"), _elements("*ELEMENT_BEAM_PID"))
+@rule("D2R304", INFO, "elements of a kind that is not searched for shared nodes")
 def _unread(case: Case) -> Iterator[Objection]:
     """D2R108 looks for nodes that separate rigid bodies share. Element keywords with options that put more whole
     numbers on their lines are not followed, so it may miss some.
@@ -274,13 +252,8 @@ def _unread(case: Case) -> Iterator[Objection]:
         yield card.here, f"nodes that parts share were not searched in *{card.name}, whose lines are not followed"
 
 
-@rule(
-    "D2R305",
-    INFO,
-    "*DEFORMABLE_TO_RIGID_INERTIA: mass and inertia given for a switch",
-    (PASSES,),
-    (deck(_INERTIA + THERE + BACK), deck(_INERTIA)),
-)
+@fails(deck(_INERTIA + THERE + BACK), deck(_INERTIA))
+@rule("D2R305", INFO, "*DEFORMABLE_TO_RIGID_INERTIA: mass and inertia given for a switch")
 def _inertias(case: Case) -> Iterator[Objection]:
     """The card replaces the mass properties that the solver computes from the mesh when the part is made rigid; left
     over from another state of the model they are wrong without a word. Source: vendor keyword data.
@@ -295,13 +268,9 @@ def _inertias(case: Case) -> Iterator[Objection]:
         yield card.card.here, f"gives mass and inertia of part {part} for when a switch makes it rigid{used}"
 
 
-@rule(
-    "D2R306",
-    INFO,
-    "switching cards on standard input without parts: ids are not checked",
-    (Example(THERE + BACK), Example(GOOD, stdin=True)),
-    (Example(THERE + BACK, stdin=True),),
-)
+@passes(Example(THERE + BACK), Example(GOOD, stdin=True))
+@fails(Example(THERE + BACK, stdin=True))
+@rule("D2R306", INFO, "switching cards on standard input without parts: ids are not checked")
 def _without_parts(case: Case) -> Iterator[Objection]:
     """A file of cards alone is for another deck to include, which is checked with it. Cards on standard input, as in
     d2rpick card ... | d2rpick check -, have no deck around them: that their parts exist is not known.

@@ -10,8 +10,23 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import name_units
 from d2rpick.deck.radioss_files import AT_REST, NOT_FOLLOWED, THROUGH_WALL
-from d2rpick.rules.base import ERROR, INFO, RADIOSS, WARNING, Example, Objection, RunCase, rule
-from d2rpick.rules.examples import GOOD_RUN, WINDOW, engine_files, run_of, starter_deck
+from d2rpick.rules.base import (
+    ERROR,
+    GOOD_RUN,
+    INFO,
+    RADIOSS,
+    WARNING,
+    WINDOW,
+    Example,
+    Objection,
+    RunCase,
+    engine_files,
+    fails,
+    passes,
+    rule,
+    run_of,
+    starter_deck,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -79,17 +94,12 @@ def _switching_legs(case: RunCase) -> list[Leg]:
     return case.run.legs if any(leg.switched for leg in case.run.legs) else []
 
 
-@rule(
-    "D2R401",
-    ERROR,
-    "legs of a Radioss run that do not follow each other",
-    (GOOD_RUN, run_of(engine_files(("0.05", "ON"), ("0.05", "OFF")))),
-    (
-        run_of(engine_files(("0.09", "OFF"), ("0.02", "ON"), ("0.2", "OFF"))),
-        run_of({name: text for name, text in engine_files(*WINDOW).items() if "0002" not in name}),
-    ),
-    (RADIOSS,),
+@passes(GOOD_RUN, run_of(engine_files(("0.05", "ON"), ("0.05", "OFF"))))
+@fails(
+    run_of(engine_files(("0.09", "OFF"), ("0.02", "ON"), ("0.2", "OFF"))),
+    run_of({name: text for name, text in engine_files(*WINDOW).items() if "0002" not in name}),
 )
+@rule("D2R401", ERROR, "legs of a Radioss run that do not follow each other", (RADIOSS,))
 def _order(case: RunCase) -> Iterator[Objection]:
     """Each engine file continues the run where the one before ended: their numbers count up from 1, their /RUN names
     are the same, and none ends before the one before it. Otherwise nothing can be said about when a part is rigid.
@@ -109,14 +119,9 @@ def _order(case: RunCase) -> Iterator[Objection]:
             yield leg.run.here, f"leg {leg.number} belongs to run {leg.name!r}, the one before to {before.name!r}"
 
 
-@rule(
-    "D2R402",
-    ERROR,
-    "/RBODY/ON or /RBODY/OFF names what is not a main node",
-    (GOOD_RUN, run_of(engine_files(*WINDOW, node="0"))),
-    (run_of(engine_files(*WINDOW, node="1")), run_of(engine_files(*WINDOW, node="1808 77"))),
-    (RADIOSS,),
-)
+@passes(GOOD_RUN, run_of(engine_files(*WINDOW, node="0")))
+@fails(run_of(engine_files(*WINDOW, node="1")), run_of(engine_files(*WINDOW, node="1808 77")))
+@rule("D2R402", ERROR, "/RBODY/ON or /RBODY/OFF names what is not a main node", (RADIOSS,))
 def _main_nodes(case: RunCase) -> Iterator[Objection]:
     """The engine takes the main nodes of rigid bodies, not the ids of bodies, and skips an unknown one without a
     message: the part stays as it was. 0 names nothing and is not reported. Judged only when the starter deck and its
@@ -138,14 +143,9 @@ def _main_nodes(case: RunCase) -> Iterator[Objection]:
                 yield node.field, f"{found}; {hint or f'main nodes here: {there}'}"
 
 
-@rule(
-    "D2R403",
-    WARNING,
-    "/RBODY/ON in a later leg for a body that was rigid from the start",
-    (GOOD_RUN, run_of(engine_files(("0.09", "ON"), ("0.2", "OFF")))),
-    (run_of(engine_files(("0.02", ""), ("0.09", "ON"), ("0.2", "OFF"))),),
-    (RADIOSS,),
-)
+@passes(GOOD_RUN, run_of(engine_files(("0.09", "ON"), ("0.2", "OFF"))))
+@fails(run_of(engine_files(("0.02", ""), ("0.09", "ON"), ("0.2", "OFF"))))
+@rule("D2R403", WARNING, "/RBODY/ON in a later leg for a body that was rigid from the start", (RADIOSS,))
 def _never_off(case: RunCase) -> Iterator[Objection]:
     """A rigid body is on by default in the first leg. Where no leg before says /RBODY/OFF the part is rigid from
     time 0 on, through the load as well. Source: Altair's help for /RBODY in engine files.
@@ -162,14 +162,9 @@ def _never_off(case: RunCase) -> Iterator[Objection]:
             said.update(node.value for node in nodes)
 
 
-@rule(
-    "D2R411",
-    WARNING,
-    "/RBODY/ON in a later leg for a body that is rigid already",
-    (GOOD_RUN, run_of(engine_files(("0.09", "ON"), ("0.1", ""), ("0.2", "OFF")))),
-    (run_of(engine_files(("0.02", "OFF"), ("0.05", "ON"), ("0.09", "ON"), ("0.2", "OFF"))),),
-    (RADIOSS,),
-)
+@passes(GOOD_RUN, run_of(engine_files(("0.09", "ON"), ("0.1", ""), ("0.2", "OFF"))))
+@fails(run_of(engine_files(("0.02", "OFF"), ("0.05", "ON"), ("0.09", "ON"), ("0.2", "OFF"))))
+@rule("D2R411", WARNING, "/RBODY/ON in a later leg for a body that is rigid already", (RADIOSS,))
 def _on_again(case: RunCase) -> Iterator[Objection]:
     """What a restart finds rigid stays so. Switched on once more it moves as before, but the internal energy of its
     elements is counted again: in one run the model had a third too much of it behind td. Source: runs computed with
@@ -186,19 +181,12 @@ def _on_again(case: RunCase) -> Iterator[Objection]:
             rigid_now = rigid_now | named if rigid else rigid_now - named
 
 
-@rule(
-    "D2R404",
-    WARNING,
-    "no limit of the time step, or a large one, in a leg with rigid parts",
-    (
-        GOOD_RUN,
-        run_of(
-            engine_files(*WINDOW, cap=""), starter_deck().replace("/RBODY", "/SHELL/2\n         2         1\n/RBODY")
-        ),
-    ),
-    (run_of(engine_files(*WINDOW, cap="")), run_of(engine_files(*WINDOW, cap="1e-5 1e-3"))),
-    (RADIOSS,),
+@passes(
+    GOOD_RUN,
+    run_of(engine_files(*WINDOW, cap=""), starter_deck().replace("/RBODY", "/SHELL/2\n         2         1\n/RBODY")),
 )
+@fails(run_of(engine_files(*WINDOW, cap="")), run_of(engine_files(*WINDOW, cap="1e-5 1e-3")))
+@rule("D2R404", WARNING, "no limit of the time step, or a large one, in a leg with rigid parts", (RADIOSS,))
 def _step(case: RunCase) -> Iterator[Objection]:
     """With nothing deformable left the step grows by 10 % per cycle without limit, and the release comes late with a
     kick; /DTIX caps it. A cap above a hundredth of the rigid window is reported too. A leg without cap is reported
@@ -225,7 +213,8 @@ def _deformable_left(case: RunCase, rigid: set[int]) -> bool:
     return not parts or bool(parts - rigid)
 
 
-@rule("D2R405", WARNING, "legs of different /VERS", (GOOD_RUN,), (run_of(_MIXED),), (RADIOSS,))
+@fails(run_of(_MIXED))
+@rule("D2R405", WARNING, "legs of different /VERS", (RADIOSS,))
 def _versions(case: RunCase) -> Iterator[Objection]:
     """The version says how the fields of an engine file are read. Source: Altair's help for /VERS; that a mixture
     does harm was not seen.
@@ -242,14 +231,9 @@ def _flaws(case: RunCase, *, code: str) -> Iterator[Objection]:
             yield flaw.place, flaw.message
 
 
-@rule(
-    "D2R408",
-    WARNING,
-    "a rigid body that no leg switches, in a run that switches others",
-    (GOOD_RUN, _wheel("1809"), _wheel(members=(5, 6, 7)), run_of(engine_files(("0.2", "OFF")), _wheel().deck)),
-    (_wheel(),),
-    (RADIOSS,),
-)
+@passes(GOOD_RUN, _wheel("1809"), _wheel(members=(5, 6, 7)), run_of(engine_files(("0.2", "OFF")), _wheel().deck))
+@fails(_wheel())
+@rule("D2R408", WARNING, "a rigid body that no leg switches, in a run that switches others", (RADIOSS,))
 def _left_rigid(case: RunCase) -> Iterator[Objection]:
     """A body is on from time 0 unless the first leg says /RBODY/OFF, and what it holds is rigid to the end: the
     wheels of a car whose legs name its body alone. Reported where the body holds whole parts, and no history tells
@@ -261,14 +245,9 @@ def _left_rigid(case: RunCase) -> Iterator[Objection]:
         yield left.place, f"{left.found}; where the run without switching keeps the bodies off, {left.way_out}"
 
 
-@rule(
-    "D2R409",
-    ERROR,
-    "a rigid body that no leg switches, though its parts deform in the history",
-    (GOOD_RUN, _wheel(), _wheel()._replace(history=_SPRING)),
-    (_wheel(part=3)._replace(history=_SPRING),),
-    (RADIOSS,),
-)
+@passes(GOOD_RUN, _wheel(), _wheel()._replace(history=_SPRING))
+@fails(_wheel(part=3)._replace(history=_SPRING))
+@rule("D2R409", ERROR, "a rigid body that no leg switches, though its parts deform in the history", (RADIOSS,))
 def _left_rigid_deforming(case: RunCase) -> Iterator[Objection]:
     """As D2R408, where a history has internal energy of the parts of that body: they deform in the run without
     switching, and cannot in this one. Where the history has their energy and it is zero, they are meant to be rigid.
@@ -286,18 +265,13 @@ def _left_rigid_parts(case: RunCase) -> tuple[LeftRigid | None, tuple[int, ...] 
     return left, case.judge.deforming(left.parts) if left and case.judge else None
 
 
-@rule(
-    "D2R307",
-    INFO,
-    "a rigid wall, an initial velocity or a rigid body whose nodes are not known",
-    (GOOD_RUN, _with(_NODES, _wall(8))),
-    (
-        _with("/GRNOD/BOX/8\nbox\n", _row(1), _wall(8)),
-        _with(_velocity(8)),
-        _with(_PLACES, "/TRANSFORM/TRA/1\n", _wall(0, 0, 0.1)),
-    ),
-    (RADIOSS,),
+@passes(GOOD_RUN, _with(_NODES, _wall(8)))
+@fails(
+    _with("/GRNOD/BOX/8\nbox\n", _row(1), _wall(8)),
+    _with(_velocity(8)),
+    _with(_PLACES, "/TRANSFORM/TRA/1\n", _wall(0, 0, 0.1)),
 )
+@rule("D2R307", INFO, "a rigid wall, an initial velocity or a rigid body whose nodes are not known", (RADIOSS,))
 def _d2r307(case: RunCase) -> Iterator[Objection]:
     """What walls and velocities do to the nodes of rigid bodies (D2R406, D2R407) is judged by groups of nodes, parts
     and subsets, and by the distance from the wall. Other groups, nodes that /TRANSFORM moves and the ids of a
@@ -306,20 +280,15 @@ def _d2r307(case: RunCase) -> Iterator[Objection]:
     return _flaws(case, code=NOT_FOLLOWED)
 
 
-@rule(
-    "D2R406",
-    ERROR,
-    "a rigid wall that does not hold what a switched rigid body holds",
-    (
-        GOOD_RUN,
-        _with(_NODES, _wall(8, 8)),
-        run_of(_LEGS, f"{_KEEPS}{_NODES.replace('/8', '/7')}{_wall(7)}/END\n"),
-        _with(_PLACES, _wall(0, 0, 0.01)),
-        run_of({}, starter_deck(more=_NODES + _wall(8))),
-    ),
-    (_with(_NODES, _wall(8)), _with(_PLACES, _wall(0, 0, 0.1)), _with(_wall(7))),
-    (RADIOSS,),
+@passes(
+    GOOD_RUN,
+    _with(_NODES, _wall(8, 8)),
+    run_of(_LEGS, f"{_KEEPS}{_NODES.replace('/8', '/7')}{_wall(7)}/END\n"),
+    _with(_PLACES, _wall(0, 0, 0.01)),
+    run_of({}, starter_deck(more=_NODES + _wall(8))),
 )
+@fails(_with(_NODES, _wall(8)), _with(_PLACES, _wall(0, 0, 0.1)), _with(_wall(7)))
+@rule("D2R406", ERROR, "a rigid wall that does not hold what a switched rigid body holds", (RADIOSS,))
 def _d2r406(case: RunCase) -> Iterator[Objection]:
     """The starter removes the nodes of every /RBODY with Ikrem 0 from all /RWALL, also of one that the engine puts
     off in the first leg (warning 446): what they hold goes through the wall. OpenRadioss takes the Ikrem of the
@@ -331,19 +300,16 @@ def _d2r406(case: RunCase) -> Iterator[Objection]:
     return _flaws(case, code=THROUGH_WALL)
 
 
+@passes(
+    GOOD_RUN,
+    _with(_NODES, _velocity(8), _MAIN, _velocity(9)),
+    _with(_NODES, _velocity(8, 0.0)),
+    _start("OFF", 1, 4),
+    _start("ON", 1, 1808),
+)
+@fails(_with(_NODES, _velocity(8)), _with(_velocity(7)), _start("ON", 1, 4))
 @rule(
-    "D2R407",
-    ERROR,
-    "an initial velocity that moves nodes of a switched rigid body and not its main node",
-    (
-        GOOD_RUN,
-        _with(_NODES, _velocity(8), _MAIN, _velocity(9)),
-        _with(_NODES, _velocity(8, 0.0)),
-        _start("OFF", 1, 4),
-        _start("ON", 1, 1808),
-    ),
-    (_with(_NODES, _velocity(8)), _with(_velocity(7)), _start("ON", 1, 4)),
-    (RADIOSS,),
+    "D2R407", ERROR, "an initial velocity that moves nodes of a switched rigid body and not its main node", (RADIOSS,)
 )
 def _d2r407(case: RunCase) -> Iterator[Objection]:
     """The starter gives all nodes of an /RBODY the velocity of its main node, also of one that the engine puts off

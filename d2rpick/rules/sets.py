@@ -8,8 +8,21 @@ from typing import TYPE_CHECKING, Final, Literal
 from d2rpick.base.errors import listing
 from d2rpick.deck.ls_dyna_parts import Entities, read_entities
 from d2rpick.deck.switching import BY_TIME, Header, SwitchSet, Unit
-from d2rpick.rules.base import ERROR, WARNING, Case, Example, Objection, rule
-from d2rpick.rules.examples import BACK, PASSES, THERE, automatic, deck
+from d2rpick.rules.base import (
+    BACK,
+    ERROR,
+    PASSES,
+    THERE,
+    WARNING,
+    Case,
+    Example,
+    Objection,
+    automatic,
+    deck,
+    fails,
+    passes,
+    rule,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -56,7 +69,8 @@ _WALL: Final = (
 _with_floor = partial(_force, contact=_FLOOR)
 
 
-@rule("D2R004", ERROR, "SWSET used twice", (PASSES,), (deck(THERE + automatic(1, "0.09", deformable=["1"])),))
+@fails(deck(THERE + automatic(1, "0.09", deformable=["1"])))
+@rule("D2R004", ERROR, "SWSET used twice")
 def _unique(case: Case) -> Iterator[Objection]:
     """Every *DEFORMABLE_TO_RIGID_AUTOMATIC is a switch set with an id of its own; RELSW refers to it."""
     first: dict[int, Header] = {}
@@ -69,13 +83,9 @@ def _unique(case: Case) -> Iterator[Objection]:
             yield header.swset.field, f"{found}; give every set its own id"
 
 
-@rule(
-    "D2R005",
-    ERROR,
-    "RELSW/PAIRED not mutual, not of opposite sign, or CODEs of different families",
-    (_pair((2, 4)), _pair((1, 3))),
-    (_pair((2, 4), back=7), _pair((2, 4), signs=(1, 1)), _pair((1, 4))),
-)
+@passes(_pair((2, 4)), _pair((1, 3)))
+@fails(_pair((2, 4), back=7), _pair((2, 4), signs=(1, 1)), _pair((1, 4)))
+@rule("D2R005", ERROR, "RELSW/PAIRED not mutual, not of opposite sign, or CODEs of different families")
 def _mutual(case: Case) -> Iterator[Objection]:
     """Paired sets alternate as a contact or wall force comes and goes: each names the other in RELSW, PAIRED is 1
     for the one that acts first and -1 for the other, and their CODEs are 1 and 3 (wall) or 2 and 4 (contact). Sets,
@@ -140,13 +150,9 @@ def _mismatch(one: Header, other: Header) -> str:
     return ""
 
 
-@rule(
-    "D2R006",
-    WARNING,
-    "PAIRED together with CODE 0",
-    (PASSES, _pair((2, 4))),
-    (deck(automatic(1, "0.02", rigid=["1"], pair=(2, 1)) + BACK),),
-)
+@passes(PASSES, _pair((2, 4)))
+@fails(deck(automatic(1, "0.02", rigid=["1"], pair=(2, 1)) + BACK))
+@rule("D2R006", WARNING, "PAIRED together with CODE 0")
 def _timed_pair(case: Case) -> Iterator[Objection]:
     """For one window by time two unpaired sets are enough."""
     for _, header in case.headers:
@@ -161,13 +167,9 @@ def _by_force(case: Case, codes: set[int]) -> Iterator[Header]:
             yield header
 
 
-@rule(
-    "D2R007",
-    ERROR,
-    "ENTNO names no contact or rigid wall of the deck",
-    (_with_floor(4, 7), _force(4, 1, contact=_BY_ORDER), _force(3, 3, contact=_WALL), Example(THERE + BACK)),
-    (_with_floor(4, 8), _force(4, 7), _force(3, 4, contact=_WALL), _force(2, 2, contact=_BY_ORDER)),
-)
+@passes(_with_floor(4, 7), _force(4, 1, contact=_BY_ORDER), _force(3, 3, contact=_WALL), Example(THERE + BACK))
+@fails(_with_floor(4, 8), _force(4, 7), _force(3, 4, contact=_WALL), _force(2, 2, contact=_BY_ORDER))
+@rule("D2R007", ERROR, "ENTNO names no contact or rigid wall of the deck")
 def _there(case: Case) -> Iterator[Objection]:
     """CODE 2 and 4 wait for the force of contact ENTNO, 1 and 3 for that of a rigid wall. One that does not exist
     never has a force. ENTNO is the id of *CONTACT_..._ID; without ids the order of definition counts (from memory of
@@ -186,13 +188,9 @@ def _there(case: Case) -> Iterator[Objection]:
                 yield header.entno.field, f"{found}; the switch never comes: give the number of one of them"
 
 
-@rule(
-    "D2R008",
-    ERROR,
-    "ENTNO names a contact whose force cannot trigger a switch",
-    (_with_floor(4, 7), _force(2, 1, contact=_BY_ORDER), _force(3, 7, contact=_contact("GENERAL") + _WALL)),
-    (_force(4, 7, contact=_contact("GENERAL")), _force(2, 7, contact=_contact("SINGLE_SURFACE"))),
-)
+@passes(_with_floor(4, 7), _force(2, 1, contact=_BY_ORDER), _force(3, 7, contact=_contact("GENERAL") + _WALL))
+@fails(_force(4, 7, contact=_contact("GENERAL")), _force(2, 7, contact=_contact("SINGLE_SURFACE")))
+@rule("D2R008", ERROR, "ENTNO names a contact whose force cannot trigger a switch")
 def _able(case: Case) -> Iterator[Objection]:
     """Only surface-to-surface and nodes-to-surface contacts switch parts by their force; one of type GENERAL or
     SINGLE_SURFACE never does, so the part stays as it is, silently. Source: Vol I, Remark 1, as quoted by a public
@@ -216,13 +214,9 @@ def _listed(entities: Entities) -> str:
     return listing(texts, most=_MOST_LISTED)
 
 
-@rule(
-    "D2R009",
-    WARNING,
-    "TIME3 is 0 with a contact CODE",
-    (PASSES, _with_floor(4, 7)),
-    (_with_floor(4, 7, "0.0"), _with_floor(2, 7, "0.0")),
-)
+@passes(PASSES, _with_floor(4, 7))
+@fails(_with_floor(4, 7, "0.0"), _with_floor(2, 7, "0.0"))
+@rule("D2R009", WARNING, "TIME3 is 0 with a contact CODE")
 def _delay(case: Case) -> Iterator[Objection]:
     """TIME3 is how long after a switch no other one of the set is made. With 0 the next step may switch back: the
     force of a contact is zero and not zero many times in one impact, and the parts chatter. Source: vendor keyword
@@ -234,13 +228,9 @@ def _delay(case: Case) -> Iterator[Objection]:
             yield header.time3.field, f"{found}; set it to a time in which the contact settles"
 
 
-@rule(
-    "D2R010",
-    ERROR,
-    "CODE 3 or 4 without a contact or rigid wall (ENTNO 0)",
-    (PASSES, _with_floor(4, 7)),
-    (_with_floor(4, 0), _force(3, 0)),
-)
+@passes(PASSES, _with_floor(4, 7))
+@fails(_with_floor(4, 0), _force(3, 0))
+@rule("D2R010", ERROR, "CODE 3 or 4 without a contact or rigid wall (ENTNO 0)")
 def _unnamed(case: Case) -> Iterator[Objection]:
     """The switch waits for a force that is not zero. Without the number of the contact or rigid wall there is no
     force to wait for. Source: vendor keyword data; what the solver does with 0 is not confirmed.

@@ -7,13 +7,29 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.base.errors import name_units
 from d2rpick.base.graph import reached
 from d2rpick.deck.ls_dyna_parts import Parts, element_cards
-from d2rpick.rules.base import BOTH, ERROR, INFO, WARNING, Case, Example, Objection, grouped, rule
-from d2rpick.rules.examples import BACK, PASSES, THERE, automatic, deck
+from d2rpick.rules.base import (
+    BACK,
+    BOTH,
+    ERROR,
+    INFO,
+    PASSES,
+    THERE,
+    WARNING,
+    Case,
+    Example,
+    Objection,
+    automatic,
+    deck,
+    fails,
+    grouped,
+    passes,
+    rule,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
-    from d2rpick.deck.fields import Field
+    from d2rpick.deck.card import Field
     from d2rpick.deck.switching import Event, Header, Switched, SwitchSet, Unit
 
 _NEAREST = 3  # ids that are named in place of one that the deck does not have
@@ -73,13 +89,8 @@ def _unknown_members(case: Case, *, to_rigid: bool) -> bool:
     return any(event.unit.is_set and event.line.to_rigid == to_rigid for event in case.windows.events)
 
 
-@rule(
-    "D2R103",
-    ERROR,
-    "a part switched back that nothing made rigid",
-    (PASSES,),
-    (deck(BACK), deck(THERE + BACK.replace("  1  ", "  2  "))),
-)
+@fails(deck(BACK), deck(THERE + BACK.replace("  1  ", "  2  ")))
+@rule("D2R103", ERROR, "a part switched back that nothing made rigid")
 def _never_rigid(case: Case) -> Iterator[Objection]:
     """An R2D line for a part that no D2R line made rigid before has no effect; usually an id is wrong on one of the
     two cards.
@@ -95,14 +106,8 @@ def _never_rigid(case: Case) -> Iterator[Objection]:
         yield place, f"{named} switched back, but no card makes it rigid before; add the D2R line or remove this"
 
 
-@rule(
-    "D2R104",
-    INFO,
-    "a part made rigid and never switched back",
-    (PASSES,),
-    (deck(THERE), deck("*DEFORMABLE_TO_RIGID\n         1\n")),
-    BOTH,
-)
+@fails(deck(THERE), deck("*DEFORMABLE_TO_RIGID\n         1\n"))
+@rule("D2R104", INFO, "a part made rigid and never switched back", BOTH)
 def _never_back(case: Case) -> Iterator[Objection]:
     """It stays rigid to the end of the run, unless a restart deck switches it back. What it would have deformed in
     the next contact is missing from the result.
@@ -118,20 +123,16 @@ def _never_back(case: Case) -> Iterator[Objection]:
         yield place, f"{named} made rigid at {card.time:g} and never switched back in this deck"
 
 
-@rule(
-    "D2R106",
-    ERROR,
-    "part or part set not in the deck (only when every include was read)",
-    (PASSES, Example(THERE + BACK), deck("*INCLUDE\nmore_parts.k\n" + BACK)),
-    (
-        deck(automatic(1, "0.02", rigid=["7"])),
-        *(
-            deck(text + "*DEFORMABLE_TO_RIGID\n         3         0      PSET\n")
-            for text in ("", "*SET_PART\n         3\n", "*SET_PART\n         3\n         1         7\n")
-        ),
-        deck(_LAYERED + automatic(1, "0.02", rigid=["8"])),
+@passes(PASSES, Example(THERE + BACK), deck("*INCLUDE\nmore_parts.k\n" + BACK))
+@fails(
+    deck(automatic(1, "0.02", rigid=["7"])),
+    *(
+        deck(text + "*DEFORMABLE_TO_RIGID\n         3         0      PSET\n")
+        for text in ("", "*SET_PART\n         3\n", "*SET_PART\n         3\n         1         7\n")
     ),
+    deck(_LAYERED + automatic(1, "0.02", rigid=["8"])),
 )
+@rule("D2R106", ERROR, "part or part set not in the deck (only when every include was read)")
 def _exists(case: Case) -> Iterator[Objection]:
     """A switching card names a part, part set or lead part that no *PART or *SET_PART defines, or a set without
     parts. Judged only when all of the deck could be read and it has parts at all.
@@ -169,7 +170,8 @@ def _absent(line: Switched, parts: Parts) -> Iterator[tuple[str, int]]:
         yield "lead part", line.lead.value
 
 
-@rule("D2R107", WARNING, "a *MAT_RIGID part switched to deformable", (PASSES,), (deck(_RIGID + BACK),))
+@fails(deck(_RIGID + BACK))
+@rule("D2R107", WARNING, "a *MAT_RIGID part switched to deformable")
 def _always_rigid(case: Case) -> Iterator[Objection]:
     """A part with *MAT_RIGID is rigid from the start and cannot become deformable. It must be modelled with its
     deformable material and made rigid by the card.
@@ -184,13 +186,9 @@ def _always_rigid(case: Case) -> Iterator[Objection]:
         yield place, f"{found}; give it its deformable material and let a D2R line make it rigid"
 
 
-@rule(
-    "D2R108",
-    WARNING,
-    "several parts made rigid with LRB 0 although they share nodes",
-    (_both("1", "         2         1      PART"),),
-    (_both("1", "2"), _LAYERS, _BEAMS),
-)
+@passes(_both("1", "         2         1      PART"))
+@fails(_both("1", "2"), _LAYERS, _BEAMS)
+@rule("D2R108", WARNING, "several parts made rigid with LRB 0 although they share nodes")
 def _torn(case: Case) -> Iterator[Objection]:
     """With LRB 0 each part becomes a rigid body of its own, and the bodies fight over the nodes they share. Merge
     them: the lead part with LRB 0, the others with LRB = the lead.
@@ -264,14 +262,9 @@ def _left_active(case: Case, *, nodal: bool) -> dict[int, Header]:
     return found
 
 
-@rule(
-    "D2R116",
-    WARNING,
-    "solids whose stresses do not turn with the rigid body",
-    (PASSES, _solid("0"), _solid("2", "0.0")),
-    (_solid("2"), _solid(""), _solid("13")),
-    BOTH,
-)
+@passes(PASSES, _solid("0"), _solid("2", "0.0"))
+@fails(_solid("2"), _solid(""), _solid("13"))
+@rule("D2R116", WARNING, "solids whose stresses do not turn with the rigid body", BOTH)
 def _unturned(case: Case) -> Iterator[Objection]:
     """While a part is rigid its elements are not computed. Formulations without a co-rotating frame keep their
     stresses in global axes: after a rotation they spring back in the wrong direction. Parts that are rigid from the
@@ -288,13 +281,9 @@ def _unturned(case: Case) -> Iterator[Objection]:
         yield those[0][1], f"{found}: {why}; expect an error after a large rotation"
 
 
-@rule(
-    "D2R112",
-    ERROR,
-    "a nodal rigid body on a switched part stays active (NRBF)",
-    (PASSES, _constrained(_NODAL, "         1         0"), _constrained(_NODAL.replace("   5\n", "   6\n"))),
-    (_constrained(_NODAL), _constrained(_NODAL, "         2         1")),
-)
+@passes(PASSES, _constrained(_NODAL, "         1         0"), _constrained(_NODAL.replace("   5\n", "   6\n")))
+@fails(_constrained(_NODAL), _constrained(_NODAL, "         2         1"))
+@rule("D2R112", ERROR, "a nodal rigid body on a switched part stays active (NRBF)")
 def _d2r112(case: Case) -> Iterator[Objection]:
     """A node cannot belong to two rigid bodies. A nodal rigid body on a part that is made rigid must be deleted by
     the same card (NRBF 1) and activated again on the way back (2); else the run stops (Error 30164, as a public drop
@@ -303,13 +292,9 @@ def _d2r112(case: Case) -> Iterator[Objection]:
     return _held(case, nodal=True)
 
 
-@rule(
-    "D2R113",
-    WARNING,
-    "extra nodes or a joint on a switched part stay active (NRBF, NCSF)",
-    (PASSES, _constrained(_EXTRA, "         0         1"), _constrained(_JOINT, "         1         0")),
-    (_constrained(_EXTRA), _constrained(_JOINT), _constrained(_EXTRA.replace("  8  ", "  1  "))),
-)
+@passes(PASSES, _constrained(_EXTRA, "         0         1"), _constrained(_JOINT, "         1         0"))
+@fails(_constrained(_EXTRA), _constrained(_JOINT), _constrained(_EXTRA.replace("  8  ", "  1  ")))
+@rule("D2R113", WARNING, "extra nodes or a joint on a switched part stay active (NRBF, NCSF)")
 def _d2r113(case: Case) -> Iterator[Objection]:
     """Extra nodes and joints tie nodes to a rigid body; on a part that a card makes rigid the nodes then belong to
     two. The vendor asks to delete what lies in switched parts (1) and to activate it on the way back (2); which of

@@ -7,8 +7,28 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import name_units
 from d2rpick.deck.switching import BY_SENSOR, BY_TIME, Header, SwitchSet, Window
-from d2rpick.rules.base import BOTH, ERROR, WARNING, Case, Example, Objection, grouped, rule
-from d2rpick.rules.examples import BACK, END, GOOD, HEAD, PARTS, PASSES, THERE, automatic, deck, window
+from d2rpick.rules.base import (
+    BACK,
+    BOTH,
+    END,
+    ERROR,
+    GOOD,
+    HEAD,
+    PARTS,
+    PASSES,
+    THERE,
+    WARNING,
+    Case,
+    Example,
+    Objection,
+    automatic,
+    deck,
+    fails,
+    grouped,
+    passes,
+    rule,
+    window,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -24,17 +44,12 @@ _FEW = 2  # cards: D2R102 and D2R105 say it already
 _SECOND: Final = automatic(3, "0.1", rigid=["2"]) + automatic(4, "0.1", deformable=["2"])
 
 
-@rule(
-    "D2R101",
-    ERROR,
-    "switch time outside [0, ENDTIM)",
-    (PASSES,),
-    (
-        window("0.02", "0.2"),
-        window("-0.02", "0.09"),
-        Example(PARTS + automatic(1, "0.02", rigid=["1"], code=2).replace("       0.0", "      0.01", 1) + END),
-    ),
+@fails(
+    window("0.02", "0.2"),
+    window("-0.02", "0.09"),
+    Example(PARTS + automatic(1, "0.02", rigid=["1"], code=2).replace("       0.0", "      0.01", 1) + END),
 )
+@rule("D2R101", ERROR, "switch time outside [0, ENDTIM)")
 def _in_run(case: Case) -> Iterator[Objection]:
     """TIME1 is the switching time for CODE 0 and the earliest one for CODE 1 to 4. At or after ENDTIM of
     *CONTROL_TERMINATION the switch never happens, and with CODE 1 to 4 not after TIME2 either.
@@ -67,14 +82,8 @@ def _lost(one: Window) -> bool:
     return one.tr == 0 == one.td
 
 
-@rule(
-    "D2R102",
-    ERROR,
-    "switched back before (or when) it was switched to rigid",
-    (PASSES,),
-    (window("0.09", "0.02"), window("0.02", "0.02")),
-    BOTH,
-)
+@fails(window("0.09", "0.02"), window("0.02", "0.02"))
+@rule("D2R102", ERROR, "switched back before (or when) it was switched to rigid", BOTH)
 def _order(case: Case) -> Iterator[Objection]:
     """The R2D switch of a part must come after its D2R switch; the solver does not sort them for you."""
     for (opening, closing), windows in _closed(case).items():
@@ -85,13 +94,9 @@ def _order(case: Case) -> Iterator[Objection]:
             yield closing.time_field, f"{found} {way_out}"
 
 
-@rule(
-    "D2R105",
-    ERROR,
-    "both times of a window are 0 (decimals lost in writing)",
-    (PASSES, window("0.0", "0.09")),
-    (window("0.0", "0.0"),),
-)
+@passes(PASSES, window("0.0", "0.09"))
+@fails(window("0.0", "0.0"))
+@rule("D2R105", ERROR, "both times of a window are 0 (decimals lost in writing)")
 def _zero(case: Case) -> Iterator[Objection]:
     """Writers that print times with one decimal turn everything below 0.05 into 0.0. Two sets that both switch at 0
     are a sign of it.
@@ -102,13 +107,9 @@ def _zero(case: Case) -> Iterator[Objection]:
             yield closing.time_field, f"{found}; print times below 0.05 with more than one decimal"
 
 
-@rule(
-    "D2R111",
-    WARNING,
-    "without --history: *DATABASE_GLSTAT/_MATSUM missing, or DT above (td-tr)/200",
-    (PASSES, Example(THERE + BACK)),
-    (Example(PARTS + THERE + BACK + END), Example(GOOD.replace("    0.0001", "      0.01"))),
-)
+@passes(PASSES, Example(THERE + BACK))
+@fails(Example(PARTS + THERE + BACK + END), Example(GOOD.replace("    0.0001", "      0.01")))
+@rule("D2R111", WARNING, "without --history: *DATABASE_GLSTAT/_MATSUM missing, or DT above (td-tr)/200")
 def _sampling(case: Case) -> Iterator[Objection]:
     """Switching times are chosen by the internal energy of a reference run: glstat holds it for the whole run,
     matsum for every part. Written too rarely, the energy at tr and td is not known well enough. Decks that are only
@@ -148,13 +149,9 @@ def _timed(case: Case) -> list[tuple[SwitchSet, Header]]:
     return [(card, header) for card, header in case.headers if card.time is not None and header.code.value == BY_TIME]
 
 
-@rule(
-    "D2R114",
-    ERROR,
-    "all switching times are equal (decimals lost in writing)",
-    (PASSES, deck(THERE + automatic(3, "0.02", rigid=["2"]))),
-    (window("0.1", "0.1", _SECOND), deck(automatic(1, "0.0", rigid=["1"]) + automatic(2, "0.0", deformable=["2"]))),
-)
+@passes(PASSES, deck(THERE + automatic(3, "0.02", rigid=["2"])))
+@fails(window("0.1", "0.1", _SECOND), deck(automatic(1, "0.0", rigid=["1"]) + automatic(2, "0.0", deformable=["2"])))
+@rule("D2R114", ERROR, "all switching times are equal (decimals lost in writing)")
 def _equal(case: Case) -> Iterator[Objection]:
     """Writers with one decimal make 0.0 of every time below 0.05, and 0.1 of 0.07 and 0.13. Cards that make parts
     rigid and cards that make them deformable, all at one time, are a sign of it. Source: a public drop tool wrote
@@ -189,13 +186,9 @@ def _mixed(times: list[float], end: float, what: str) -> str | None:
     return f"the switching times reach {latest:g} but {what}, about 1000 times {way}? give both in the same unit"
 
 
-@rule(
-    "D2R115",
-    ERROR,
-    "the switching times are about 1000 times the termination time, or a thousandth of it",
-    (PASSES, Example(THERE + BACK), window("-0.01", "0.07"), window("-0.02", "-0.01"), window("0.0", "0.07")),
-    (window("20.0", "90.0"), window("2.0e-5", "9.0e-5")),
-)
+@passes(PASSES, Example(THERE + BACK), window("-0.01", "0.07"), window("-0.02", "-0.01"), window("0.0", "0.07"))
+@fails(window("20.0", "90.0"), window("2.0e-5", "9.0e-5"))
+@rule("D2R115", ERROR, "the switching times are about 1000 times the termination time, or a thousandth of it")
 def _thousand(case: Case) -> Iterator[Objection]:
     """Seconds and milliseconds are mixed: the times would lie in the run if they were divided, or multiplied, by
     1000, and do not, or only in its first 1/1000. D2R101 reports times after the end too. Files name no units, so
@@ -225,8 +218,7 @@ _PASSING: Final = (_pair(*_GOOD_PAIR),)
 
 def _faults(case: Case, rule_id: str) -> Iterator[Objection]:
     """Objections of one rule; those that parts of one card share are one."""
-    if case.judge is None:
-        return
+    assert case.judge is not None
     windows = case.windows.windows
     together = grouped(((one.tr, one.td), one.part) for one in windows if one.part is not None)
     found = grouped(
@@ -239,19 +231,20 @@ def _faults(case: Case, rule_id: str) -> Iterator[Objection]:
         yield card.time_field, f"{name_units(ids, kind)}: {message}"
 
 
+@passes(*_PASSING, PASSES)
+@fails(_pair("13.5867", "68.7534", head=HEAD.replace("       0.2", "     150.0")))
 @rule(
     "D2R206",
     WARNING,
     "deck and history seem to have different time units (ENDTIM and the record's end differ by a power of 1000)",
-    (*_PASSING, PASSES),
-    (_pair("13.5867", "68.7534", head=HEAD.replace("       0.2", "     150.0")),),
     BOTH,
 )
 def _units(case: Case) -> Iterator[Objection]:
     """Decks in milliseconds and histories in seconds are a common mix. Files name no units, so the two ends are all
     there is to compare.
     """
-    if case.judge is None or case.end is None or case.end_time is None or not case.judge.end > 0:
+    assert case.judge is not None
+    if case.end is None or case.end_time is None or not case.judge.end > 0:
         return
     decades = math.log10(case.end) - math.log10(case.judge.end)
     power = round(decades / _DECADES)
@@ -261,14 +254,9 @@ def _units(case: Case) -> Iterator[Objection]:
         yield case.end_time.field, f"{found} {way}: different units of time? give both in the same"
 
 
-@rule(
-    "D2R207",
-    ERROR,
-    "the switching times are about 1000 times those of the history, or a thousandth of them",
-    (*_PASSING, PASSES),
-    (_pair("13.5867", "68.7534", head=HEAD.replace("       0.2", "     150.0")), _pair("1.0e-5", "6.0e-5")),
-    BOTH,
-)
+@passes(*_PASSING, PASSES)
+@fails(_pair("13.5867", "68.7534", head=HEAD.replace("       0.2", "     150.0")), _pair("1.0e-5", "6.0e-5"))
+@rule("D2R207", ERROR, "the switching times are about 1000 times those of the history, or a thousandth of them", BOTH)
 def _thousand_of_history(case: Case) -> Iterator[Objection]:
     """A deck in milliseconds and a history in seconds, or the other way round: the windows would lie in the history
     if their times were divided, or multiplied, by 1000. Files name no units, so this is a guess by size; D2R205
@@ -276,20 +264,16 @@ def _thousand_of_history(case: Case) -> Iterator[Objection]:
     """
     windows = case.windows.windows
     times = [time for one in windows for time in (one.tr, one.td) if time is not None]
-    if case.judge is None or not case.judge.end > 0:
+    assert case.judge is not None
+    if not case.judge.end > 0:
         return
     if found := _mixed(times, case.judge.end, f"the history ends at {case.judge.end:g}"):
         yield windows[0].opened.by.time_field, found
 
 
-@rule(
-    "D2R201",
-    ERROR,
-    "the error of the locked-in energy is above --tolerance",
-    (*_PASSING, PASSES),
-    (_pair("0.017", ".0687534"), _pair("0.0135", ".0687534", "--tolerance 0.05")),
-    BOTH,
-)
+@passes(*_PASSING, PASSES)
+@fails(_pair("0.017", ".0687534"), _pair("0.0135", ".0687534", "--tolerance 0.05"))
+@rule("D2R201", ERROR, "the error of the locked-in energy is above --tolerance", BOTH)
 def _d2r201(case: Case) -> Iterator[Objection]:
     """While a part is rigid it keeps the deformation it had at tr; it springs back at td. The deformation should be
     the one it would have had at td: same energy, same sign. Judged as d2rpick verify does, for the parts that share
@@ -299,7 +283,9 @@ def _d2r201(case: Case) -> Iterator[Objection]:
     return _faults(case, "D2R201")
 
 
-@rule("D2R202", ERROR, "opposite sign of the deformation", _PASSING, (_pair(".0122659", "0.064"),), BOTH)
+@passes(*_PASSING)
+@fails(_pair(".0122659", "0.064"))
+@rule("D2R202", ERROR, "opposite sign of the deformation", BOTH)
 def _d2r202(case: Case) -> Iterator[Objection]:
     """A vibrating part passes every energy level twice stretched and twice compressed. Locked in with the wrong
     sign, the vibration after td is worse than with no energy at all. Known only where an oscillator describes the
@@ -308,14 +294,9 @@ def _d2r202(case: Case) -> Iterator[Objection]:
     return _faults(case, "D2R202")
 
 
-@rule(
-    "D2R203",
-    WARNING,
-    "poor td (kinetic share above one half): the better td, named",
-    _PASSING,
-    (_pair(".0128853", "0.064"),),
-    BOTH,
-)
+@passes(*_PASSING)
+@fails(_pair(".0128853", "0.064"))
+@rule("D2R203", WARNING, "poor td (kinetic share above one half): the better td, named", BOTH)
 def _d2r203(case: Case) -> Iterator[Objection]:
     """The share of the vibration energy that is kinetic at td is lost whatever tr is, since a rigid part does not
     vibrate. Near a peak of the internal energy hardly any is kinetic.
@@ -323,14 +304,9 @@ def _d2r203(case: Case) -> Iterator[Objection]:
     return _faults(case, "D2R203")
 
 
-@rule(
-    "D2R204",
-    ERROR,
-    "tr before the load is over, or td after the next contact",
-    _PASSING,
-    (_pair(*_GOOD_PAIR, "--after 0.03"),),
-    BOTH,
-)
+@passes(*_PASSING)
+@fails(_pair(*_GOOD_PAIR, "--after 0.03"))
+@rule("D2R204", ERROR, "tr before the load is over, or td after the next contact", BOTH)
 def _d2r204(case: Case) -> Iterator[Objection]:
     """Before the load is over equal energy is an accident and the motion comes out wrong; after the next contact the
     part should have deformed. When the flight begins and ends is found from the momentum or the energy of the
@@ -339,7 +315,9 @@ def _d2r204(case: Case) -> Iterator[Objection]:
     return _faults(case, "D2R204")
 
 
-@rule("D2R205", ERROR, "tr or td outside the reference history", _PASSING, (_pair(".0135867", "0.16"),), BOTH)
+@passes(*_PASSING)
+@fails(_pair(".0135867", "0.16"))
+@rule("D2R205", ERROR, "tr or td outside the reference history", BOTH)
 def _d2r205(case: Case) -> Iterator[Objection]:
     """The energy at such a time is unknown, and so is that of a part that the history does not have. A td within the
     first ten states, whose thousandfold lies in the history, was given in another unit.

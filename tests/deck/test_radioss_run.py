@@ -6,9 +6,10 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from d2rpick.base.errors import DeckError
+from d2rpick.deck.printed_card import Printing
+from d2rpick.deck.printing import cards
 from d2rpick.deck.radioss_files import recognises, run_files
 from d2rpick.deck.radioss_run import find_run_windows, read_run
-from d2rpick.deck.radioss_sensors import sensor_cards
 from d2rpick.rules import RULES, check_deck
 from tests.command import put
 from tests.computed import stored
@@ -154,8 +155,8 @@ def test_a_sensor_that_cannot_be_followed_is_told(tmp_path: Path, sensor: str, t
 def test_printed_sensors_hold_their_windows(tmp_path_factory: pytest.TempPathFactory, cuts: list[int]) -> None:
     times = sorted(one / 1000 for one in cuts)
     windows = list(zip(times[::2], times[1::2], strict=True))
-    text, last = sensor_cards(windows, 5)
-    path = sensed(tmp_path_factory.mktemp("run"), text, sensor_id=last)
+    card = cards(windows, Printing(node=(1808,), end=windows[-1][1] + 1, sensor=5), "radioss-sensors")
+    path = sensed(tmp_path_factory.mktemp("run"), card.starter, sensor_id=card.sensors[1808])
     assert spans(path) == [(1, "part", tr, td) for tr, td in windows]
 
 

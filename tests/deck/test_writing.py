@@ -12,7 +12,7 @@ from d2rpick.deck.radioss_deck import Leg
 from d2rpick.deck.radioss_run import read_run
 from d2rpick.deck.writing import write_deck
 from d2rpick.rules import RULES, check_deck
-from d2rpick.rules.examples import END, GOOD, HEAD, PARTS, THERE
+from d2rpick.rules.base import END, GOOD, HEAD, PARTS, THERE
 from tests.decks import write
 
 WINDOWS = [(0.02, 0.09), (0.1, 0.15)]
@@ -38,14 +38,6 @@ def test_the_deck_is_the_same_but_for_one_include(tmp_path: Path, end: str, newl
     assert windows(written) == [(1, tr, td) for tr, td in WINDOWS]
 
 
-@pytest.mark.parametrize(
-    ("deck", "cure"),
-    [((HEAD + PARTS).rstrip("\n"), "end its last line"), (f"{HEAD}{PARTS}*NODE\n       1\n", "add that line")],
-)
-def test_a_deck_that_seems_to_be_cut_is_not_completed(tmp_path: Path, deck: str, cure: str) -> None:
-    refused(tmp_path, deck, rf"main\.k: the .* is it cut\? The cards behind it would hide that: .*{cure}")
-
-
 def test_a_deck_in_long_format_gets_cards_that_are_not(tmp_path: Path) -> None:
     deck = "*KEYWORD LONG=Y\n*PART\ndoor\n" + f"{1:20d}{1:20d}{1:20d}\n" + END
     written, _ = write_deck(write(tmp_path, deck), CARD, str(tmp_path / "next"))
@@ -59,34 +51,36 @@ def test_included_files_go_with_the_deck(tmp_path: Path) -> None:
     assert windows(written[0]) == [(1, tr, td) for tr, td in WINDOWS]
 
 
-def refused(tmp_path: Path, deck: str, message: str, files: dict[str, str] | None = None) -> None:
-    main = write(tmp_path, deck, files)
-    with pytest.raises(DeckError, match=message):
-        write_deck(main, CARD, str(tmp_path / "next"))
-    assert not list((tmp_path / "next").glob("*"))
+IS_CUT = r"main\.k: the .* is it cut\? The cards behind it would hide that: .*"
+OTHER_SET = THERE.replace("         1         0  ", "       901         0  ", 1).replace(
+    "         1         0      PART", "         2         0      PART"
+)
 
 
-def test_what_cannot_be_written_is_refused_before_anything_is(tmp_path: Path) -> None:
-    refused(tmp_path, GOOD, r"main.k:14: the deck switches part 1 already")
-    refused(
-        tmp_path,
-        HEAD
-        + PARTS
-        + THERE.replace("         1         0  ", "       901         0  ", 1).replace(
-            "         1         0      PART", "         2         0      PART"
-        )
-        + END,
-        "switch set 901",
-    )
-    refused(
-        tmp_path,
-        HEAD + "*INCLUDE\nswitches.k\n" + END,
-        "with the name of the cards, 'switches.k'",
-        {"switches.k": PARTS},
-    )
+@pytest.mark.parametrize(
+    ("deck", "files", "message"),
+    [
+        (GOOD, {}, r"main.k:14: the deck switches part 1 already"),
+        (HEAD + PARTS + OTHER_SET + END, {}, "switch set 901"),
+        (HEAD + INCLUDE + END, {"switches.k": PARTS}, "with the name of the cards, 'switches.k'"),
+        (HEAD + "*INCLUDE\n../parts.k\n" + END, {"../parts.k": PARTS}, "outside the folder"),
+        ((HEAD + PARTS).rstrip("\n"), {}, IS_CUT + "end its last line"),
+        (f"{HEAD}{PARTS}*NODE\n       1\n", {}, IS_CUT + "add that line"),
+    ],
+)
+def test_what_cannot_be_written_is_refused_before_anything_is(
+    tmp_path: Path, deck: str, files: dict[str, str], message: str
+) -> None:
     (tmp_path / "deep").mkdir()
-    (tmp_path / "parts.k").write_text(PARTS)
-    refused(tmp_path / "deep", HEAD + "*INCLUDE\n../parts.k\n" + END, "outside the folder")
+    refused(write(tmp_path / "deep", deck, files), CARD, message)
+
+
+def refused(main: str, card: PrintedCard, message: str) -> None:
+    """The deck is not written, and nothing else either."""
+    folder = Path(main).parent / "next"
+    with pytest.raises(DeckError, match=message):
+        write_deck(main, card, str(folder))
+    assert not list(folder.glob("*"))
 
 
 def test_nothing_is_replaced_without_being_told(tmp_path: Path) -> None:
@@ -173,19 +167,6 @@ def test_a_card_names_all_that_is_off_in_one_block() -> None:
     assert "/RBODY/OFF\n1808 1809\n" in texts[0]
 
 
-@pytest.mark.parametrize(
-    ("engine", "name", "message"),
-    [
-        (ENGINE.replace("OFF", "ON"), "box", "switches main node 1808 already"),
-        (ENGINE, "other", "run 'other', the run is 'box'"),
-    ],
-)
-def test_a_run_that_does_not_suit_is_refused(tmp_path: Path, engine: str, name: str, message: str) -> None:
-    card = cards(WINDOWS, Printing(node=(1808,), end=0.4, name=name), "radioss")
-    with pytest.raises(DeckError, match=message):
-        write_deck(radioss_run(tmp_path / "ref", engine), card, str(tmp_path / "next"))
-
-
 def sensed(**more: object) -> PrintedCard:
     printing = Printing(node=(1808,), end=0.4, name="box", **more)  # type: ignore[arg-type]
     return cards(WINDOWS, printing, "radioss-sensors")
@@ -212,22 +193,6 @@ def test_all_windows_fit_one_engine_run_by_sensors(tmp_path: Path, newline: str)
     assert changed[2] == "/SENSOR/TIME/901"  # in place of /END
 
 
-@pytest.mark.parametrize(
-    ("deck", "message"),
-    [
-        (RUN.deck.replace("      1808         0", "      1808         4"), "sensor 4 switches this /RBODY already"),
-        (RUN.deck.replace("/END", "/SENSOR/TIME/903\nown\n 1.0\n/END"), "has sensor 903 of the cards already"),
-        (RUN.deck.replace("      1808 ", "      1807 "), "main node 1808: no /RBODY"),
-    ],
-)
-def test_sensors_that_the_deck_cannot_take_are_refused(tmp_path: Path, deck: str, message: str) -> None:
-    main = radioss_run(tmp_path / "ref")
-    Path(main).write_text(deck)
-    with pytest.raises(DeckError, match=message):
-        write_deck(main, sensed(), str(tmp_path / "next"))
-    assert not (tmp_path / "next").exists() or not list((tmp_path / "next").iterdir())
-
-
 def test_bodies_that_a_deck_lacks_get_their_sensor(tmp_path: Path) -> None:
     head, _, behind = RUN.deck.partition("/RBODY/1\n")
     _, _, rest = behind.partition("7\n")
@@ -238,9 +203,31 @@ def test_bodies_that_a_deck_lacks_get_their_sensor(tmp_path: Path) -> None:
     assert windows(starter) == [(1, tr, td) for tr, td in WINDOWS]
 
 
-def test_the_card_is_one_for_the_solver_of_the_deck(tmp_path: Path) -> None:
-    with pytest.raises(DeckError, match="another solver"):
-        write_deck(radioss_run(tmp_path / "ref"), CARD, str(tmp_path / "next"))
-    card = cards(WINDOWS, Printing(node=(1808,), end=0.4), "radioss")
-    with pytest.raises(DeckError):
-        write_deck(write(tmp_path, HEAD + PARTS), card, str(tmp_path / "next"))
+LEGS = Printing(node=(1808,), end=0.4, name="box")
+
+
+@pytest.mark.parametrize(
+    ("deck", "engine", "card", "message"),
+    [
+        (RUN.deck, ENGINE.replace("OFF", "ON"), cards(WINDOWS, LEGS, "radioss"), "switches main node 1808 already"),
+        (RUN.deck, ENGINE, cards(WINDOWS, LEGS._replace(name="other"), "radioss"), "run 'other', the run is 'box'"),
+        (RUN.deck.replace("      1808         0", "      1808         4"), ENGINE, sensed(),
+         "sensor 4 switches this /RBODY already"),
+        (RUN.deck.replace("/END", "/SENSOR/TIME/903\nown\n 1.0\n/END"), ENGINE, sensed(),
+         "has sensor 903 of the cards already"),
+        (RUN.deck.replace("      1808 ", "      1807 "), ENGINE, sensed(), "main node 1808: no /RBODY"),
+        (RUN.deck, ENGINE, CARD, "another solver"),
+    ],
+)  # fmt: skip
+def test_a_run_that_does_not_suit_is_refused(
+    tmp_path: Path, deck: str, engine: str, card: PrintedCard, message: str
+) -> None:
+    main = radioss_run(tmp_path / "ref", engine)
+    Path(main).write_text(deck)
+    refused(main, card, message)
+
+
+@pytest.mark.parametrize("solver", ["radioss", "radioss-sensors"])
+def test_cards_of_radioss_do_not_go_into_a_deck_of_ls_dyna(tmp_path: Path, solver: str) -> None:
+    message = r"main\.k: an LS-DYNA deck, but the cards are for another solver"
+    refused(write(tmp_path, HEAD + PARTS), cards(WINDOWS, LEGS, solver), message)

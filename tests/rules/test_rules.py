@@ -11,8 +11,7 @@ import pytest
 
 from d2rpick.base.errors import ConfigurationError, DeckError
 from d2rpick.rules import RULES, Configuration, check_deck, configuration_for, read_configuration
-from d2rpick.rules.base import Example, Rule, Severity
-from d2rpick.rules.examples import END, GOOD, HEAD, PARTS, THERE, automatic
+from d2rpick.rules.base import END, GOOD, HEAD, PARTS, THERE, Example, Rule, Severity, automatic
 from tests.command import answer, run
 from tests.decks import found, write
 
