@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from d2rpick.histories.samples import outline
-from d2rpick.report.html import Markup, join, resource, tag
+from d2rpick.report.page import Explorer, Markup, join, resource, tag
 from d2rpick.report.suggestion import acceptable
 from d2rpick.report.tables import measure, shell_line, short
 from d2rpick.report.view import View, locked_in, response, scale_in, view_of
@@ -35,16 +35,6 @@ _HELP: Final = (
 )
 
 
-class Explorer(NamedTuple):
-    """What can be explored: the trade-offs of one or several flights.
-
-    ``command`` is the command line that asks for the pair of a td, in front of td and behind it.
-    """
-
-    trade_offs: tuple[TradeOff, ...]
-    command: tuple[Sequence[str], Sequence[str]]
-
-
 def styles() -> tuple[Markup, ...]:
     """Give the style sheets that the interactive part needs."""
     return resource("uplot/uPlot.min.css"), resource("explorer.css")
@@ -56,8 +46,10 @@ def scripts() -> tuple[Markup, ...]:
     return Markup(licence + resource("uplot/uPlot.iife.min.js")), resource("explorer.js")
 
 
-def explorer(shown: Explorer) -> Markup:
-    """Give the section, hidden until its script finds that it can run, and its data."""
+def explorer(shown: Explorer | None) -> Markup:
+    """Give the section, hidden until its script finds that it can run, and its data; nothing without any."""
+    if shown is None:
+        return Markup()
     flights = [_flight(one) for one in shown.trade_offs]
     before, behind = (shell_line(words) for words in shown.command)
     content = (

@@ -13,7 +13,7 @@ import pytest
 
 from d2rpick.choice.suggest_td import STEPS
 from d2rpick.histories.digits import window_as_read
-from d2rpick.report.html import resource
+from d2rpick.report.page import resource
 from d2rpick.report.tables import measure, short
 from tests.command import ENERGY, ROLLOVER, run
 
