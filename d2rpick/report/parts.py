@@ -257,10 +257,6 @@ def _percent(value: float | None) -> str | None:
     return None if value is None else f"{100 * value:.3g}%"
 
 
-def _growth(value: float | None) -> str | None:
-    return "free" if value is not None and isinf(value) else tables.shown(value, ".2g")
-
-
 COLUMNS: Final[dict[str, Callable[[PartRow], tables.Cell]]] = {
     "part": lambda row: row.id,
     "title": lambda row: row.title,
@@ -284,7 +280,7 @@ SET_COLUMNS: Final[dict[str, Callable[[PartSet], tables.Cell]]] = {
     "elements": lambda one: one.elements,
     "mass": lambda one: _percent(one.mass_fraction),
     "saved of a step": lambda one: _percent(one.cost_share),
-    "step grows": lambda one: _growth(one.step_growth),
+    "step grows": lambda one: "free" if _free(one) else tables.shown(one.step_growth, ".2g"),
     "tr": lambda one: one.window[0] if one.window else None,
     "td": lambda one: one.window[1] if one.window else None,
     "run time": lambda one: _percent(one.run_time_share),
