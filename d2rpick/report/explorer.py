@@ -1,11 +1,14 @@
 """The interactive part of a page: td can be dragged, typed and moved by keys, and all that depends on it follows.
 
-Python computes and prints everything; the script in ``explorer.js`` looks it up.
+Python computes and prints everything; the script in ``explorer.js`` looks it up.  What every page has stands in
+``explorer.html``.
 """
 
 from __future__ import annotations
 
 import json
+import re
+from string import Template
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -17,7 +20,7 @@ from d2rpick.report.tables import filled, measure, shell_line, short, shown
 from d2rpick.report.view import View, locked_in, response, scale_in, view_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from d2rpick.choice.answers import AcceptableWindow
     from d2rpick.choice.candidates import Candidate
@@ -29,10 +32,8 @@ if TYPE_CHECKING:
 # Stretches of the energy in sight, each with its lowest and highest value, and of the whole record in the overview.
 _STRETCHES: Final = 600
 _OVERVIEW: Final = 200
-_HELP: Final = (
-    "Drag the handle in the energy, type a td, or move it with the arrow keys; a click on a point of the trade-off "
-    "selects it. Everything was computed for the td in a grid and at the peaks of the energy: the nearest one is shown."
-)
+# Between the section, the chart of the motion and what is said of a pair.
+_NEXT: Final = "<!-- next -->"
 
 
 def styles() -> tuple[Markup, ...]:
@@ -47,93 +48,43 @@ def scripts() -> tuple[Markup, ...]:
 
 
 def explorer(explored: Explorer | None) -> Markup:
-    """Give the section, hidden until its script finds that it can run, and its data; nothing without any."""
+    """Give the section, hidden until its script finds that it can run, and its data; nothing without any.
+
+    Charts and values stand in two columns; on a narrow page the style puts them below each other in another order.
+    """
     if explored is None:
         return Markup()
     flights = [_flight(one) for one in explored.trade_offs]
-    before, behind = (shell_line(words) for words in explored.command)
-    content = (
-        tag("h2", "What another td would cost"),
-        tag("p", _HELP, class_="soft"),
-        _controls(explored.trade_offs),
-        tag("div", *_columns(flights), class_="panels"),
-        tag("h3", "The command for this td"),
-        tag("pre", class_="wrap", data_value="command", tabindex="0"),
+    known = {name for flight in flights for name in flight["texts"]}  # what no pair has is left out
+    listed = (tag("div", tag("dt", name), tag("dd", data_value=key)) for key, name in _VALUES.items() if key in known)
+    section, motion, values = _closed_up(resource("explorer.html")).split(_NEXT)
+    values = Template(values).substitute(listed=join(listed))
+    below = (motion, values) if any(flight["motion"] for flight in flights) else (values, "")
+    options = (tag("option", f"flight {i + 1}", value=str(i)) for i in range(len(flights)))
+    unit = explored.trade_offs[0].situation.history.time_unit
+    section = Template(section).substitute(
+        chooser=tag("label", "flight", tag("select", *options, id="explorer-flight")) if len(flights) > 1 else "",
+        unit=join([f" [{unit}]"] if unit else []),
+        windows=tag("li", tag("i", class_="windows"), "acceptable tr") if "windows" in known else "",
+        below_energy=below[0],
+        below_trade=below[1],
     )
+    before, behind = (shell_line(words) for words in explored.command)
     found = {"flight": 0, "flights": flights, "command": [f"{before} ", f" {behind}"]}
-    return join([tag("section", *content, class_="explorer", id="explorer", hidden=""), data("explorer-data", found)])
+    return join([Markup(section), _data("explorer-data", found)])
 
 
-def data(name: str, content: Any) -> Markup:
+def _closed_up(text: str) -> str:
+    """Leave out the blanks and line ends between elements, and make one blank of those within a text."""
+    return re.sub(r"\s*\n\s*", " ", re.sub(r"\s*\n\s*(?=<|$)|(?<=>)\s*\n\s*", "", text))
+
+
+def _data(name: str, content: Any) -> Markup:
     """Give data for a script: JSON in which nothing can be taken for markup."""
     text = json.dumps(content, allow_nan=False, separators=(",", ":"))
     for letter in "<>&":
         text = text.replace(letter, f"\\u{ord(letter):04x}")
     return tag("script", Markup(text), type="application/json", id=name)
-
-
-_ENERGY: Final = (
-    ("flight", "flight"), ("", "internal energy"), ("level", "level at td; dashed: tr"), ("windows", "acceptable tr"),
-)  # fmt: skip
-_MOTION: Final = (("", "without switching"), ("switched", "switched"))
-_CAPTION: Final = "Error against saving"
-_TRADE: Final = (("point", "no other td has less error and saves more"), ("beaten", "other td"))
-
-
-def _controls(trade_offs: Sequence[TradeOff]) -> Markup:
-    """What td is typed into, and buttons."""
-    unit = trade_offs[0].situation.history.time_unit
-    field = tag("input", id="explorer-td", inputmode="decimal", autocomplete="off", spellcheck="false")
-    buttons = (("earlier", "Earlier peak"), ("later", "Later peak"), ("back", "Back"))
-    flights = (tag("option", f"flight {i + 1}", value=str(i)) for i in range(len(trade_offs)))
-    chooser = tag("label", "flight", tag("select", *flights, id="explorer-flight"))
-    return tag(
-        "div",
-        *((chooser,) if len(trade_offs) > 1 else ()),
-        tag("label", f"td{f' [{unit}]' if unit else ''}", field),
-        *(tag("button", text, type="button", class_=name) for name, text in buttons),
-        tag("p", class_="said", role="status"),
-        class_="controls",
-    )
-
-
-def _values(flights: Sequence[Mapping[str, Any]]) -> Markup:
-    """What is known of the pair in sight; what no pair has is left out."""
-    known = {name for flight in flights for name in flight["texts"]}
-    times = (tag("span", tag("i", name), tag("b", data_value=name)) for name in ("tr", "td"))
-    full = (tag("span", f"{name} = ", tag("b", data_value=f"exact_{name}")) for name in ("tr", "td"))
-    listed = (tag("div", tag("dt", name), tag("dd", data_value=key)) for key, name in _VALUES.items() if key in known)
-    content = (
-        tag("h3", "The best pair for this td"),
-        tag("div", *times, class_="times"),
-        tag("p", "in full: ", join(full, ", "), class_="soft exact"),
-        tag("dl", *listed),
-    )
-    return tag("div", *content, class_="now")
-
-
-def _columns(flights: Sequence[Mapping[str, Any]]) -> Iterator[Markup]:
-    """Charts and values in two columns; on a narrow page the style puts them below each other in another order."""
-    windows = any("windows" in flight["texts"] for flight in flights)
-    left = [
-        _chart("energy", "Internal energy in the flight", _ENERGY if windows else _ENERGY[:-1]),
-        _chart("whole", "The whole record; shaded: what is shown above", ()),
-    ]
-    right, values = [_chart("trade", _CAPTION, _TRADE)], _values(flights)
-    if any(flight["motion"] for flight in flights):
-        left.append(_chart("motion", "Deformation of the oscillator behind the record", _MOTION))
-        right.append(values)
-    else:
-        left.append(values)
-    yield from (tag("div", *column, class_="column") for column in (left, right))
-
-
-def _chart(name: str, caption: str, key: Iterable[tuple[str, str]]) -> Markup:
-    """Give the place of a chart, with its caption and what its marks mean."""
-    entries = [tag("li", tag("i", **({"class_": mark} if mark else {})), text) for mark, text in key]
-    listed = (tag("ul", *entries, class_="key"),) if entries else ()
-    described = {"role": "group" if name == "energy" else "img", "aria_label": caption}
-    return tag("div", tag("p", caption), tag("div", class_="plot", **described), *listed, class_=f"chart {name}")
 
 
 def _flight(found: TradeOff) -> dict[str, Any]:
