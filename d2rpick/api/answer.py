@@ -156,7 +156,7 @@ class RunAnswer(Paged):
 
     def _explorer(self, found: Iterable[TradeOff | None]) -> Any:
         """Give what can be explored on a page, and the command line that asks for each td."""
-        from d2rpick.report.explorer import Explorer
+        from d2rpick.report.page import Explorer
 
         trade_offs = tuple(one for one in found if one)
         return Explorer(trade_offs, (("d2rpick", "suggest", "--td"), self.question.options)) if trade_offs else None

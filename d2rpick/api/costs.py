@@ -61,9 +61,9 @@ class PartTable(Paged, sets_of_parts.Parts):
 
     def plot(self) -> Figure:
         """Draw the energies of the parts that have most, and the flights."""
-        from d2rpick.report.parts import draw
+        from d2rpick.report.figures_choice import draw_parts
 
-        return draw(self)
+        return draw_parts(self)
 
 
 def parts(

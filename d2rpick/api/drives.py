@@ -42,7 +42,7 @@ class Drive(Paged, Driven):
 
     def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:  # noqa: ARG002
         """Write the page."""
-        from d2rpick.report.drive import drive_page
+        from d2rpick.report.pages import drive_page
 
         return drive_page(self, command)
 

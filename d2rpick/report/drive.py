@@ -1,16 +1,13 @@
-"""The answer of ``drive`` as table, JSON and page."""
+"""The answer of ``drive`` as table and JSON."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.report import keys, page, tables
+from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, many, row
-from d2rpick.report.html import Markup, document, drawings, pairs, remarks, section, table, tag
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
     from d2rpick.report.formats import Shown
     from d2rpick.running.drive import Driven
 
@@ -40,13 +37,14 @@ _NOT_KNOWN: Final = "without a reference no level at td is matched: what keeps o
 def as_table(found: Driven, shown: Shown) -> str:
     """The windows, what the legs took, and what was saved."""
     parts = [
-        tables.as_text(*_windows(found), shown.width) if found.windows else "no window",
-        tables.as_text(*_legs(found), shown.width),
+        tables.as_text(*windows(found), shown.width) if found.windows else "no window",
+        tables.as_text(*legs(found), shown.width),
     ]
-    return "\n\n".join([*parts, "\n".join(tables.in_line(_outlook(found), 9))])
+    return "\n\n".join([*parts, "\n".join(tables.in_line(outlook(found), 9))])
 
 
-def _windows(found: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
+def windows(found: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
+    """Give names of columns and cells of the windows."""
     columns = {
         "flight": lambda one: one.free, "wait": lambda one: f"{one.wait:.4g}",
         "tr": lambda one: one.tr, "td": lambda one: one.td,
@@ -58,7 +56,8 @@ def _windows(found: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
     return tables.filled(columns, found.windows)
 
 
-def _legs(found: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
+def legs(found: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
+    """Give the same of the legs, those of a kind together."""
     rows: list[list[tables.Cell]] = []
     for kind in dict.fromkeys(one.kind for one in found.legs):
         own = [one for one in found.legs if one.kind == kind]
@@ -67,38 +66,10 @@ def _legs(found: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
     return ["kind", "legs", "time", "cycles", "CPU s"], rows
 
 
-def _outlook(found: Driven) -> list[tuple[str, str]]:
+def outlook(found: Driven) -> list[tuple[str, str]]:
+    """What was saved, and what to know of it; a name and a sentence each."""
     words = zip(found.saved, ("by the cost model", "by the processor time of its legs"), strict=True)
     saved = [f"{value:.0%} {by}" for value, by in words if value is not None]
     lines = [("saves", f"{', '.join(saved)}, against a deformable run")] if saved else []
     lines += [("place", one.message) for one in found.cautions if one.code == "out-of-place"]
     return [*lines, *([("wait", found.why)] if found.why else []), ("keeps", _NOT_KNOWN)]
-
-
-def drive_page(found: Driven, command: Sequence[str]) -> str:
-    """Write the page; ``command`` are the arguments that repeat the run."""
-    return document(f"First run: {found.deck.name}", *_sections(found, command), signed=page.CHECKED)
-
-
-def _sections(found: Driven, command: Sequence[str]) -> Iterator[Markup]:
-    from d2rpick.histories.names import Selection
-    from d2rpick.report.figures import svg_element
-    from d2rpick.report.figures_choice import draw_run
-
-    history = found.run.history(Selection(parts=tuple(map(str, found.deck.parts))))
-    switched = [one for one in found.windows if not one.reason]
-    told = [
-        pairs([("contact", "none to the end" if one.contact is None else f"{one.contact:.6g}")]) for one in switched
-    ]
-    cards = [
-        page.pair(f"Window {number}", (one.tr, one.td), text, history, "card chosen")
-        for number, (one, text) in enumerate(zip(switched, told, strict=True), start=1)
-    ]
-    yield page.front(cards or [tag("p", "No flight was switched.")], remarks(found.cautions), pairs(_outlook(found)))
-    caption = "Internal energy in the deformable legs, with the rigid windows; rigid legs have none that is believed"
-    flights, rigid = [(one.free, one.contact or one.td) for one in switched], [(one.tr, one.td) for one in switched]
-    yield drawings({caption: svg_element(draw_run(history, flights, rigid), "driven-")})
-    yield section("Evidence", table("Windows", *_windows(found)))
-    yield section("Cost", table("Legs", *_legs(found)))
-    yield section("What was read", pairs(page.digests(found.run.files)))
-    yield page.repeated(command)

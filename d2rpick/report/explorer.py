@@ -1,23 +1,26 @@
 """The interactive part of a page: td can be dragged, typed and moved by keys, and all that depends on it follows.
 
-Python computes and prints everything; the script in ``explorer.js`` looks it up.
+Python computes and prints everything; the script in ``explorer.js`` looks it up.  What every page has stands in
+``explorer.html``.
 """
 
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+import re
+from string import Template
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from d2rpick.histories.samples import outline
-from d2rpick.report.html import Markup, join, resource, tag
+from d2rpick.report.page import Explorer, Markup, join, resource, tag
 from d2rpick.report.suggestion import acceptable
-from d2rpick.report.tables import measure, shell_line, short
+from d2rpick.report.tables import filled, measure, shell_line, short, shown
 from d2rpick.report.view import View, locked_in, response, scale_in, view_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from d2rpick.choice.answers import AcceptableWindow
     from d2rpick.choice.candidates import Candidate
@@ -29,20 +32,8 @@ if TYPE_CHECKING:
 # Stretches of the energy in sight, each with its lowest and highest value, and of the whole record in the overview.
 _STRETCHES: Final = 600
 _OVERVIEW: Final = 200
-_HELP: Final = (
-    "Drag the handle in the energy, type a td, or move it with the arrow keys; a click on a point of the trade-off "
-    "selects it. Everything was computed for the td in a grid and at the peaks of the energy: the nearest one is shown."
-)
-
-
-class Explorer(NamedTuple):
-    """What can be explored: the trade-offs of one or several flights.
-
-    ``command`` is the command line that asks for the pair of a td, in front of td and behind it.
-    """
-
-    trade_offs: tuple[TradeOff, ...]
-    command: tuple[Sequence[str], Sequence[str]]
+# Between the section, the chart of the motion and what is said of a pair.
+_NEXT: Final = "<!-- next -->"
 
 
 def styles() -> tuple[Markup, ...]:
@@ -56,95 +47,44 @@ def scripts() -> tuple[Markup, ...]:
     return Markup(licence + resource("uplot/uPlot.iife.min.js")), resource("explorer.js")
 
 
-def explorer(shown: Explorer) -> Markup:
-    """Give the section, hidden until its script finds that it can run, and its data."""
-    flights = [_flight(one) for one in shown.trade_offs]
-    before, behind = (shell_line(words) for words in shown.command)
-    content = (
-        tag("h2", "What another td would cost"),
-        tag("p", _HELP, class_="soft"),
-        _controls(shown.trade_offs),
-        tag(
-            "div",
-            *_columns(flights, any("windows" in flight["texts"] for flight in flights)),
-            class_="panels",
-        ),
-        tag("h3", "The command for this td"),
-        tag("pre", class_="wrap", data_value="command", tabindex="0"),
+def explorer(explored: Explorer | None) -> Markup:
+    """Give the section, hidden until its script finds that it can run, and its data; nothing without any.
+
+    Charts and values stand in two columns; on a narrow page the style puts them below each other in another order.
+    """
+    if explored is None:
+        return Markup()
+    flights = [_flight(one) for one in explored.trade_offs]
+    known = {name for flight in flights for name in flight["texts"]}  # what no pair has is left out
+    listed = (tag("div", tag("dt", name), tag("dd", data_value=key)) for key, name in _VALUES.items() if key in known)
+    section, motion, values = _closed_up(resource("explorer.html")).split(_NEXT)
+    values = Template(values).substitute(listed=join(listed))
+    below = (motion, values) if any(flight["motion"] for flight in flights) else (values, "")
+    options = (tag("option", f"flight {i + 1}", value=str(i)) for i in range(len(flights)))
+    unit = explored.trade_offs[0].situation.history.time_unit
+    section = Template(section).substitute(
+        chooser=tag("label", "flight", tag("select", *options, id="explorer-flight")) if len(flights) > 1 else "",
+        unit=join([f" [{unit}]"] if unit else []),
+        windows=tag("li", tag("i", class_="windows"), "acceptable tr") if "windows" in known else "",
+        below_energy=below[0],
+        below_trade=below[1],
     )
+    before, behind = (shell_line(words) for words in explored.command)
     found = {"flight": 0, "flights": flights, "command": [f"{before} ", f" {behind}"]}
-    return join([tag("section", *content, class_="explorer", id="explorer", hidden=""), data("explorer-data", found)])
+    return join([Markup(section), _data("explorer-data", found)])
 
 
-def data(name: str, content: Any) -> Markup:
+def _closed_up(text: str) -> str:
+    """Leave out the blanks and line ends between elements, and make one blank of those within a text."""
+    return re.sub(r"\s*\n\s*", " ", re.sub(r"\s*\n\s*(?=<|$)|(?<=>)\s*\n\s*", "", text))
+
+
+def _data(name: str, content: Any) -> Markup:
     """Give data for a script: JSON in which nothing can be taken for markup."""
     text = json.dumps(content, allow_nan=False, separators=(",", ":"))
     for letter in "<>&":
         text = text.replace(letter, f"\\u{ord(letter):04x}")
     return tag("script", Markup(text), type="application/json", id=name)
-
-
-_ENERGY: Final = (
-    ("flight", "flight"), ("", "internal energy"), ("level", "level at td; dashed: tr"), ("windows", "acceptable tr"),
-)  # fmt: skip
-_MOTION: Final = (("", "without switching"), ("switched", "switched"))
-_CAPTION: Final = "Error against saving"
-_TRADE: Final = (("point", "no other td has less error and saves more"), ("beaten", "other td"))
-
-
-def _controls(trade_offs: Sequence[TradeOff]) -> Markup:
-    """What td is typed into, and buttons."""
-    unit = trade_offs[0].situation.history.time_unit
-    field = tag("input", id="explorer-td", inputmode="decimal", autocomplete="off", spellcheck="false")
-    buttons = (("earlier", "Earlier peak"), ("later", "Later peak"), ("back", "Back"))
-    flights = (tag("option", f"flight {i + 1}", value=str(i)) for i in range(len(trade_offs)))
-    chooser = tag("label", "flight", tag("select", *flights, id="explorer-flight"))
-    return tag(
-        "div",
-        *((chooser,) if len(trade_offs) > 1 else ()),
-        tag("label", f"td{f' [{unit}]' if unit else ''}", field),
-        *(tag("button", text, type="button", class_=name) for name, text in buttons),
-        tag("p", class_="said", role="status"),
-        class_="controls",
-    )
-
-
-def _values(flights: Sequence[Mapping[str, Any]]) -> Markup:
-    """What is known of the pair in sight; what no pair has is left out."""
-    known = {name for flight in flights for name in flight["texts"]}
-    times = (tag("span", tag("i", name), tag("b", data_value=name)) for name in ("tr", "td"))
-    full = (tag("span", f"{name} = ", tag("b", data_value=f"exact_{name}")) for name in ("tr", "td"))
-    listed = (tag("div", tag("dt", name), tag("dd", data_value=key)) for key, name in VALUES.items() if key in known)
-    shown = (
-        tag("h3", "The best pair for this td"),
-        tag("div", *times, class_="times"),
-        tag("p", "in full: ", join(full, ", "), class_="soft exact"),
-        tag("dl", *listed),
-    )
-    return tag("div", *shown, class_="now")
-
-
-def _columns(flights: Sequence[Mapping[str, Any]], windows: bool) -> Iterator[Markup]:
-    """Charts and values in two columns; on a narrow page the style puts them below each other in another order."""
-    left = [
-        _chart("energy", "Internal energy in the flight", _ENERGY if windows else _ENERGY[:-1]),
-        _chart("whole", "The whole record; shaded: what is shown above", ()),
-    ]
-    right, values = [_chart("trade", _CAPTION, _TRADE)], _values(flights)
-    if any(flight["motion"] for flight in flights):
-        left.append(_chart("motion", "Deformation of the oscillator behind the record", _MOTION))
-        right.append(values)
-    else:
-        left.append(values)
-    yield from (tag("div", *column, class_="column") for column in (left, right))
-
-
-def _chart(name: str, caption: str, key: Iterable[tuple[str, str]]) -> Markup:
-    """Give the place of a chart, with its caption and what its marks mean."""
-    entries = [tag("li", tag("i", **({"class_": mark} if mark else {})), text) for mark, text in key]
-    listed = (tag("ul", *entries, class_="key"),) if entries else ()
-    described = {"role": "group" if name == "energy" else "img", "aria_label": caption}
-    return tag("div", tag("p", caption), tag("div", class_="plot", **described), *listed, class_=f"chart {name}")
 
 
 def _flight(found: TradeOff) -> dict[str, Any]:
@@ -164,8 +104,8 @@ def _flight(found: TradeOff) -> dict[str, Any]:
     return {
         "caption": f"Internal energy in the flight{cut}",
         "time": f"time [{unit}]" if unit else "time",
-        "error": error_name(found.offers),
-        "saved": saved_name(found.offers),
+        "error": _error_name(found.offers),
+        "saved": _saved_name(found.offers),
         "view": [seen.start, seen.end],
         "flight": [
             seen.start if flight.start is None else flight.start,
@@ -177,7 +117,7 @@ def _flight(found: TradeOff) -> dict[str, Any]:
         "whole": [_brief(column) for column in whole],
         "motion": _motion(situation),
         "start": found.offers.index(first),
-        **table_of([row_of(one, first, seen, unit, _locked(situation, one)) for one in found.offers]),
+        **_table(found, first, seen),
     }
 
 
@@ -190,18 +130,13 @@ def _motion(situation: Situation) -> dict[str, Any] | None:
     return {**{name: _brief(column) for name, column in columns.items()}, "preload": found.preload}
 
 
-def _locked(situation: Situation, offer: Offer) -> float | None:
-    """Deformation that an offer locks in, where one oscillator knows it."""
-    return locked_in(situation, offer.tr) if offer.basis == "oscillator" and offer.tr is not None else None
-
-
 def _brief(values: Samples) -> list[float]:
     """Numbers for a curve, to six digits."""
     return [float(f"{value:.6g}") for value in values.tolist()]
 
 
 # What is listed of a pair, by key, in this order.
-VALUES: Final[Mapping[str, str]] = {
+_VALUES: Final[Mapping[str, str]] = {
     "quality": "quality",
     "compared": "change",
     "residual": "residual",
@@ -216,53 +151,40 @@ VALUES: Final[Mapping[str, str]] = {
     "reason": "no tr",
 }
 # Columns in which windows of acceptable tr are drawn, a multiple of eight.
-COLUMNS: Final = 480
+_COLUMNS: Final = 480
 # Digits of a difference that people read.
 _READ: Final = 3
 
 
-class OfferRow(NamedTuple):
-    """One td: ``numbers`` for the curves, and ``texts``, what stands beside them; both by name."""
+def _table(found: TradeOff, first: Offer, seen: View) -> dict[str, Any]:
+    """Give a row for each td, the names of its values once: ``numbers`` for curves, ``texts`` that stand beside them.
 
-    numbers: dict[str, Any]
-    texts: dict[str, str]
-
-
-def table_of(rows: Sequence[OfferRow]) -> dict[str, Any]:
-    """Give rows with their names written once: ``numbers`` and ``texts``, and in ``rows`` the values of both."""
-    texts = list(dict.fromkeys(name for row in rows for name, text in row.texts.items() if text))
-    values = [[list(row.numbers.values()), [row.texts.get(name, "") for name in texts]] for row in rows]
-    return {"numbers": list(rows[0].numbers), "texts": texts, "rows": values}
-
-
-def row_of(offer: Offer, start: Offer, view: View, unit: str, deformation: float | None) -> OfferRow:
-    """Give one td.
-
-    Parameters
-    ----------
-    offer, start : Offer
-        The td, and the one that is shown first, with which it is compared.
-    view : View
-        What is in sight.
-    unit : str
-        Of the time, where it is known.
-    deformation : float or None
-        What the recommended tr locks in [square root of energy].
+    ``first`` is the td that is shown first, with which others are compared.
     """
-    best, saving = offer.best, offer.saving
-    numbers = {
-        "td": offer.td,
-        "tr": None if best is None else _short(best.tr),
-        "level": _short(offer.energy_td),
-        "locked": _short(best.energy) if best else None,
-        "deformation": None if deformation is None else _short(deformation),
-        "saved": None if best is None else _short(100 * (best.rigid_fraction if saving is None else saving)),
-        "error": None if offer.error is None else _short(offer.error),
-        "windows": _marked_columns(offer.answer.windows or (), view),
-        "peak": int(offer.peak),
-        "unbeaten": int(offer.unbeaten),
+    situation, unit = found.situation, found.situation.history.time_unit
+    columns: dict[str, Callable[[Offer], Any]] = {
+        "td": lambda one: one.td,
+        "tr": lambda one: _short(one.tr),
+        "level": lambda one: _short(one.energy_td),
+        "locked": lambda one: _short(one.best and one.best.energy),
+        "deformation": lambda one: _short(locked_in(situation, one.tr) if one.basis == "oscillator" else None),
+        "saved": lambda one: _short(_saved(one)),
+        "error": lambda one: _short(one.error),
+        "windows": lambda one: _marked_columns(one.answer.windows or (), seen),
+        "peak": lambda one: int(one.peak),
+        "unbeaten": lambda one: int(one.unbeaten),
     }
-    return OfferRow(numbers, _texts(offer, start, f" {unit}" if unit else ""))
+    names, numbers = filled(columns, found.offers)
+    texts = [_texts(one, first, f" {unit}" if unit else "") for one in found.offers]
+    said = list(dict.fromkeys(name for row in texts for name, text in row.items() if text))
+    rows = [[values, [row.get(name) or "" for name in said]] for values, row in zip(numbers, texts, strict=True)]
+    return {"numbers": names, "texts": said, "rows": rows}
+
+
+def _saved(offer: Offer) -> float | None:
+    """What a pair saves [%]: of the run time, or of the record where no cost is known."""
+    share = offer.best.rigid_fraction if offer.best and offer.saving is None else offer.saving
+    return None if share is None else 100 * share
 
 
 def _marked_columns(windows: Sequence[AcceptableWindow], view: View) -> str:
@@ -271,31 +193,31 @@ def _marked_columns(windows: Sequence[AcceptableWindow], view: View) -> str:
     However many windows noise makes, this is short, and finer than a screen shows.
     """
     ends = np.array([(one.start, one.end) for one in windows]).reshape(-1, 2)
-    first, last = np.clip((ends - view.start) / (view.end - view.start) * COLUMNS, 0, COLUMNS - 1).astype(int).T
-    marked = np.zeros(COLUMNS, dtype=bool)
+    first, last = np.clip((ends - view.start) / (view.end - view.start) * _COLUMNS, 0, _COLUMNS - 1).astype(int).T
+    marked = np.zeros(_COLUMNS, dtype=bool)
     for low, high in zip(first.tolist(), last.tolist(), strict=True):
         marked[low : high + 1] = True
     return np.packbits(marked).tobytes().hex() if marked.any() else ""
 
 
-def _short(value: float) -> float:
+def _short(value: float | None) -> float | None:
     """Shorten a number that is drawn, not read."""
-    return float(f"{value:.6g}")
+    return None if value is None else float(f"{value:.6g}")
 
 
-def error_name(offers: Sequence[Offer]) -> str:
+def _error_name(offers: Sequence[Offer]) -> str:
     """Name what offers are compared by."""
     return "shortfall of the level at td" if all(one.basis == "energy" for one in offers) else "residual"
 
 
-def saved_name(offers: Sequence[Offer]) -> str:
+def _saved_name(offers: Sequence[Offer]) -> str:
     """Name what their errors are held against: the saving of run time, or the rigid time where no cost is known."""
     known = any(one.saving is not None for one in offers)
     return "saved, % of the run time" if known else "rigid, % of the record"
 
 
-def _texts(offer: Offer, start: Offer, unit: str) -> dict[str, str]:
-    """Everything that is said of a td, as ``suggest --td`` prints it; empty where it is not known."""
+def _texts(offer: Offer, start: Offer, unit: str) -> dict[str, str | None]:
+    """Everything that is said of a td, as ``suggest --td`` prints it; nothing where it is not known."""
     best, quality = offer.best, offer.quality
     return {
         "td": short(offer.td),
@@ -303,8 +225,8 @@ def _texts(offer: Offer, start: Offer, unit: str) -> dict[str, str]:
         "exact_td": repr(offer.td),
         "exact_tr": repr(best.tr) if best else "none",
         "level": short(offer.energy_td),
-        "kinetic": "" if offer.kinetic_share is None else measure(offer.kinetic_share),
-        "quality": quality.told if quality else "",
+        "kinetic": shown(offer.kinetic_share, ".3f"),
+        "quality": quality and quality.told,
         "reason": offer.answer.why_none,
         **(_of_best(offer, best, unit) if best else {}),
         "compared": _compared(offer, start, unit),
@@ -312,18 +234,18 @@ def _texts(offer: Offer, start: Offer, unit: str) -> dict[str, str]:
     }
 
 
-def _of_best(offer: Offer, best: Candidate, unit: str) -> dict[str, str]:
+def _of_best(offer: Offer, best: Candidate, unit: str) -> dict[str, str | None]:
     """What is said of the recommended tr."""
     expected, windows = offer.answer.expected, offer.answer.windows
     ratio = expected.ratio if expected else None
     return {
-        "residual": "" if best.residual is None else measure(best.residual),
-        "after": "" if ratio is None else f"about {ratio:.0%} of what the reference has",
-        "level_error": "" if best.residual is not None or best.level_error is None else measure(best.level_error),
+        "residual": shown(best.residual, ".3f"),
+        "after": None if ratio is None else f"about {ratio:.0%} of what the reference has",
+        "level_error": shown(best.level_error if best.residual is None else None, ".3f"),
         "rigid": f"for {short(best.rigid_time)}{unit}, {best.rigid_fraction:.1%} of the record",
-        "run_time": "" if best.run_time_share is None else f"about {best.run_time_share:.0%} of the reference's",
-        "tolerance": "" if best.timing_tolerance is None else f"{best.timing_tolerance:.1e}{unit}",
-        "windows": acceptable(windows, best.tr) if windows else "",
+        "run_time": None if best.run_time_share is None else f"about {best.run_time_share:.0%} of the reference's",
+        "tolerance": None if best.timing_tolerance is None else f"{best.timing_tolerance:.1e}{unit}",
+        "windows": acceptable(windows, best.tr) if windows else None,
     }
 
 
@@ -352,5 +274,5 @@ def _compared(offer: Offer, start: Offer, unit: str) -> str:
     if offer.saving is not None and start.saving is not None:
         said.append(f"saves {offer.saving:.1%} of the run time instead of {start.saving:.1%}")
     if offer.error is not None and start.error is not None and (offer.basis == "energy") == (start.basis == "energy"):
-        said.append(f"{error_name([offer])} {measure(offer.error)} instead of {measure(start.error)}")
+        said.append(f"{_error_name([offer])} {measure(offer.error)} instead of {measure(start.error)}")
     return ", ".join(said)

@@ -48,6 +48,23 @@ class Figure(figures.Figure):
         return render(self, "figure.png")
 
 
+def begin(count: int, height: float, *, page: bool) -> tuple[Figure, list[Axes]]:
+    """Begin a figure of axes below each other that share their times; ``height`` is that of it in a file [inch]."""
+    figure = Figure(figsize=(WIDTH, height), layout=None if page else "constrained")
+    return figure, list(figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
+
+
+def shade(axes: Axes, span: Sequence[float], label: str, colour: str = FLIGHT, alpha: float = 0.15) -> None:
+    """Shade a span of times, a flight if nothing else is said."""
+    axes.axvspan(*span, color=colour, alpha=alpha, linewidth=0, label=label)
+
+
+def note(axes: Axes, text: str, place: tuple[float, float], offset: tuple[float, float], **look: Any) -> None:
+    """Write at a place, its height a share of the axes, ``offset`` by some points; by default at a time."""
+    look = {"xycoords": ("data", "axes fraction"), "fontsize": "small", **look}
+    axes.annotate(text, place, xytext=offset, textcoords="offset points", **look)
+
+
 def picture_format(name: str) -> str:
     """Tell the format that the suffix of ``name`` asks for; FormatError unless it is png, svg or pdf."""
     form = PurePath(name).suffix.lower().lstrip(".")
@@ -103,10 +120,9 @@ def show_span(axes: Axes, span: tuple[float, float], scale: Scale, above: Sequen
         if highest <= scale.high:
             continue
         early = what == "load"  # it stands on the left, a landing on the right
-        axes.annotate(
-            f"{what}, up to {highest:.4g} \N{UPWARDS ARROW}", (0 if early else 1, 1), xycoords="axes fraction",
-            xytext=(6 if early else -6, -6), textcoords="offset points", ha="left" if early else "right", va="top",
-            fontsize="small",
+        note(
+            axes, f"{what}, up to {highest:.4g} \N{UPWARDS ARROW}", (0 if early else 1, 1), (6 if early else -6, -6),
+            xycoords="axes fraction", ha="left" if early else "right", va="top",
             bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1},
         )  # fmt: skip
 
@@ -128,10 +144,7 @@ def mark_times(panels: Sequence[Axes], tr: float | None, td: float | None, *, pa
         if time is not None:
             for axes in panels:
                 axes.axvline(time, color=SWITCHED, linestyle="--", linewidth=0.8)
-            panels[0].annotate(
-                f" {name} = {time:.6g} ", (time, 1), xycoords=("data", "axes fraction"), xytext=(0, 3),
-                textcoords="offset points", ha=side, fontsize="small", color=SWITCHED,
-            )  # fmt: skip
+            note(panels[0], f" {name} = {time:.6g} ", (time, 1), (0, 3), ha=side, color=SWITCHED)
 
 
 def finish(axes: Axes, *, legend: bool = True) -> None:
@@ -146,10 +159,16 @@ def finish(axes: Axes, *, legend: bool = True) -> None:
         axes.legend(fontsize="small", loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
-def entries(panels: Sequence[Axes]) -> dict[str, Artist]:
+def _entries(panels: Sequence[Axes]) -> dict[str, Artist]:
     """What a legend of several panels names, each thing once."""
     known = (zip(*panel.get_legend_handles_labels(), strict=True) for panel in panels)
     return {name: handle for pairs in known for handle, name in pairs}
+
+
+def legend_below(figure: figures.Figure, panels: Sequence[Axes], columns: int = 4, size: str | None = "small") -> None:
+    """Put one legend of all panels below them."""
+    if known := _entries(panels):
+        figure.legend(known.values(), known, loc="outside lower left", ncols=columns, fontsize=size, frameon=False)
 
 
 def with_unit(name: str, unit: str) -> str:
@@ -186,7 +205,7 @@ def arrange(figure: figures.Figure, panels: Sequence[Axes], height: float) -> No
     Margins are measured once, by the numbers of the vertical axes; an engine for layouts draws a figure three times.
     """
     FigureCanvasSVG(figure)
-    known = entries(panels)
+    known = _entries(panels)
     foot = _BELOW + _LINE * ceil(len(known) / _COLUMNS)
     full = _TOP + len(panels) * height + (len(panels) - 1) * _BETWEEN + foot
     figure.set_size_inches(PAGE_WIDTH, full)

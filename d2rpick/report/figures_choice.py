@@ -9,36 +9,21 @@ from matplotlib.collections import LineCollection
 
 from d2rpick.choice.study import Study, StudyRow, outliers, runs_of
 from d2rpick.histories.samples import outline
-from d2rpick.report.figures import (
-    BETTER,
-    FLIGHT,
-    GOOD,
-    PAGE_WIDTH,
-    REFERENCE,
-    STRETCHES,
-    SWITCHED,
-    WIDTH,
-    Figure,
-    arrange,
-    entries,
-    finish,
-    mark_times,
-    plain,
-    show_span,
-    with_unit,
-)
+from d2rpick.report import figures
+from d2rpick.report.figures import BETTER, FLIGHT, GOOD, REFERENCE, STRETCHES, SWITCHED, Figure, plain, shade, with_unit
 from d2rpick.report.situation import energy_name
 from d2rpick.report.study import short_names
 from d2rpick.report.view import Motion, View, merged, replayed_motion, scale_in, scale_of, view_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from matplotlib.axes import Axes
 
     from d2rpick.choice.answers import Suggestion, Verdict
     from d2rpick.choice.candidates import Candidate, Pair
     from d2rpick.choice.plan import Plan
+    from d2rpick.choice.sets_of_parts import Parts
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.switched_run import Times
     from d2rpick.choice.trade_off import TradeOff
@@ -82,8 +67,7 @@ def _draw(
     page: bool = False,
 ) -> Figure:
     motion = None if tr is None else replayed_motion(situation, tr)
-    figure = Figure(figsize=(WIDTH, _HEIGHTS[bool(motion)]), layout=None if page else "constrained")
-    panels = list(figure.subplots(2 if motion else 1, 1, sharex=True, squeeze=False)[:, 0])
+    figure, panels = figures.begin(2 if motion else 1, _HEIGHTS[bool(motion)], page=page)
     seen = view_of(situation, *(() if tr is None else (tr,)), *(better[:2] if better else ()))
     _draw_energy(panels[0], situation, seen, candidates, bands)
     if motion:
@@ -92,12 +76,13 @@ def _draw(
         _draw_better(panels, situation.at(better.td), better.tr)
     panels[-1].set_xlabel(with_unit("time", situation.history.time_unit))
     for panel in panels:
-        finish(panel, legend=not page)
+        figures.finish(panel, legend=not page)
     # the level belongs to the flight, also where td lies beyond
-    show_span(panels[0], (seen.start, seen.end), scale_in(situation, seen, [situation.energy_td]), seen.above)
+    scale = scale_in(situation, seen, [situation.energy_td])
+    figures.show_span(panels[0], (seen.start, seen.end), scale, seen.above)
     if page:
-        arrange(figure, panels, _PANELS[bool(motion)])
-    mark_times(panels, tr, situation.td, page=page)
+        figures.arrange(figure, panels, _PANELS[bool(motion)])
+    figures.mark_times(panels, tr, situation.td, page=page)
     return figure
 
 
@@ -113,7 +98,7 @@ def _draw_energy(
     if flight.start is not None:
         known = span.end if span else situation.td  # without a contact, as far as it was seen
         end = known if flight.end is None else flight.end
-        axes.axvspan(flight.start, end, color=FLIGHT, alpha=0.15, linewidth=0, label=f"flight ({flight.source})")
+        shade(axes, (flight.start, end), f"flight ({flight.source})")
     axes.plot(*drawn, color=REFERENCE, linewidth=1, label=plain(energy_name(history)))
     axes.axhline(level, color=SWITCHED, linewidth=0.8, label=f"level at td, {level:.4g}")
     for number, band in enumerate(merged(bands, (seen.end - seen.start) / STRETCHES)):
@@ -154,53 +139,65 @@ _COLOURS: Final = {"supported": GOOD, "re-plan": SWITCHED, "done": "#999999"}
 _HATCHES: Final = {"supported": None, "re-plan": "//", "done": None}  # told apart without colour, too
 # Of the figure in a file, and of the axes on a page [inch].
 _PLAN_HEIGHT, _PLAN_PANEL = 4.0, 2.8
-# Share of the axes below the energy in which the windows are drawn.
+# Share of the axes below the energy in which the windows are drawn; parts of which the energy is drawn.
 _STRIP: Final = 0.07
+_MOST_PARTS: Final = 6
 
 
 def draw_plan(plan: Plan, *, page: bool = False) -> Figure:
     """Draw the energy over time, the flights behind it and the rigid windows below it."""
-    figure = Figure(figsize=(WIDTH, _PLAN_HEIGHT), layout=None if page else "constrained")
-    axes = figure.subplots()
+    figure, (axes,) = figures.begin(1, _PLAN_HEIGHT, page=page)
     history = plan.history
     axes.plot(history.time, history.energy, color=REFERENCE, linewidth=1, label="internal energy")
     for row in plan.flights:
-        axes.axvspan(row.start, row.end, color=FLIGHT, alpha=0.15, linewidth=0, label="flight")
+        shade(axes, (row.start, row.end), "flight")
         if row.window:
             axes.axvspan(
                 *row.window, ymax=_STRIP, facecolor=_COLOURS[row.status], hatch=_HATCHES[row.status],
                 edgecolor="white", linewidth=0, label=f"rigid, {row.status}",
             )  # fmt: skip
-            axes.annotate(
-                str(row.number), (sum(row.window) / 2, _STRIP), xycoords=("data", "axes fraction"), xytext=(0, 2),
-                textcoords="offset points", ha="center", fontsize="small",
-            )  # fmt: skip
+            figures.note(axes, str(row.number), (sum(row.window) / 2, _STRIP), (0, 2), ha="center")
     low, high = axes.get_ylim()
     axes.set_ylim(low - 2 * _STRIP * (high - low), high)
-    axes.set(xlabel=with_unit("time", history.time_unit), ylabel="internal energy")
-    finish(axes, legend=False)
-    if page:
-        arrange(figure, [axes], _PLAN_PANEL)
-    else:
-        known = entries([axes])
-        figure.legend(known.values(), known, loc="outside lower left", ncols=4, fontsize="small", frameon=False)
+    _finish(figure, axes, with_unit("time", history.time_unit), page=page)
     return figure
 
 
 def draw_run(history: History, flights: Sequence[Times], windows: Sequence[Times] = ()) -> Figure:
     """Draw the energy of a run, as far as it is believed, its flights and the windows in which parts were rigid."""
-    figure = Figure()
-    axes = figure.subplots()
+    figure, (axes,) = figures.begin(1, _PLAN_HEIGHT, page=True)
     rigid = np.any([(history.time > tr) & (history.time < td) for tr, td in windows], axis=0)
     axes.plot(history.time, np.where(rigid, np.nan, history.energy), color=REFERENCE, linewidth=1, label="energy")
-    for start, end in flights:
-        axes.axvspan(start, end, color=FLIGHT, alpha=0.15, linewidth=0, label="flight")
-    for tr, td in windows:
-        axes.axvspan(tr, td, ymax=_STRIP, color=GOOD, linewidth=0, label="rigid")
-    axes.set(xlabel=with_unit("time", history.time_unit), ylabel="internal energy")
-    finish(axes, legend=False)
-    arrange(figure, [axes], _PLAN_PANEL)
+    for flight in flights:
+        shade(axes, flight, "flight")
+    for window in windows:
+        axes.axvspan(*window, ymax=_STRIP, color=GOOD, linewidth=0, label="rigid")
+    _finish(figure, axes, with_unit("time", history.time_unit), page=True)
     return figure
+
+
+def draw_parts(found: Parts) -> Figure:
+    """Draw the energies of the parts that have most over time, and the flights; FormatError without parts."""
+    run = found.files
+    energies, time = run.part_energies(run.parts), run.part_time
+    figure, (axes,) = figures.begin(1, _PLAN_HEIGHT, page=True)
+    for at in energies.max(axis=0).argsort()[::-1][:_MOST_PARTS]:
+        curve = outline(time, energies[:, at], stretches=STRETCHES)
+        axes.plot(*curve, linewidth=1, label=plain(run.parts[at].name))
+    for flight in found.facts.flights:
+        shade(axes, flight, "flight")
+    _finish(figure, axes, "time", page=True)
+    return figure
+
+
+def _finish(figure: Figure, axes: Axes, time: str, *, page: bool) -> None:
+    """Name the axes of a whole run, and put the legend below."""
+    axes.set(xlabel=time, ylabel="internal energy")
+    figures.finish(axes, legend=False)
+    if page:
+        figures.arrange(figure, [axes], _PLAN_PANEL)
+    else:
+        figures.legend_below(figure, [axes])
 
 
 # Of the figure in a file, and of one of its axes on a page [inch].
@@ -212,8 +209,8 @@ _ERRORS: Final = {True: "shortfall of the level", False: "residual"}
 
 def draw_trade_off(found: TradeOff, *, page: bool = False) -> Figure:
     """Draw the energy in the window of td, and below it error and saving of the best pair for each td."""
-    figure = Figure(figsize=(WIDTH, _TRADE_HEIGHT), layout=None if page else "constrained")
-    energy, error, rigid = figure.subplots(3, sharex=True)
+    figure, panels = figures.begin(3, _TRADE_HEIGHT, page=page)
+    energy, error, rigid = panels
     history = found.situation.history
     inner = history.between(*found.td_window)
     energy.plot(*outline(*inner, stretches=STRETCHES), color=REFERENCE, linewidth=1)
@@ -226,18 +223,16 @@ def draw_trade_off(found: TradeOff, *, page: bool = False) -> Figure:
     _curve(rigid, found, saved if cost else [one.rigid_time for one in found.offers])
     td = with_unit("td", history.time_unit)
     rigid.set(ylabel="run time saved" if cost else "rigid time", xlabel=td, ylim=(0, None))
-    panels = (energy, error, rigid)
     for axes in panels:
         for one, colour, name in ((found.asked, FLIGHT, "td asked for"), (found.recommended, SWITCHED, "recommended")):
             if one:
                 axes.axvline(one.td, color=colour, linewidth=1, linestyle="--", label=name)
-        finish(axes, legend=False)
+        figures.finish(axes, legend=False)
         axes.margins(x=_AT_EDGE)
     if page:
-        arrange(figure, panels, _TRADE_PANEL)
+        figures.arrange(figure, panels, _TRADE_PANEL)
     else:
-        known = entries(panels)
-        figure.legend(known.values(), known, loc="outside lower left", ncols=4, frameon=False)
+        figures.legend_below(figure, panels, size=None)
     return figure
 
 
@@ -274,7 +269,7 @@ _LOWEST: Final = 50.0
 
 
 class _Named(NamedTuple):
-    row: StudyRow
+    curve: Samples
     name: str
     colour: str
     pattern: str
@@ -283,49 +278,46 @@ class _Named(NamedTuple):
 def draw_study(answer: Study, *, page: bool = False) -> Figure:
     """Draw energies around td over each other, the tr of each, the common one and td."""
     # names of runs stand beside the axes, so that the margins are not known, on a page neither
-    figure = Figure(figsize=(PAGE_WIDTH if page else WIDTH, _HEIGHT), layout="constrained")
+    figure = Figure(figsize=(figures.PAGE_WIDTH if page else figures.WIDTH, _HEIGHT), layout="constrained")
     axes = figure.subplots()
-    drawn = [row for row in answer.runs if row.curve is not None]
-    named = _named(drawn)
-    _draw_others(axes, drawn, named)
+    drawn = {id(row): row.curve for row in answer.runs if row.curve is not None}
+    runs = [row for row in answer.runs if id(row) in drawn]
+    named = _named(runs, drawn)
+    _draw_others(axes, [*drawn.values()], named)
     for one in named:
-        assert one.row.curve is not None
-        axes.plot(*one.row.curve, color=one.colour, linestyle=one.pattern, linewidth=1, label="_")
+        axes.plot(*one.curve, color=one.colour, linestyle=one.pattern, linewidth=1, label="_")
     if answer.common.window:
-        axes.axvspan(*answer.common.window, color=GOOD, alpha=0.2, linewidth=0, label="acceptable in all runs")
-    _draw_times(axes, drawn)
+        shade(axes, answer.common.window, "acceptable in all runs", GOOD, alpha=0.2)
+    _draw_times(axes, runs)
     units = {row.time_unit for row in answer.runs if row.judged}
-    unit = units.pop() if len(units) == 1 else ""
-    axes.set(xlabel=with_unit("time", unit), ylabel="internal energy")
-    finish(axes, legend=False)
-    _show_runs(axes, answer, drawn)
+    axes.set(xlabel=with_unit("time", units.pop() if len(units) == 1 else ""), ylabel="internal energy")
+    figures.finish(axes, legend=False)
+    _show_runs(axes, answer, runs, [*drawn.values()])
     _name(axes, named, page=page)
-    if axes.get_legend_handles_labels()[0]:
-        figure.legend(loc="outside lower left", ncols=1 if page else 4, fontsize="small", frameon=False)
-    mark_times([axes], answer.common.tr, answer.td, page=page)
+    figures.legend_below(figure, [axes], columns=1 if page else 4)
+    figures.mark_times([axes], answer.common.tr, answer.td, page=page)
     return figure
 
 
-def _named(drawn: Sequence[StudyRow]) -> list[_Named]:
+def _named(runs: Sequence[StudyRow], curves: Mapping[int, Samples]) -> list[_Named]:
     """Give the runs that have a colour and a name: all where they are few, else those that stand out."""
-    chosen = list(drawn) if len(drawn) <= _NAMED else list(outliers(drawn))[:_MOST_OUTLIERS]
-    names = dict(zip(map(id, drawn), short_names([row.source for row in drawn]), strict=True))
-    palette = _RUN_COLOURS if len(drawn) <= _NAMED else _RUN_COLOURS[1:]
+    chosen = list(runs) if len(runs) <= _NAMED else list(outliers(runs))[:_MOST_OUTLIERS]
+    names = dict(zip(map(id, runs), short_names([row.source for row in runs]), strict=True))
+    palette = _RUN_COLOURS if len(runs) <= _NAMED else _RUN_COLOURS[1:]
     return [
-        _Named(row, plain(names[id(row)]), palette[place % len(palette)], _PATTERNS[place // len(palette) % 2])
-        for place, row in enumerate(chosen)
+        _Named(curves[id(row)], plain(names[id(row)]), palette[i % len(palette)], _PATTERNS[i // len(palette) % 2])
+        for i, row in enumerate(chosen)
     ]
 
 
-def _draw_others(axes: Axes, drawn: Sequence[StudyRow], named: Sequence[_Named]) -> None:
+def _draw_others(axes: Axes, curves: Sequence[Samples], named: Sequence[_Named]) -> None:
     """Draw the runs without a name in grey; taken together they stay as dark as ten lines."""
-    told = {id(one.row) for one in named}
-    curves = [row.curve.T for row in drawn if row.curve is not None and id(row) not in told]
-    many = len(drawn) > _MANY
+    told = {id(one.curve) for one in named}
+    others, many = [curve.T for curve in curves if id(curve) not in told], len(curves) > _MANY
     lines = LineCollection(
-        curves, colors=_GREY if told or len(curves) > 1 else REFERENCE, linewidths=0.6 if many else 1, rasterized=many,
-        alpha=max(_FAINTEST, min(1.0, _DARK / max(1, len(curves)))),
-        label=f"internal energy of {runs_of(len(drawn))}" if curves else "_",
+        others, colors=_GREY if told or len(others) > 1 else REFERENCE, linewidths=0.6 if many else 1, rasterized=many,
+        alpha=max(_FAINTEST, min(1.0, _DARK / max(1, len(others)))),
+        label=f"internal energy of {runs_of(len(curves))}" if others else "_",
     )  # fmt: skip
     axes.add_collection(lines)
     axes.autoscale_view()
@@ -342,9 +334,8 @@ def _draw_times(axes: Axes, drawn: Sequence[StudyRow]) -> None:
         )  # fmt: skip
 
 
-def _show_runs(axes: Axes, answer: Study, drawn: Sequence[StudyRow]) -> None:
+def _show_runs(axes: Axes, answer: Study, drawn: Sequence[StudyRow], curves: Sequence[Samples]) -> None:
     """Show the time from a little before the first tr to a little after td; what is higher there is cut."""
-    curves = [row.curve for row in drawn if row.curve is not None]
     if not curves:
         return
     first, last = min(float(one[0, 0]) for one in curves), max(float(one[0, -1]) for one in curves)
@@ -359,7 +350,7 @@ def _show_runs(axes: Axes, answer: Study, drawn: Sequence[StudyRow]) -> None:
     scale = scale_of(float(inner.min()), float(inner.max()), level)
     if drawn and all("at-rest" in row.warnings for row in drawn):
         scale = scale_of(0.0, max(float(one[1].max()) for one in curves), 0.0)
-    show_span(axes, span, scale, [("highest run", float(seen.max()))])
+    figures.show_span(axes, span, scale, [("highest run", float(seen.max()))])
 
 
 def _energies(curves: Sequence[Samples], start: float, end: float) -> Iterator[Samples]:
@@ -371,7 +362,7 @@ def _energies(curves: Sequence[Samples], start: float, end: float) -> Iterator[S
 def _name(axes: Axes, named: Sequence[_Named], *, page: bool) -> None:
     """Write the names of runs beside the axes, in the order of their curves there, with a line to each."""
     end, free = axes.get_xlim()[1], 0.0
-    places = ((_height(axes, float(np.interp(end, *one.row.curve))), one) for one in named if one.row.curve is not None)
+    places = ((_height(axes, float(np.interp(end, *one.curve))), one) for one in named)
     for place, one in sorted(places, key=lambda known: known[0]):
         at = max(free, min(place, 1 - _LINE * (len(named) - 1)))
         free = at + _LINE

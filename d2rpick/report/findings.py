@@ -14,7 +14,7 @@ from d2rpick.base.files import STDIN
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, kind_of, many, one_of, row
 from d2rpick.rules import RULES, Checked, CheckedWindow, find_rules
-from d2rpick.rules.base import MAIN_DECK, Example, Rule, Severity, Unreadable, grouped
+from d2rpick.rules.base import MAIN_DECK, Example, Finding, Rule, Severity, Unreadable, grouped
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -48,7 +48,7 @@ _LINE: Final = kind_of("integer", minimum=1)
 _COUNTS: Final = ("errors", "warnings", "infos", "decks")
 FINDING: Final = row(
     Field("rule", kind_of("text", pattern="^D2R[0-9]{3}$")),
-    Field("severity", one_of(*map(str, Severity)), get=lambda finding: str(finding["severity"])),
+    Field("severity", one_of(*map(str, Severity)), get=lambda finding: str(finding.severity)),
     Field("message", "text"),
     Field("file", "text"),
     Field("line", _LINE),
@@ -67,18 +67,15 @@ _WINDOW: Final = row(
 
 def as_table(checks: Checks, _: Shown) -> str:
     """Findings and windows of each deck, one per line, and how many there are; decks that failed are counted."""
-    root = checks.root
     lines: list[str] = []
     for result in checks.results:
-        lines.append(_shown(result.deck, root))
+        lines.append(_shown(result.deck, checks.root))
         if not result.cards:
             lines.append("  no switching cards")
         elif not result.windows and not result.findings:
             lines.append("  switching cards that switch nothing")
-        lines += [f"  {line}" for line in _window_lines(result.windows, root)]
-        lines += [
-            f"  {_shown(f.file, root)}:{f.line}:{f.column}: {f.severity} {f.rule} {f.message}" for f in result.findings
-        ]
+        lines += [f"  {line}" for line in _window_lines(result.windows, checks.root)]
+        lines += [f"  {_line(one)}" for one in _findings(checks, result)]
     return "\n".join([*map(printable, lines), "", _last_line(checks)])
 
 
@@ -101,85 +98,84 @@ def as_markdown(checks: Checks, _: Shown) -> str:
 
 def as_github(checks: Checks, _: Shown) -> str:
     """Workflow commands that GitHub Actions shows beside the lines of a deck."""
-    root = checks.root
     found = [
-        f"::{_GITHUB[f.severity]} file={_escaped(_shown(f.file, root), ',:')},line={f.line},col={f.column},"
+        f"::{_GITHUB[f.severity]} file={_escaped(f.file, ',:')},line={f.line},col={f.column},"
         f"title={f.rule}::{_escaped(f.message)}"
-        for result in checks.results
-        for f in result.findings
+        for f in _findings(checks)
     ]
-    found += [f"::error file={_escaped(_shown(one.deck, root), ',:')}::{_escaped(one.reason)}" for one in checks.failed]
-    return "\n".join(found)
+    failed = ((_shown(one.deck, checks.root), one.reason) for one in checks.failed)
+    return "\n".join([*found, *(f"::error file={_escaped(deck, ',:')}::{_escaped(reason)}" for deck, reason in failed)])
 
 
 def as_junit(checks: Checks, _: Shown) -> str:
     """One suite per deck, one case per finding; those lighter than ``fail_on`` pass and only say their message."""
     from xml.etree import ElementTree as ET  # start-up
 
-    root, fail_on = checks.root, checks.fail_on
     suites = ET.Element("testsuites", name="d2rpick check")
-    for one in checks.failed:
-        name = _xml(_shown(one.deck, root))
-        suite = ET.SubElement(suites, "testsuite", name=name, tests="1", failures="0", errors="1")
+
+    def begin(deck: str, **counts: int) -> tuple[ET.Element, str]:
+        name = _xml(_shown(deck, checks.root))
+        about = {"name": name, **{key: str(count) for key, count in counts.items()}}
+        return ET.SubElement(suites, "testsuite", about), name
+
+    for failed in checks.failed:
+        suite, name = begin(failed.deck, tests=1, failures=0, errors=1)
         case = ET.SubElement(suite, "testcase", name="d2rpick check", classname=name)
-        ET.SubElement(case, "error", type=one.code, message=_xml(one.reason))
+        ET.SubElement(case, "error", type=failed.code, message=_xml(failed.reason))
     for result in checks.results:
-        name, tests = _xml(_shown(result.deck, root)), str(max(1, len(result.findings)))
-        failures = str(sum(finding.severity.rank <= fail_on.rank for finding in result.findings))
-        suite = ET.SubElement(suites, "testsuite", name=name, tests=tests, failures=failures, errors="0")
-        if not result.findings:
+        failing = [one.severity.rank <= checks.fail_on.rank for one in result.findings]
+        suite, name = begin(result.deck, tests=max(1, len(failing)), failures=sum(failing), errors=0)
+        if not failing:
             ET.SubElement(suite, "testcase", name="d2rpick check", classname=name)
-        for f in result.findings:
-            place = f"{_shown(f.file, root)}:{f.line}:{f.column}"
-            case = ET.SubElement(suite, "testcase", name=_xml(f"{f.rule} {place}"), classname=name)
-            text = _xml(f"{place}: {f.severity} {f.rule} {f.message}")
-            if f.severity.rank <= fail_on.rank:
-                ET.SubElement(case, "failure", type=f.rule, message=_xml(f.message)).text = text
-            else:
-                ET.SubElement(case, "system-out").text = text
+        for one, fails in zip(_findings(checks, result), failing, strict=True):
+            case = ET.SubElement(suite, "testcase", name=_xml(f"{one.rule} {_place(one)}"), classname=name)
+            about = {"type": one.rule, "message": _xml(one.message)} if fails else {}
+            ET.SubElement(case, "failure" if fails else "system-out", about).text = _xml(_line(one))
     ET.indent(suites)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(suites, encoding="unicode")
 
 
 def as_sarif(checks: Checks, _: Shown) -> str:
     """SARIF 2.1.0 with all rules; ids are stable."""
-    root = checks.root
     ids = list(RULES)
-    driver = {
-        "name": "d2rpick",
-        "version": __version__,
-        "rules": [
-            {
-                "id": rule.id,
-                "shortDescription": {"text": rule.summary},
-                "fullDescription": {"text": rule.explanation},
-                "defaultConfiguration": {"level": _SARIF[rule.severity]},
-            }
-            for rule in RULES.values()
-        ],
-    }
+    rules = [
+        {
+            "id": rule.id,
+            "shortDescription": {"text": rule.summary},
+            "fullDescription": {"text": rule.explanation},
+            "defaultConfiguration": {"level": _SARIF[rule.severity]},
+        }
+        for rule in RULES.values()
+    ]
     found = [
         {
             "ruleId": f.rule,
             "ruleIndex": ids.index(f.rule),
             "level": _SARIF[f.severity],
             "message": {"text": f.message},
-            "locations": _places(f.file, root, region={"startLine": f.line, "startColumn": f.column}),
+            "locations": _places(f.file, region={"startLine": f.line, "startColumn": f.column}),
         }
-        for result in checks.results
-        for f in result.findings
+        for f in _findings(checks)
     ]
     messages = [
-        {"level": "error", "message": {"text": one.reason}, "locations": _places(one.deck, root)}
+        {"level": "error", "message": {"text": one.reason}, "locations": _places(_shown(one.deck, checks.root))}
         for one in checks.failed
     ]
     run = {
-        "tool": {"driver": driver},
+        "tool": {"driver": {"name": "d2rpick", "version": __version__, "rules": rules}},
         "columnKind": "unicodeCodePoints",
         "invocations": [{"executionSuccessful": not checks.failed, "toolExecutionNotifications": messages}],
         "results": found,
     }
     return tables.as_json({"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]})
+
+
+def _place(one: Finding) -> str:
+    return f"{one.file}:{one.line}:{one.column}"
+
+
+def _line(one: Finding) -> str:
+    return f"{_place(one)}: {one.severity} {one.rule} {one.message}"
 
 
 def _window_lines(windows: Sequence[CheckedWindow], root: str) -> Iterator[str]:
@@ -207,10 +203,10 @@ def _windows(checks: Checks) -> Iterator[dict[str, Any]]:
             }
 
 
-def _findings(checks: Checks) -> Iterator[dict[str, Any]]:
-    for finding in (one for result in checks.results for one in result.findings):
-        shown = {"file": _shown(finding.file, checks.root), "deck": _shown(finding.deck, checks.root)}
-        yield {**finding._asdict(), **shown}
+def _findings(checks: Checks, *results: Checked) -> Iterator[Finding]:
+    """Give what was found in all decks, or in some ``results``, with paths as they are shown."""
+    for one in (one for result in results or checks.results for one in result.findings):
+        yield one._replace(file=_shown(one.file, checks.root), deck=_shown(one.deck, checks.root))
 
 
 def _warnings(checks: Checks) -> list[Caution]:
@@ -258,11 +254,10 @@ def _shown(path: str, root: str) -> str:
     return os.fsencode(shown).decode("utf-8", "replace").replace(os.sep, "/")
 
 
-def _places(path: str, root: str, **more: Any) -> list[dict[str, Any]]:
+def _places(shown: str, **more: Any) -> list[dict[str, Any]]:
     """Give a place in a file as SARIF has it."""
     from urllib.parse import quote
 
-    shown = _shown(path, root)
     uri = f"{'file://' * shown.startswith('/')}{quote(shown)}"
     return [{"physicalLocation": {"artifactLocation": {"uri": uri}, **more}}]
 

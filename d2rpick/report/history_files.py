@@ -63,13 +63,11 @@ def _oscillator_glstat(motion: Trajectory, _: Oscillator) -> bytes:
     """Energies of the oscillator; its time step is the output interval."""
     step = float(motion.time[1] - motion.time[0]) if motion.time.size > 1 else 0.0
     internal, kinetic = motion.internal_energy, motion.kinetic_energy
-    return glstat.write(
-        "floating oscillator",
-        {
-            "time": motion.time, "time step": 0 * motion.time + step, "kinetic energy": kinetic,
-            "internal energy": internal, "total energy": kinetic + internal,
-        },
-    )  # fmt: skip
+    columns = {
+        "time": motion.time, "time step": 0 * motion.time + step, "kinetic energy": kinetic,
+        "internal energy": internal, "total energy": kinetic + internal,
+    }  # fmt: skip
+    return glstat.write("floating oscillator", columns)
 
 
 def _oscillator_matsum(motion: Trajectory, oscillator: Oscillator) -> bytes:
@@ -139,15 +137,13 @@ def _box_matsum(record: Record) -> bytes:
     return matsum.write("rollover box", record.time, tuple(matsum.PartColumns(*one) for one in columns))
 
 
-OSCILLATOR_WRITERS: Final[Mapping[str, Callable[[Trajectory, Oscillator], bytes]]] = {
-    "csv": lambda motion, _: write_table("csv", _oscillator_table(motion)),
-    "hdf5": lambda motion, _: write_table("hdf5", _oscillator_table(motion)),
-    "glstat": _oscillator_glstat,
-    "matsum": _oscillator_matsum,
-}
-BOX_WRITERS: Final[Mapping[str, Callable[[Record], bytes]]] = {
-    "csv": lambda record: write_table("csv", _box_table(record)),
-    "hdf5": lambda record: write_table("hdf5", _box_table(record)),
-    "glstat": _box_glstat,
-    "matsum": _box_matsum,
-}
+def _writers(
+    table: Callable[..., Table], glstat: Callable[..., bytes], matsum: Callable[..., bytes]
+) -> Mapping[str, Callable[..., bytes]]:
+    """Give how to write a run in each format, by what makes its columns or writes it."""
+    tables = {form: lambda run, *_, form=form: write_table(form, table(run)) for form in TABLES}
+    return {**tables, "glstat": glstat, "matsum": matsum}
+
+
+OSCILLATOR_WRITERS: Final = _writers(_oscillator_table, _oscillator_glstat, _oscillator_matsum)
+BOX_WRITERS: Final = _writers(_box_table, _box_glstat, _box_matsum)

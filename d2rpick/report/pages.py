@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import if_written
 from d2rpick.choice.study import Study, runs_of
-from d2rpick.report import overview, page, parts, plan, study, suggestion, trade_off, verdict
-from d2rpick.report.explorer import Explorer, explorer
-from d2rpick.report.html import Markup, document, drawings, grid, pairs, remarks, section, table, tag
+from d2rpick.report import drive, overview, page, parts, plan, study, suggestion, trade_off, verdict
+from d2rpick.report.explorer import explorer, scripts, styles
+from d2rpick.report.page import Explorer, Markup, document, grid, pairs, remarks, section, table, tag
 from d2rpick.report.situation import what_was_read
 from d2rpick.report.tables import Cell, known, measure, short, unstarred
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.trade_off import TradeOff
     from d2rpick.histories.run import Run
     from d2rpick.histories.source import Source
+    from d2rpick.running.drive import Driven
 
 
 # More rows than one compares by eye; csv and json hold all.
@@ -32,29 +33,35 @@ _MOST_ROWS = 20
 _TOLD = ("quality", "keeps", "saves")
 
 
-def _drawn(kind: str, answer: Any, prefix: str) -> str:
-    """Draw an answer of a kind as an SVG element, whose ids begin with ``prefix``."""
+def _of_run(record: page.PageContext, *sections: Markup) -> str:
+    """Write a page about one run; where something can be explored it runs a script."""
+    needed = {"styles": styles(), "scripts": scripts()} if record.explorer else {}
+    return document(f"Switch times: {page.title_of(record.run)}", *sections, signed=page.SIGNED, **needed)
+
+
+def _figures(prefix: str, caption: str, kind: str, *asked: Any, **how: Any) -> Markup:
+    """Draw something of a kind under its caption, an SVG element whose ids begin with ``prefix``."""
     from d2rpick.report import figures, figures_choice
 
-    return figures.svg_element(getattr(figures_choice, f"draw_{kind}")(answer, page=True), prefix)
+    drawn = getattr(figures_choice, f"draw_{kind}")(*asked, **how)
+    return page.drawing(caption, figures.svg_element(drawn, prefix))
 
 
-def _draw_suggestion(answer: Suggestion) -> dict[str, str]:
-    """Draw the figure of ``suggestion_page``."""
+def _draw_suggestion(answer: Suggestion) -> Markup:
     shown = "the choice, and a better pair" if answer.clearly_better else "and the choice"
-    caption = f"Internal energy with its level at td, {shown}"
-    return {caption: _drawn("suggestion", answer, "choice-")}
+    return _figures("choice-", f"Internal energy with its level at td, {shown}", "suggestion", answer, page=True)
+
+
+def _starred(title: str, head: Sequence[str], rows: Sequence[Sequence[Cell]]) -> Markup:
+    """Give a table whose first column has a star for what is recommended: the row stands out instead."""
+    marked = next((at for at, row in enumerate(rows) if row[0] == "*"), None)
+    return table(title, *unstarred(head, rows), marked)
 
 
 def suggestion_page(answer: Suggestion, record: page.PageContext) -> str:
     """Write the page of ``suggest``."""
-    return page.run_page(record.run, _of_suggestion(answer, record), record.explorer)
-
-
-def _of_suggestion(answer: Suggestion, record: page.PageContext) -> Iterator[Markup]:
-    yield _choice(answer)
-    yield from page.shown(_draw_suggestion(answer), record)
-    yield from _below_figures(answer, record)
+    shown = (_choice(answer), explorer(record.explorer), _draw_suggestion(answer))
+    return _of_run(record, *shown, *_below_figures(answer, record))
 
 
 def _below_figures(answer: Suggestion, record: page.PageContext) -> Iterator[Markup]:
@@ -89,17 +96,14 @@ def _candidates(answer: Suggestion) -> Iterator[Markup]:
     if not answer.candidates:
         yield tag("p", "None.")
         return
-    shown = answer.candidates[:_MOST_ROWS]
-    marked = next((i for i, candidate in enumerate(shown) if candidate.recommended), None)
-    yield table("Candidates", *known(*unstarred(*suggestion.table(answer, _MOST_ROWS))), marked)
-    left = len(answer.candidates) - len(shown)
-    if left:
+    yield _starred("Candidates", *known(*suggestion.table(answer, _MOST_ROWS)))
+    if (left := len(answer.candidates) - _MOST_ROWS) > 0:
         yield tag("p", f"{left} more in the csv and json results.", class_="soft")
 
 
 def verdict_page(answer: Verdict, record: page.PageContext) -> str:
     """Write the page of ``verify``."""
-    return page.run_page(record.run, _of_verdict(answer, record), record.explorer)
+    return _of_run(record, *_of_verdict(answer, record))
 
 
 def _of_verdict(answer: Verdict, record: page.PageContext) -> Iterator[Markup]:
@@ -116,12 +120,11 @@ def _of_verdict(answer: Verdict, record: page.PageContext) -> Iterator[Markup]:
         "card chosen" if answer.verified and not poor else "card refused",
     )
     yield page.front([card], remarks(answer.cautions, answer.reasons))
+    yield explorer(record.explorer)
     caption = "Internal energy with its level at td, and the pair"
-    yield from page.shown({caption: _drawn("verdict", answer, "pair-")}, record)
-    measures = (
-        (name.replace("_", " "), short(one)) for name, one in verdict.MEASURES.plain(answer).items() if one is not None
-    )
-    yield section("Measures", pairs(measures))
+    yield _figures("pair-", caption, "verdict", answer, page=True)
+    measures = _told(verdict.MEASURES.plain(answer).items())
+    yield section("Measures", pairs((name.replace("_", " "), short(value)) for name, value in measures))
     yield page.parts(candidate)
     if answer.switched:
         yield _switched(answer.switched, record.switched.files if record.switched else ())
@@ -140,22 +143,20 @@ def _switched(found: Comparison, files: Iterable[Source]) -> Markup:
 
 def trade_off_page(found: TradeOff, record: page.PageContext) -> str:
     """Write the page of ``explore``."""
-    return page.run_page(record.run, _of_trade_off(found, record), record.explorer)
-
-
-def _of_trade_off(found: TradeOff, record: page.PageContext) -> Iterator[Markup]:
-    yield _choice(found.suggestion)
     further = [one for one in found.cautions if one not in found.suggestion.cautions]
-    yield tag("section", tag("p", trade_off.answer(found)), remarks(further))
     caption = "Error and rigid time of the best pair for each td"
-    curve = _drawn("trade_off", found, "explore-")
-    yield from page.shown({**_draw_suggestion(found.suggestion), caption: curve}, record)
     best = trade_off.some_of(found, _MOST_ROWS)
-    marked = next((i for i, one in enumerate(best) if one.recommended), None)
-    shown = table("Pairs", *known(*unstarred(*trade_off.table(best))), marked)
     left = tag("p", f"{len(found.offers) - len(best)} more td in the csv and json results.", class_="soft")
-    yield section("Pairs that nothing beats", shown, left)
-    yield from _below_figures(found.suggestion, record)
+    return _of_run(
+        record,
+        _choice(found.suggestion),
+        tag("section", tag("p", trade_off.answer(found)), remarks(further)),
+        explorer(record.explorer),
+        _draw_suggestion(found.suggestion),
+        _figures("explore-", caption, "trade_off", found, page=True),
+        section("Pairs that nothing beats", _starred("Pairs", *known(*trade_off.table(best))), left),
+        *_below_figures(found.suggestion, record),
+    )
 
 
 def plan_page(found: Plan, run: Run, command: Sequence[str], card: str | None, explored: Explorer | None = None) -> str:
@@ -173,26 +174,21 @@ def plan_page(found: Plan, run: Run, command: Sequence[str], card: str | None, e
     explored : Explorer, optional
         The flights of the plan.
     """
-    return page.run_page(run, _of_plan(found, run, command, card, explored), explored)
-
-
-def _of_plan(
-    found: Plan, run: Run, command: Sequence[str], card: str | None, explored: Explorer | None
-) -> Iterator[Markup]:
     cards = [_window(row, found) for row in found.supported]
     cards = cards or [page.refused("No window of this run can be recommended.")]
-    yield page.front(cards, remarks(found.cautions), pairs([("plan", plan.sentence(found)), *plan.outlook(found)]))
-    if explored:
-        yield explorer(explored)
     caption = "Internal energy with the flights, and below it the rigid windows with their numbers"
-    yield drawings({caption: _drawn("plan", found, "plan-")})
-    yield section("Flights", table("Flights", *unstarred(*plan.table(found))), pairs(plan.reasons(found)))
-    if card:
-        yield section("For the solver's input", tag("pre", card, tabindex="0"))
     files = [*page.digests(run.files), *page.digests_of(found.settings)]
     notes = [("note", note) for note in found.history.notes]
-    yield section("What was read", pairs([("history", what_was_read(found.history)), *files, *notes]))
-    yield from page.method(command)
+    return _of_run(
+        page.PageContext(run, command, (), explorer=explored),
+        page.front(cards, remarks(found.cautions), pairs([("plan", plan.sentence(found)), *plan.outlook(found)])),
+        explorer(explored),
+        _figures("plan-", caption, "plan", found, page=True),
+        section("Flights", table("Flights", *unstarred(*plan.table(found))), pairs(plan.reasons(found))),
+        section("For the solver's input", tag("pre", card, tabindex="0")) if card else Markup(),
+        section("What was read", pairs([("history", what_was_read(found.history)), *files, *notes])),
+        *page.method(command),
+    )
 
 
 def _window(row: Planned, found: Plan) -> Markup:
@@ -205,18 +201,17 @@ def _window(row: Planned, found: Plan) -> Markup:
 
 def study_page(answer: Study, command: Sequence[str]) -> str:
     """Write the page of ``study``; ``command`` are the arguments that repeat it."""
-    title = f"Switch times of {runs_of(len(answer.runs))}"
-    return document(title, *_of_study(answer, command), signed=page.CHECKED)
-
-
-def _of_study(answer: Study, command: Sequence[str]) -> Iterator[Markup]:
-    yield page.front([_common(answer)], remarks(answer.cautions), pairs(study.outcome(answer)))
     caption = "Internal energies of all runs, with the tr of each, the common one and td"
-    yield drawings({caption: _drawn("study", answer, "runs-")})
     head, rows = study.table(answer)
-    yield section("Runs", table("Runs", *known([name.replace("+-", "±") for name in head], rows)))
-    yield section("Files", tag("pre", _files(answer), class_="wrap"))
-    yield from page.method(command)
+    return document(
+        f"Switch times of {runs_of(len(answer.runs))}",
+        page.front([_common(answer)], remarks(answer.cautions), pairs(study.outcome(answer))),
+        _figures("runs-", caption, "study", answer, page=True),
+        section("Runs", table("Runs", *known([name.replace("+-", "±") for name in head], rows))),
+        section("Files", tag("pre", _files(answer), class_="wrap")),
+        *page.method(command),
+        signed=page.CHECKED,
+    )
 
 
 def _common(answer: Study) -> Markup:
@@ -243,22 +238,20 @@ def _files(answer: Study) -> str:
 
 def parts_page(found: Parts, command: Sequence[str]) -> str:
     """Write the page of ``parts``; ``command`` are the arguments that repeat the answer."""
-    return document(f"Parts to switch: {page.title_of(found.files)}", *_of_parts(found, command), signed=page.SIGNED)
-
-
-def _of_parts(found: Parts, command: Sequence[str]) -> Iterator[Markup]:
-    yield page.front([_set(found.recommended)], remarks(found.cautions))
-    if found.sets:
-        marked = next((at for at, one in enumerate(found.sets) if one.recommended), None)
-        yield section("Sets", table("Sets", *unstarred(*parts.set_table(found, parts.SETS)), marked))
-    for caption, names in parts.TABLES.items():
-        yield section(caption, table(caption, *unstarred(*parts.table(found, names))))
-    yield section("What it means", pairs(parts.outlook(found)))
+    sets = [section("Sets", _starred("Sets", *parts.set_table(found, parts.SETS)))] if found.sets else []
+    tables = {name: unstarred(*parts.table(found, columns)) for name, columns in parts.TABLES.items()}
     weights = [("weights", found.weights.source)] if found.weights else []
     deck = page.deck_digests(found.inventory.files, found.weights) if found.inventory else []
-    read = [*parts.heading(found), *weights, *page.digests(found.files.files), *deck]
-    yield section("What was read", pairs(read))
-    yield page.repeated(command)
+    return document(
+        f"Parts to switch: {page.title_of(found.files)}",
+        page.front([_set(found.recommended)], remarks(found.cautions)),
+        *sets,
+        *(section(name, table(name, *cells)) for name, cells in tables.items()),
+        section("What it means", pairs(parts.outlook(found))),
+        section("What was read", pairs([*parts.heading(found), *weights, *page.digests(found.files.files), *deck])),
+        page.repeated(command),
+        signed=page.SIGNED,
+    )
 
 
 def _set(best: PartSet | None) -> Markup:
@@ -267,6 +260,32 @@ def _set(best: PartSet | None) -> Markup:
     saved = tag("span", tag("i", "saves about"), f"{best.saving:.0%}", tag("i", " of the run time"))
     listed = tag("p", f"parts {parts.ranges(best.parts)}")
     return tag("div", tag("h2", best.name), tag("div", saved, class_="times"), listed, class_="card chosen")
+
+
+def drive_page(found: Driven, command: Sequence[str]) -> str:
+    """Write the page of ``drive``; ``command`` are the arguments that repeat the run."""
+    from d2rpick.histories.names import Selection
+
+    history = found.run.history(Selection(parts=tuple(map(str, found.deck.parts))))
+    switched = [one for one in found.windows if not one.reason]
+    contacts = ("none to the end" if one.contact is None else f"{one.contact:.6g}" for one in switched)
+    cards = [
+        page.pair(f"Window {number}", (one.tr, one.td), pairs([("contact", text)]), history, "card chosen")
+        for number, (one, text) in enumerate(zip(switched, contacts, strict=True), start=1)
+    ]
+    cards = cards or [tag("p", "No flight was switched.")]
+    caption = "Internal energy in the deformable legs, with the rigid windows; rigid legs have none that is believed"
+    flights, rigid = [(one.free, one.contact or one.td) for one in switched], [(one.tr, one.td) for one in switched]
+    return document(
+        f"First run: {found.deck.name}",
+        page.front(cards, remarks(found.cautions), pairs(drive.outlook(found))),
+        _figures("driven-", caption, "run", history, flights, rigid),
+        section("Evidence", table("Windows", *drive.windows(found))),
+        section("Cost", table("Legs", *drive.legs(found))),
+        section("What was read", pairs(page.digests(found.run.files))),
+        page.repeated(command),
+        signed=page.CHECKED,
+    )
 
 
 # Of a table in a notebook.

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.sets_of_parts import Parts, PartSet
     from d2rpick.choice.switchable_parts import PartRow
-    from d2rpick.report.figures import Figure
     from d2rpick.report.formats import Shown
 
 # Columns of the sets, and of the parts in two tables: as many as a screen and a sheet hold side by side.
@@ -130,7 +129,6 @@ DOCUMENT: Final = Document(
     closed=True,
 )
 _MOST_SHOWN = 6
-_PANEL: Final = 2.8  # height of the axes of the figure [inch]
 # Left out, in this order, where a terminal has no room for them.
 _SPARE: Final = ("material", "step", "mass", "saved of a step", "turned [deg]")
 
@@ -161,24 +159,6 @@ def as_csv(found: Parts, _: Shown) -> str:
 def as_value(found: Parts, _: Shown) -> str:
     """Numbers of the recommended set as ``--part`` takes them; nothing where there is none."""
     return ",".join(map(str, found.recommended.parts)) if found.recommended else ""
-
-
-def draw(found: Parts) -> Figure:
-    """Draw the energies of the parts that have most over time, and the flights; FormatError without parts."""
-    from d2rpick.histories.samples import outline
-    from d2rpick.report import figures
-
-    run, axes = found.files, (figure := figures.Figure()).subplots()
-    energies, time = run.part_energies(run.parts), run.part_time
-    for at in energies.max(axis=0).argsort()[::-1][:_MOST_SHOWN]:
-        curve = outline(time, energies[:, at], stretches=figures.STRETCHES)
-        axes.plot(*curve, linewidth=1, label=figures.plain(run.parts[at].name))
-    for flight in found.facts.flights:
-        axes.axvspan(*flight, color=figures.FLIGHT, alpha=0.15, linewidth=0, label="flight")
-    axes.set(xlabel="time", ylabel="internal energy")
-    figures.finish(axes, legend=False)
-    figures.arrange(figure, [axes], _PANEL)
-    return figure
 
 
 def heading(found: Parts) -> list[tuple[str, str]]:
@@ -277,10 +257,6 @@ def _percent(value: float | None) -> str | None:
     return None if value is None else f"{100 * value:.3g}%"
 
 
-def _growth(value: float | None) -> str | None:
-    return "free" if value is not None and isinf(value) else tables.shown(value, ".2g")
-
-
 COLUMNS: Final[dict[str, Callable[[PartRow], tables.Cell]]] = {
     "part": lambda row: row.id,
     "title": lambda row: row.title,
@@ -304,7 +280,7 @@ SET_COLUMNS: Final[dict[str, Callable[[PartSet], tables.Cell]]] = {
     "elements": lambda one: one.elements,
     "mass": lambda one: _percent(one.mass_fraction),
     "saved of a step": lambda one: _percent(one.cost_share),
-    "step grows": lambda one: _growth(one.step_growth),
+    "step grows": lambda one: "free" if _free(one) else tables.shown(one.step_growth, ".2g"),
     "tr": lambda one: one.window[0] if one.window else None,
     "td": lambda one: one.window[1] if one.window else None,
     "run time": lambda one: _percent(one.run_time_share),

@@ -194,7 +194,7 @@ def response(situation: Situation) -> Response | None:
     return Response(time, np.asarray(mode.deformation(time)), np.asarray(unit.y - unit.z), mode.preload)
 
 
-def locked_in(situation: Situation, tr: float) -> float | None:
+def locked_in(situation: Situation, tr: float | None) -> float | None:
     """Deformation that tr locks in [square root of energy]; None where no single oscillator describes it."""
-    mode = situation.vibration.whole.mode
-    return float(mode.deformation(tr)) if isinstance(mode, Mode) and situation.vibration.whole.described(tr) else None
+    mode = None if tr is None or not situation.vibration.whole.described(tr) else situation.vibration.whole.mode
+    return float(mode.deformation(tr)) if tr is not None and isinstance(mode, Mode) else None

@@ -189,37 +189,24 @@ def test_notes_of_a_reader_go_to_stderr_and_into_json(tmp_path: Path) -> None:
     assert [f"note: {note}" for note in found["history"]["notes"]] == result.stderr.splitlines()[:1]
 
 
-STAR = "\x1b[1m*"
-
-
-@pytest.mark.parametrize(
-    ("env", "coloured"),
-    [
-        ({}, False),
-        ({"FORCE_COLOR": "1"}, True),
-        ({"NO_COLOR": "1"}, False),
-        ({"NO_COLOR": "1", "FORCE_COLOR": "1"}, False),
-    ],
-)
-def test_colour_is_for_terminals_unless_asked_for(env: dict[str, str], coloured: bool) -> None:
-    assert (STAR in run(*SUGGEST, ENERGY, env=env).stdout) == coloured
-
-
+@pytest.mark.parametrize("terminal", [False, True])  # for which the colour of CliRunner stands
 @pytest.mark.parametrize(
     ("args", "line"),
-    [((*VERIFY, "--no-verify", ENERGY), "verdict  "), (("check", DECK, "--history", ENERGY), r"  \S+:43:21: error")],
+    [
+        ((*SUGGEST, ENERGY), r"\*"),
+        ((*VERIFY, "--no-verify", ENERGY), "verdict  "),
+        (("check", DECK, "--history", ENERGY), r"  \S+:43:21: error"),
+    ],
 )
-def test_what_is_judged_stands_out_too(args: tuple[str, ...], line: str) -> None:
-    assert re.search(rf"\x1b\[1m{line}", run(*args, env={"FORCE_COLOR": "1"}).stdout)
-    assert "\x1b" not in run(*args, color=True, env={"FORCE_COLOR": "1", "NO_COLOR": "1"}).stdout
-
-
-def test_a_terminal_has_colour_unless_refused_and_files_never_do(tmp_path: Path) -> None:
-    # CliRunner's color stands for a terminal
-    assert STAR in run(*SUGGEST, ENERGY, color=True).stdout
-    assert "\x1b" not in run(*SUGGEST, ENERGY, color=True, env={"NO_COLOR": "1"}).stdout
+def test_what_stands_out_does_so_on_terminals_and_where_asked_for(
+    args: tuple[str, ...], line: str, terminal: bool, tmp_path: Path
+) -> None:
+    asked = {(): terminal, ("FORCE_COLOR",): True, ("NO_COLOR",): False, ("NO_COLOR", "FORCE_COLOR"): False}
+    for names, coloured in asked.items():
+        shown = run(*args, color=terminal, env=dict.fromkeys(names, "1")).stdout
+        assert bool(re.search(rf"(?m)^\x1b\[1m{line}", shown)) == coloured == ("\x1b" in shown)
     file = tmp_path / "result.txt"
-    run(*SUGGEST, ENERGY, "-o", str(file), env={"FORCE_COLOR": "1"})
+    run(*args, "-o", str(file), color=terminal, env={"FORCE_COLOR": "1"})
     assert "\x1b" not in file.read_text()
 
 
@@ -239,17 +226,17 @@ def test_a_file_gets_what_stdout_would_have_got(form: str, tmp_path: Path) -> No
     assert [path.name for path in tmp_path.iterdir()] == ["result"]
 
 
-@pytest.mark.parametrize("option", ["-o", "--plot"])
+@pytest.mark.parametrize("option", ["-o", "--plot", "--report"])
 def test_a_file_is_replaced_only_when_that_was_asked_for(option: str, tmp_path: Path) -> None:
     file = put(tmp_path / "result.svg", "kept")
-    refused = run(*SUGGEST, ENERGY, option, str(file))
-    assert (refused.exit_code, file.read_text()) == (2, "kept")
-    assert "--overwrite" in refused.stderr
+    assert "the file exists; give another one or --overwrite" in refused(*SUGGEST, ENERGY, option, str(file))
+    assert "no such folder" in refused(*SUGGEST, ENERGY, option, str(tmp_path / "no" / "a.svg"))
+    assert file.read_text() == "kept"
     assert run(*SUGGEST, ENERGY, option, str(file), "--overwrite").exit_code == 0
     assert file.read_text() != "kept"
 
 
-@pytest.mark.parametrize("option", ["-o", "--plot"])
+@pytest.mark.parametrize("option", ["-o", "--plot", "--report"])
 @pytest.mark.parametrize("spelling", ["energy.svg", "./energy.svg", "link.svg"])
 @pytest.mark.usefixtures("here")
 def test_an_input_is_never_written_to(option: str, spelling: str) -> None:
@@ -281,8 +268,6 @@ def test_a_link_stays_and_the_file_behind_it_is_replaced(tmp_path: Path) -> None
 
 
 def test_a_named_pipe_is_written_to_and_stays_one(tmp_path: Path) -> None:
-    import os
-
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     received: list[str] = []
@@ -345,10 +330,14 @@ def test_a_name_that_promises_another_format_is_told(tmp_path: Path) -> None:
     assert run("replay", *OSCILLATOR, "--t-end", "0.1", "--dt", "0.01", "-o", str(tmp_path / "run.csv")).stderr == ""
 
 
-def test_a_report_is_not_named_what_it_is_not(tmp_path: Path) -> None:
-    name = tmp_path / "report.PDF"
-    assert "the report is an HTML page" in refused("suggest", "--td", "0.064", "--report", str(name), ENERGY)
-    assert not name.exists()
+def test_a_report_is_a_file_of_its_own_and_not_named_what_it_is_not(tmp_path: Path) -> None:
+    for name, message in (
+        (str(tmp_path / "report.PDF"), "the report is an HTML page"),
+        ("-", "--report writes a file"),
+        (str(tmp_path / "a.svg"), "--report and --plot are the same file"),
+    ):
+        assert message in refused(*SUGGEST, "--report", name, "--plot", str(tmp_path / "a.svg"), ENERGY)
+    assert [*tmp_path.iterdir()] == []
 
 
 pty = pytest.importorskip("pty", reason="terminals are a matter of POSIX")

@@ -8,8 +8,7 @@ from xml.etree import ElementTree as ET
 import pytest
 from hypothesis import given, strategies as st
 
-from d2rpick.report import findings as report
-from d2rpick.report.formats import Shown
+from d2rpick.report import findings as report, formats
 from d2rpick.rules import RULES, Checked, check_deck
 from d2rpick.rules.base import END, GOOD, HEAD, PARTS, Finding, Severity, automatic
 from tests.deck.test_radioss_run import place
@@ -25,8 +24,12 @@ def results(tmp_path: Path) -> list[Checked]:
     return [check_deck(write(tmp_path, BAD)), check_deck(write(tmp_path / "good", GOOD))]
 
 
+def written(form: str, results: list[Checked], root: Path, fail_on: Severity = Severity.ERROR) -> str:
+    return formats.write("findings", form, report.Checks(results, str(root), fail_on=fail_on), formats.Shown())
+
+
 def test_table(results: list[Checked], tmp_path: Path) -> None:
-    lines = report.as_table(report.Checks(results, str(tmp_path)), Shown()).split("\n")
+    lines = written("table", results, tmp_path).split("\n")
     assert lines[0] == "main.k"
     assert "  part 1: rigid from 0.02 to 0.5 (main.k:14)" in lines
     assert "  part 2: rigid from 0.02 to the end (main.k:14)" in lines
@@ -36,12 +39,12 @@ def test_table(results: list[Checked], tmp_path: Path) -> None:
 
 def test_a_card_without_a_window_is_not_passed_over(tmp_path: Path) -> None:
     deck = place(tmp_path, legs=(("0.2", "/RBODY/ON\n0\n"),))  # without a main node
-    lines = report.as_table(report.Checks([check_deck(deck)], str(tmp_path)), Shown()).split("\n")
+    lines = written("table", [check_deck(deck)], tmp_path).split("\n")
     assert lines[:2] == ["box_0000.rad", "  switching cards that switch nothing"]
 
 
 def test_json(results: list[Checked], tmp_path: Path) -> None:
-    content = json.loads(report.DOCUMENT.as_json(report.Checks(results, str(tmp_path)), ["check", "main.k"]))
+    content = json.loads(written("json", results, tmp_path))
     check_by_schema(content)
     assert content["decks"] == ["main.k", "good/main.k"]
     assert [window["td"] for window in content["windows"]] == [0.5, None, 0.09]
@@ -50,13 +53,13 @@ def test_json(results: list[Checked], tmp_path: Path) -> None:
 
 
 def test_github(results: list[Checked], tmp_path: Path) -> None:
-    lines = report.as_github(report.Checks(results, str(tmp_path)), Shown()).split("\n")
+    lines = written("github", results, tmp_path).split("\n")
     assert lines[1].startswith("::error file=main.k,line=23,col=28,title=D2R101::TIME1 is 0.5")
     assert lines[0].startswith("::notice file=main.k")
 
 
 def test_junit(results: list[Checked], tmp_path: Path) -> None:
-    text = report.as_junit(report.Checks(results, str(tmp_path)), Shown())
+    text = written("junit", results, tmp_path)
     junit_is_valid(text)
     suites = ET.fromstring(text)
     assert [(suite.get("name"), suite.get("tests"), suite.get("failures")) for suite in suites] == [
@@ -64,12 +67,12 @@ def test_junit(results: list[Checked], tmp_path: Path) -> None:
         ("good/main.k", "1", "0"),
     ]
     assert [failure.get("type") for failure in suites.iter("failure")] == ["D2R101"]
-    strict = ET.fromstring(report.as_junit(report.Checks(results, str(tmp_path), fail_on=Severity.INFO), Shown()))
+    strict = ET.fromstring(written("junit", results, tmp_path, fail_on=Severity.INFO))
     assert len(list(strict.iter("failure"))) == 2
 
 
 def test_sarif(results: list[Checked], tmp_path: Path) -> None:
-    text = report.as_sarif(report.Checks(results, str(tmp_path)), Shown())
+    text = written("sarif", results, tmp_path)
     sarif_is_valid(text)
     (run,) = json.loads(text)["runs"]
     assert [rule["id"] for rule in run["tool"]["driver"]["rules"]] == list(RULES)
@@ -81,8 +84,8 @@ def test_sarif(results: list[Checked], tmp_path: Path) -> None:
 
 def test_paths_outside_are_absolute(results: list[Checked], tmp_path: Path) -> None:
     elsewhere = tmp_path / "else where"
-    assert f"::error file={tmp_path}/main.k" in report.as_github(report.Checks(results, str(elsewhere)), Shown())
-    assert f"file://{tmp_path}/main.k" in report.as_sarif(report.Checks(results, str(elsewhere)), Shown())
+    assert f"::error file={tmp_path}/main.k" in written("github", results, elsewhere)
+    assert f"file://{tmp_path}/main.k" in written("sarif", results, elsewhere)
 
 
 @pytest.mark.slow
@@ -91,17 +94,17 @@ def test_any_text_makes_a_valid_report(message: str, name: str) -> None:
     name = name.encode("utf-8", "replace").decode()
     finding = Finding("D2R001", Severity.ERROR, message, name, name, 1, 1)
     result = [Checked(name, (), (finding,))]
-    root = "/some folder"
-    ET.fromstring(report.as_junit(report.Checks(result, root), Shown()).encode("utf-8", "replace"))
-    sarif_is_valid(report.as_sarif(report.Checks(result, root), Shown()))
-    assert report.as_github(report.Checks(result, root), Shown()).count("\n") == 0
-    json.loads(report.DOCUMENT.as_json(report.Checks(result, root), []))
+    root = Path("/some folder")
+    ET.fromstring(written("junit", result, root).encode("utf-8", "replace"))
+    sarif_is_valid(written("sarif", result, root))
+    assert written("github", result, root).count("\n") == 0
+    json.loads(written("json", result, root))
 
 
 def test_nothing_found_is_a_report_too(tmp_path: Path) -> None:
-    sarif_is_valid(report.as_sarif(report.Checks([], str(tmp_path)), Shown()))
-    junit_is_valid(report.as_junit(report.Checks([], str(tmp_path)), Shown()))
-    assert report.as_github(report.Checks([], str(tmp_path)), Shown()) == ""
+    sarif_is_valid(written("sarif", [], tmp_path))
+    junit_is_valid(written("junit", [], tmp_path))
+    assert written("github", [], tmp_path) == ""
 
 
 def test_only_a_deck_of_another_name_is_named() -> None:

@@ -16,7 +16,7 @@ import pytest
 
 from d2rpick.api.request import OPTIONS
 from d2rpick.cli import one_run
-from tests.command import ENERGY, GLSTAT, ROOT, put, refused, replayed, run
+from tests.command import ENERGY, GLSTAT, ROOT, put, replayed, run
 from tests.computed import stored, unpacked
 
 ROLLOVER_T01 = str(ROOT / "sample_data" / "rolloverT01.gz")
@@ -182,6 +182,11 @@ TOLD = {
     "a poor pair": (
         ("verify", "--tr", "0.0128853", "--td", "0.064", ENERGY), 0, ("Verified, but of poor quality",), ()
     ),
+    "a pair that verifies": (
+        ("verify", "--tr", "0.0135867", "--td", "0.0687534", ENERGY), 0,
+        ("Verified", "residual 0.000", "0.0687534", "1501 states", "Method and limits", "d2rpick verify --tr",
+         "d2rpick card --tr 0.0135867 --td 0.0687534 --part"), ("but of poor quality",),
+    ),
     "a pair that does not verify": (
         ("verify", "--tr", "0.0122659", "--td", "0.064", ENERGY), 1,
         ("Not verified", "opposite sign of the deformation"), ("d2rpick card",),
@@ -198,6 +203,8 @@ def test_it_tells_what_is_known_and_nothing_else(
     assert [text for text in said if text not in page.text] == []
     assert [text for text in unsaid if text in page.text or text in page.source] == []
     assert page.source.count("<figure ") == 1
+    assert len(page.ids) == len({*page.ids})
+    assert not page.unnamed
 
 
 def test_a_title_of_html_and_a_file_name_that_is_no_text_are_shown_as_text(tmp_path: Path) -> None:
@@ -285,15 +292,6 @@ def test_options_set_by_the_environment_and_standard_input_are_needed_to_repeat_
     assert f"-: {hashlib.sha256(content).hexdigest()}" in text
 
 
-def test_a_verdict_has_a_page_too(tmp_path: Path) -> None:
-    page = page_of(tmp_path, "--tr", "0.0135867", "--td", "0.0687534", ENERGY, command="verify")
-    for text in ("Verified", "residual 0.000", "0.0687534", "1501 states", "Method and limits", "d2rpick verify --tr"):
-        assert text in page.text
-    assert page.last_command()[:6] == ["card", "--tr", "0.0135867", "--td", "0.0687534", "--part"]
-    assert len(page.ids) == len({*page.ids})
-    assert not page.unnamed
-
-
 @pytest.mark.slow
 def test_a_verdict_tells_health_parts_and_the_switched_run(tmp_path: Path) -> None:
     reference, *legs = (ROLLOVER_T01, *(stored(f"rollover_r100_T0{leg}.gz") for leg in (1, 2, 3)))
@@ -304,18 +302,3 @@ def test_a_verdict_tells_health_parts_and_the_switched_run(tmp_path: Path) -> No
     told = ("The switched run", "mean energy after td", "hourglass energy of box", "The window is 0.1 to 0.37")
     for text in (*told, "0.66 times that of the reference"):
         assert text in page.text
-
-
-def test_it_is_a_file_like_any_other_output(tmp_path: Path) -> None:
-    taken = put(tmp_path / "taken.html", "mine")
-    for name, message in (
-        (taken, "the file exists"),
-        (Path(ENERGY), "is an input"),
-        (tmp_path / "no" / "a", "no such folder"),
-    ):
-        assert message in refused("suggest", "--td", "0.064", "--report", str(name), ENERGY)
-    both = str(tmp_path / "a.svg")
-    result = run("suggest", "--td", "0.064", "--report", both, "--plot", both, ENERGY)
-    assert "--report and --plot are the same file" in result.stderr
-    assert "--report writes a file" in run("suggest", "--td", "0.064", "--report", "-", ENERGY).stderr
-    assert taken.read_text() == "mine"

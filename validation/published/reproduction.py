@@ -8,7 +8,7 @@ from d2rpick.base import __version__
 from d2rpick.report import keys, page, tables
 from d2rpick.report.fields import Document, Field, Kind, kind_of, many, row
 from d2rpick.report.figures import svg_element
-from d2rpick.report.html import Markup, document, section, table, tag
+from d2rpick.report.page import Markup, document, section, table, tag
 from validation.published.drawing import draw_exhibit
 from validation.published.values import MISPRINTS, MOST_DIFFERENCE, PUBLISHED, pair_at_peak, residual
 
