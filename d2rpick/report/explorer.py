@@ -166,7 +166,7 @@ def _table(found: TradeOff, first: Offer, seen: View) -> dict[str, Any]:
         "td": lambda one: one.td,
         "tr": lambda one: _short(one.tr),
         "level": lambda one: _short(one.energy_td),
-        "locked": lambda one: _short(one.best and one.best.energy),
+        "locked": lambda one: _short(one.best.energy if one.best else None),
         "deformation": lambda one: _short(locked_in(situation, one.tr) if one.basis == "oscillator" else None),
         "saved": lambda one: _short(_saved(one)),
         "error": lambda one: _short(one.error),
