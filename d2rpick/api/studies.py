@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
 from os.path import abspath
@@ -14,6 +13,7 @@ from d2rpick.api import arguments
 from d2rpick.api.answer import Paged, frame_of
 from d2rpick.api.asked import request_of
 from d2rpick.api.request import Request, needed_time, time_or_window
+from d2rpick.base.records import dataclass, replace
 from d2rpick.base.workers import Farm, on_cores
 from d2rpick.choice import study as core
 from d2rpick.choice.study import Question, StudyRow

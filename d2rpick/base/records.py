@@ -1,0 +1,64 @@
+"""Records without code that Python compiles for each: it is most of what a dataclass or a named tuple costs.
+
+A command imports some seventy of them, and start-up is part of the product.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import namedtuple
+from dataclasses import MISSING, field, fields, replace
+from typing import TYPE_CHECKING
+
+__all__ = ["NamedTuple", "dataclass", "field", "fields", "replace"]
+
+if TYPE_CHECKING:
+    from dataclasses import dataclass
+    from typing import NamedTuple
+else:
+
+    class _Made(type):
+        """Leaves annotations alone, which typing compiles."""
+
+        def __new__(cls, name, _, body):
+            names = body.pop("__annotations__")
+            defaults = [body.pop(one) for one in names if one in body]
+            made = namedtuple(name, names, defaults=defaults, module=body.pop("__module__"))
+            for key in body:
+                setattr(made, key, body[key])
+            return made
+
+    NamedTuple = type.__new__(_Made, "NamedTuple", (), {})
+
+    def dataclass(*, frozen=False, eq=True, **other):
+        """Do what that of the standard library does; a default that is not given otherwise stays one of the class."""
+
+        def made(cls):
+            dataclasses.dataclass(init=False, eq=eq, unsafe_hash=frozen and eq, **other)(cls)
+            every = fields(cls)
+            known = {one.name for one in every if one.init}
+            makers = {one.name: one.default_factory for one in every if one.default_factory is not MISSING}
+            needed = {one.name for one in every if one.default is MISSING} - makers.keys()
+            order = [one.name for one in every if one.init and not one.kw_only]
+
+            def init(self, *args, **named):
+                values = vars(self)
+                values.update(zip(order, args, strict=False), **named)
+                if not needed <= values.keys() <= known or len(values) < len(args) + len(named):
+                    raise TypeError(f"{cls.__name__} is made of {', '.join(sorted(known))}; found {args} and {named}")
+                for name in makers.keys() - values.keys():
+                    values[name] = makers[name]()
+                if hasattr(cls, "__post_init__"):
+                    self.__post_init__()
+
+            def refuse(self, name, *value):
+                if type(self) is cls or name in self.__dataclass_fields__:
+                    raise dataclasses.FrozenInstanceError(f"cannot change {name!r}")
+                (super(cls, self).__setattr__ if value else super(cls, self).__delattr__)(name, *value)
+
+            cls.__init__ = init
+            if frozen:
+                cls.__setattr__ = cls.__delattr__ = refuse
+            return cls
+
+        return made
