@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from functools import wraps
+from functools import cache, wraps
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -152,9 +152,10 @@ def takes(*names: str, forms: Iterable[str] = (), **other: Any) -> Callable[[Dec
             return function(*args, **values)
 
         if "quiet" in names:
-            run = _flags(run)
+            for flag in _FLAGS:
+                run = flag(run)
         for name in reversed(names):
-            run = _decorator(name, other.get(name, {}))(run)
+            run = (_decorator(name, other[name]) if name in other else _as_in_table(name))(run)
         return run
 
     return decorate
@@ -174,6 +175,18 @@ def takes_all(table: Any, name: str, **other: Any) -> Callable[[Decorated], Deco
         return run
 
     return decorate
+
+
+def _shared(decorate: Callable[[Decorated], Decorated]) -> Callable[[Decorated], Decorated]:
+    """Give all commands the same object of an option: a module has commands, of which one is called."""
+    made = decorate(lambda: None).__click_params__[0]
+    again: Any = lambda *_, **__: made  # noqa: E731  click takes what makes an option for its class
+    return click.option(cls=again)
+
+
+@cache
+def _as_in_table(name: str) -> Callable[[Decorated], Decorated]:
+    return _shared(_decorator(name, {}))
 
 
 def _decorator(name: str, other: Any) -> Callable[[Decorated], Decorated]:
@@ -233,21 +246,19 @@ def judging_run(request: Request) -> Run | None:
     return open_run(request)
 
 
-def _flags(function: Decorated) -> Decorated:
-    """What every command can be told and none asks for itself: it is kept in the context."""
-    for name, text in (
-        ("debug", "Show the traceback of an error."),
-        ("show-settings", "Print every option with its value and its source, and do nothing else."),
-        ("verbose", "Say all that is known, and on stderr what was read and how long it took."),
-    ):
-        short = ["-v"] if name == "verbose" else []
-        flag = click.option(*short, f"--{name}", is_flag=True, expose_value=False, callback=_remember, help=text)
-        function = flag(function)
-    return function
-
-
 def _remember(ctx: click.Context, option: click.Parameter, value: bool) -> None:
     ctx.meta[f"d2rpick.{dashed(option.name or '')}"] = value
+
+
+# What every command can be told and none asks for itself: it is kept in the context.
+_FLAGS: Final = [
+    _shared(click.option(*names, is_flag=True, expose_value=False, callback=_remember, help=text))
+    for names, text in (
+        (["--debug"], "Show the traceback of an error."),
+        (["--show-settings"], "Print every option with its value and its source, and do nothing else."),
+        (["-v", "--verbose"], "Say all that is known, and on stderr what was read and how long it took."),
+    )
+]
 
 
 def repeat() -> list[str]:
