@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from itertools import accumulate, chain, pairwise
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, Final, overload
 
 import numpy as np
 
-from d2rpick.base.records import dataclass
+from d2rpick.base.records import NamedTuple, dataclass
 from d2rpick.choice.expectation import Objection, objections
 from d2rpick.histories.digits import not_before
 from d2rpick.vibration import measures

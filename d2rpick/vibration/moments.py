@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.records import dataclass
+from d2rpick.base.records import NamedTuple, dataclass
 from d2rpick.histories.samples import find_crossings, find_turns, first_above
 from d2rpick.vibration import measures
 from d2rpick.vibration.modes import Mode

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from d2rpick.base import __version__
+from d2rpick.base.records import NamedTuple
 
 if TYPE_CHECKING:
     import re

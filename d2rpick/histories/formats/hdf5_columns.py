@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from d2rpick.base.errors import FormatError
+from d2rpick.base.records import NamedTuple
 from d2rpick.histories.formats.hdf5_damage import check_data
 
 if TYPE_CHECKING:
