@@ -29,6 +29,12 @@ class Number(NamedTuple):
     high: float = inf
     above: bool = False
 
+    def missed(self, value: float) -> str:
+        """Say which limit a value is beyond, nothing where it is within."""
+        if value < self.low or (self.above and value == self.low):
+            return f"{'above' if self.above else 'of at least'} {self.low:g}"
+        return f"of at most {self.high:g}" if value > self.high else ""
+
 
 TIME, POSITIVE, NOT_NEGATIVE, FRACTION = Number(), Number(0.0, above=True), Number(0.0), Number(0.0, 1.0)
 MIN_MEAN_ENERGY: Final = 0.7  # of the reference's; in computed runs that were switched well it was 0.77 and more

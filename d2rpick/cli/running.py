@@ -189,8 +189,8 @@ def first(
     d2rpick first --part 1 --wait 0.02 sample_data/falling_plate/plate_0000.rad -o first/
     d2rpick first --part 1 --wait 0.02 --after 0.05 sample_data/falling_plate/plate_0000.rad -o later/
     """
-    from d2rpick.api.running import prepared
+    from d2rpick.api.running import first as write
 
-    found = prepared(deck, output_dir, part, wait, after, output.overwrite)
+    found = write(deck, output_dir, parts=part or None, wait=wait, after=after, overwrite=output.overwrite)
     output.notes(found.notes, ())
     click.echo("\n".join(f"written  {printable(name)}" for name in found.files))

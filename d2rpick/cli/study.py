@@ -185,9 +185,9 @@ def calibrate(folders: tuple[str, ...], output: Output) -> None:
     d2rpick calibrate sample_data/flying_box
     d2rpick calibrate -f toml -o site.toml sample_data/flying_box
     """
-    from d2rpick.api.costs import fitted
+    from d2rpick.api.costs import calibrate as fit
 
     output = output.beside()
-    answer = fitted(folders)
+    answer = fit(folders)
     output.notes((), answer.cautions)
     output.answer(answer)

@@ -363,7 +363,7 @@ def test_the_help_names_each_command_in_a_line() -> None:
         for title in ("Commands", "Experiments")
     )
     shown = [*work, *experiments]
-    assert shown == [f"  {name:9}  {line}" for name, line in COMMANDS.items()]
+    assert shown == [f"  {name:9}  {line}" for name, (_, line) in COMMANDS.items()]
     assert max(map(len, shown)) <= 80
 
 
