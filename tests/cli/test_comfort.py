@@ -13,7 +13,7 @@ from d2rpick.base import __version__
 from d2rpick.cli import COMMANDS, d2rpick
 from d2rpick.cli.manual import manual
 from d2rpick.rules import RULES
-from tests.command import ENERGY, GLSTAT, MATSUM, ROLLOVER, ROOT, TIME_LIMIT, answer, put, refused, run
+from tests.command import ENERGY, GLSTAT, MATSUM, ROLLOVER, ROOT, TIME_LIMIT, answer, put, run
 
 
 def test_settings_are_shown_with_their_sources_and_nothing_is_done(
@@ -84,30 +84,6 @@ def test_channels_are_completed_from_the_history_that_was_typed() -> None:
     assert offered == "internal_energy"  # one word for the shell, and yet the channel
     one, other = (answer("suggest", "--td", "0.064", "--energy", name, GLSTAT) for name in (offered, "internal energy"))
     assert one["recommended"] == other["recommended"]
-
-
-@pytest.mark.parametrize(
-    ("args", "told"),
-    [
-        (("--td", "64", ENERGY), "was it meant in ms? Then give --td 0.064, in the unit of the record"),
-        (
-            ("--td-window", "60", "70", ENERGY),
-            "was it meant in ms? Then give --td-window 0.06 0.07, in the unit of the record",
-        ),
-        (("--td", "0.064", "--after", "86", ENERGY), "Then give --after 0.086, in the unit of the record"),
-        (("--td", "0.064", "--fit-window", "10", "60", ENERGY), "Then give --fit-window 0.01 0.06, in the unit of"),
-        (("--td-window", "0.06", "0.2", ENERGY), "--td-window 0.06 0.2 reaches outside the record, 0 to 0.15\n"),
-        (("--td", "0.16", ENERGY), "--td 0.16 lies outside the record, 0 to 0.15\n"),
-        (("--td", "0.6", ENERGY), "--td 0.6 lies outside the record, 0 to 0.15\n"),
-        (("--td", "2", ENERGY), "--td 2 lies outside the record, 0 to 0.15\n"),  # cut early, or 2 ms
-        (("--td", "64ms", ENERGY), "give a number in the unit of the history, 0.064 where it is s"),
-        (("64", ENERGY), "a time is given as --td, a number in the unit of the record"),
-        (("64ms", ENERGY), "a time is given as --td, a number in the unit of the record, 0.064 where it is s"),
-        (("--td", "0.064", ENERGY.replace("energy", "enrgy")), "(did you mean 'energy.csv'?)"),
-    ],
-)
-def test_a_near_miss_is_named(args: tuple[str, ...], told: str) -> None:
-    assert told in refused("suggest", *args) + "\n"
 
 
 def test_a_td_far_outside_is_not_explained_by_a_unit() -> None:
