@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from d2rpick.api.runs import Run
 
-
-if TYPE_CHECKING:
     FloatType = click.ParamType[float]
 else:
     FloatType = click.ParamType  # generic from click 8.4 on
