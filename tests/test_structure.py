@@ -187,9 +187,7 @@ def loaded(*args: str) -> frozenset[str]:
 @cache
 def beside(libraries: str) -> frozenset[str]:
     """Modules of a process that imports nothing but some libraries."""
-    command = [sys.executable, "-c", f"import sys, {libraries}; print(*sys.modules)"]
-    found = subprocess.run(command, capture_output=True, text=True, check=True, timeout=TIME_LIMIT)
-    return frozenset(found.stdout.split())
+    return frozenset(printed_by(f"import sys, {libraries}; print(*sys.modules)").split())
 
 
 def share(modules: frozenset[str]) -> float:
@@ -249,6 +247,16 @@ def test_a_command_loads_only_what_its_answer_needs(args: tuple[str, ...], libra
 def test_an_answer_needs_little_of_what_python_has(args: tuple[str, ...]) -> None:
     mine = loaded(*args) - beside("click, numpy")
     assert not mine & (UNNEEDED if args[-1] == ENERGY else UNNEEDED - {"array"})
+
+
+@pytest.mark.parametrize("args", [(*SUGGEST, "0.064", ENERGY), ("check", DECK)])
+def test_nothing_is_compiled_for_the_records_that_a_command_begins_with(args: tuple[str, ...]) -> None:
+    mine = {name.removeprefix("d2rpick.") for name in loaded(*args)} & {*INNER} - {"base.records"}
+    froms = [(name, node) for name in mine for node in statements(name) if isinstance(node, ast.ImportFrom)]
+    theirs = {
+        (name, one.name) for name, node in froms for one in node.names if node.module in ("typing", "dataclasses")
+    }
+    assert not [name for name, taken in theirs if taken in ("NamedTuple", "dataclass")]
 
 
 def test_a_small_deck_needs_little_of_what_python_has() -> None:
