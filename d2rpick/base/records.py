@@ -40,15 +40,18 @@ else:
             makers = {one.name: one.default_factory for one in every if one.default_factory is not MISSING}
             needed = {one.name for one in every if one.default is MISSING} - makers.keys()
             order = [one.name for one in every if one.init and not one.kw_only]
+            checks = hasattr(cls, "__post_init__")
 
             def init(self, *args, **named):
-                values = vars(self)
-                values.update(zip(order, args, strict=False), **named)
-                if not needed <= values.keys() <= known or len(values) < len(args) + len(named):
+                given = len(args) + len(named)
+                named.update(zip(order, args, strict=False))
+                if len(named) < given or not (known.issuperset(named) and named.keys() >= needed):
                     raise TypeError(f"{cls.__name__} is made of {', '.join(sorted(known))}; found {args} and {named}")
-                for name in makers.keys() - values.keys():
-                    values[name] = makers[name]()
-                if hasattr(cls, "__post_init__"):
+                for name, make in makers.items():
+                    if name not in named:
+                        named[name] = make()
+                self.__dict__.update(named)
+                if checks:
                     self.__post_init__()
 
             def refuse(self, name, *value):
