@@ -1,6 +1,7 @@
 """Records without code that Python compiles for each: it is most of what a dataclass or a named tuple costs.
 
-A command imports some seventy of them, and start-up is part of the product.
+A command imports some seventy of them, and start-up is part of the product.  Dataclasses of decks and rules are those
+of the standard library: thousands are made, each 1 us quicker.
 """
 
 from __future__ import annotations

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import islice
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-from d2rpick.base.records import NamedTuple, dataclass
+from d2rpick.base.records import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

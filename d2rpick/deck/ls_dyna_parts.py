@@ -5,10 +5,11 @@ Columns: the vendor's keyword data as published in its Python library.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, Literal
 
 from d2rpick.base.graph import reached
-from d2rpick.base.records import NamedTuple, dataclass, field
+from d2rpick.base.records import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence

@@ -6,11 +6,11 @@ A block is a line that begins with ``/``, and the data lines below it.  Columns 
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.graph import reached
-from d2rpick.base.records import dataclass, field
 from d2rpick.deck.card import Card
 from d2rpick.deck.expression import ExpressionError, number, real
 from d2rpick.deck.fields import Field, Row, Value

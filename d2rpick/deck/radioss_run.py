@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 import os
 import re
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.base.errors import DeckError, are, in_rows, name_units
-from d2rpick.base.records import dataclass, field
 from d2rpick.deck.fields import Field, Value
 from d2rpick.deck.radioss_deck import Body, Leg, Starter, blocks, card_of, kept_off, keyword, read_legs
 from d2rpick.deck.radioss_files import ENGINE, HEAD, STARTER, recognises, run_files

@@ -6,12 +6,13 @@ import os
 import re
 from bisect import bisect_right
 from collections import defaultdict
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import DeckError
-from d2rpick.base.records import NamedTuple, dataclass, field
+from d2rpick.base.records import NamedTuple
 from d2rpick.deck.card import Card, Transform
 from d2rpick.deck.fields import LONG, STANDARD, Field, Problem, Row
 from d2rpick.deck.parameters import Scope

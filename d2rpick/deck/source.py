@@ -12,6 +12,7 @@ import os
 import re
 from bisect import bisect_right
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice, zip_longest
 from threading import Thread
@@ -19,7 +20,6 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import DeckError
 from d2rpick.base.files import FileState, at_rest, beyond, bound, long_line
-from d2rpick.base.records import dataclass
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, MutableSequence, Sequence
