@@ -263,6 +263,15 @@ def test_settings_give_way_to_what_excludes_them_and_wait_for_what_they_belong_t
     assert "node" in shown("card", "--solver", "radioss", "--tr", "1", "--td", "2")
 
 
+def test_an_oscillator_in_the_settings_gives_way_to_what_excludes_it(settings: Path) -> None:
+    settings.write_text("[tool.d2rpick]\nstiffness = 1\nmass = 1\nbeta = 2\nalpha = 0\nv0 = 1\n")
+    given = {*shown(*ASKED)} - {"td", "history"}
+    assert given == {"stiffness", "mass", "beta", "alpha", "v0"}
+    for option in (("--no-verify",), ("--fit-window", "0", "0.1")):
+        assert not given & {*shown(*ASKED, *option)}
+    assert given - {*shown(*ASKED, "--frame-mass", "2")} == {"beta"}
+
+
 def test_the_check_takes_its_history_and_what_fails_it_from_the_settings(settings: Path) -> None:
     settings.write_text(f"[tool.d2rpick]\nhistory = ['{ENERGY}']\nfail-on = 'warning'\nignore = ['D2R202']\n")
     result = run("check", DECK)
