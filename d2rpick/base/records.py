@@ -31,6 +31,22 @@ else:
 
     NamedTuple = type.__new__(_Made, "NamedTuple", (), {})
 
+    class _Signature:
+        """What a dataclass is made of, said when it is asked for."""
+
+        def __get__(self, _, cls):
+            from inspect import Parameter, Signature
+
+            every = sorted((one for one in fields(cls) if one.init), key=lambda one: one.kw_only)
+            kinds = (Parameter.POSITIONAL_OR_KEYWORD, Parameter.KEYWORD_ONLY)
+            made = [Parameter(one.name, kinds[one.kw_only], annotation=one.type) for one in every]
+            for place, one in enumerate(every):
+                if one.default_factory is not MISSING:
+                    made[place] = made[place].replace(default=dataclasses._HAS_DEFAULT_FACTORY)
+                elif one.default is not MISSING:
+                    made[place] = made[place].replace(default=one.default)
+            return Signature(made, return_annotation=None)
+
     def dataclass(*, frozen=False, eq=True, **other):
         """Do what that of the standard library does; a default that is not given otherwise stays one of the class."""
 
@@ -57,10 +73,10 @@ else:
 
             def refuse(self, name, *value):
                 if type(self) is cls or name in self.__dataclass_fields__:
-                    raise dataclasses.FrozenInstanceError(f"cannot change {name!r}")
+                    raise dataclasses.FrozenInstanceError(f"cannot {'assign to' if value else 'delete'} field {name!r}")
                 (super(cls, self).__setattr__ if value else super(cls, self).__delattr__)(name, *value)
 
-            cls.__init__ = init
+            cls.__init__, cls.__signature__ = init, _Signature()
             if frozen:
                 cls.__setattr__ = cls.__delattr__ = refuse
             return cls

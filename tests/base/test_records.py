@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import pickle
 import typing
+from inspect import signature
 
 import pytest
 
@@ -97,12 +98,18 @@ def test_a_dataclass_takes_its_fields_and_no_others(args: tuple[typing.Any, ...]
         Held(*args, **named)
 
 
+def test_the_signature_of_a_dataclass_says_what_it_is_made_of() -> None:
+    told = "(first: 'int', second: 'str' = 'two', more: 'list[int]' = <factory>"
+    assert str(signature(Held)) == f"{told}) -> None"
+    assert str(signature(Named)) == f"{told}, *, third: 'float') -> None"
+
+
 def test_what_is_frozen_stays() -> None:
     for name in ("first", "new"):
-        with pytest.raises(dataclasses.FrozenInstanceError, match="cannot change"):
+        with pytest.raises(dataclasses.FrozenInstanceError, match="cannot assign to field"):
             setattr(Held(1), name, 2)
     derived = Derived()
-    with pytest.raises(dataclasses.FrozenInstanceError):
+    with pytest.raises(dataclasses.FrozenInstanceError, match="cannot delete field 'first'"):
         delattr(derived, "first")
     del derived.own
     changing = Changing()
