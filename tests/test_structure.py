@@ -204,7 +204,6 @@ UNNEEDED = {
     *("importlib.metadata", "importlib.resources"),
     *("numpy.ma", "numpy.typing", "numpy.polynomial", "numpy.random", "numpy.testing", "numpy.f2py"),
 }
-MADE_BY_THE_THOUSAND = ("deck", "rules")  # their dataclasses: with compiled code they are made quicker
 SUGGEST = ("suggest", "--exit-zero", "--quiet", "--td")  # -q costs click difflib
 CARD = ("card", "--tr", "0.02", "--td", "0.09")
 
@@ -248,15 +247,6 @@ def test_a_command_loads_only_what_its_answer_needs(args: tuple[str, ...], libra
 def test_an_answer_needs_little_of_what_python_has(args: tuple[str, ...]) -> None:
     mine = loaded(*args) - beside("click, numpy")
     assert not mine & (UNNEEDED if args[-1] == ENERGY else UNNEEDED - {"array"})
-
-
-@pytest.mark.parametrize("args", [(*SUGGEST, "0.064", ENERGY), ("check", DECK)])
-def test_nothing_is_compiled_for_the_records_that_a_command_begins_with(args: tuple[str, ...]) -> None:
-    mine = {name.removeprefix("d2rpick.") for name in loaded(*args)} & {*INNER} - {"base.records"}
-    froms = [(name, node) for name in mine for node in statements(name) if isinstance(node, ast.ImportFrom)]
-    theirs = {(name, f"{node.module}.{one.name}") for name, node in froms for one in node.names}
-    assert not [name for name, taken in theirs if taken == "typing.NamedTuple"]
-    assert {folder(name) for name, taken in theirs if taken == "dataclasses.dataclass"} <= {*MADE_BY_THE_THOUSAND}
 
 
 def test_a_small_deck_needs_little_of_what_python_has() -> None:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from d2rpick.api.cards import Cards
 from d2rpick.base.errors import if_written
 from d2rpick.base.files import write_whole
-from d2rpick.base.records import dataclass, field, fields
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence

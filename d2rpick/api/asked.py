@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from d2rpick.api import arguments
 from d2rpick.api.request import Request
 from d2rpick.base.errors import ArgumentError, Caution, FormatError, listing, name_units
-from d2rpick.base.records import NamedTuple
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.question import Reference
 from d2rpick.histories.names import Selection, asks_for_recommended
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypedDict, Unpack
 
 from d2rpick.api.request import OPTIONS, POSITIVE, TIME, UNLIMITED, Number, Option, Request, dashed, option, options_of
 from d2rpick.base.errors import ArgumentError, Caution
-from d2rpick.base.records import NamedTuple, dataclass, replace
+from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence

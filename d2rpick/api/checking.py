@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Unpack
 
@@ -12,7 +13,6 @@ from d2rpick.api.answer import Answer, frame_of
 from d2rpick.api.cards import SETTINGS
 from d2rpick.base.errors import Caution, ConfigurationError, D2RPickError, DeckError
 from d2rpick.base.files import STDIN
-from d2rpick.base.records import dataclass
 from d2rpick.deck import main_decks
 from d2rpick.deck.radioss_files import run_files
 from d2rpick.report.findings import FINDING, Checks

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
 from d2rpick.api.answer import Answer, Paged, frame_of, written
 from d2rpick.api.asked import model_of, request_of
 from d2rpick.base.errors import ArgumentError
-from d2rpick.base.records import dataclass
 from d2rpick.choice import calibration, sets_of_parts
 from d2rpick.choice.cost import Weights, weights_as_toml
 from d2rpick.report.tables import positional

@@ -5,12 +5,12 @@ from __future__ import annotations
 import errno
 import hashlib
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from d2rpick.api.answer import Paged
 from d2rpick.api.cards import Cards, numbers
 from d2rpick.base.errors import D2RPickError
-from d2rpick.base.records import dataclass
 from d2rpick.choice.cost import CostModel
 from d2rpick.choice.deck_of_run import doubts_of_solver
 from d2rpick.deck import read_inventory

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Unpack
 
 from d2rpick.api import arguments
@@ -10,7 +11,6 @@ from d2rpick.api.asked import Asked, ask, request_of
 from d2rpick.api.cards import CardOptions, Cards, JudgedCard, judged
 from d2rpick.api.request import NOT_NEGATIVE, check_window
 from d2rpick.base.errors import ArgumentError
-from d2rpick.base.records import dataclass
 from d2rpick.choice import plan as planning, trade_off
 
 if TYPE_CHECKING:

@@ -6,12 +6,13 @@ Python, and the command line that asks the same again.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field, fields
 from functools import cache
 from math import inf
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import ArgumentError
-from d2rpick.base.records import NamedTuple, dataclass, field, fields
+from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping
@@ -98,7 +99,7 @@ class Request:
     """
 
     deck: str | None = option("Main deck of the run.", "file", "DECK")
-    weights: str | Weights | None = option(
+    weights: str | Weights | None = option(  # noqa: RUF009
         "Cost of an element by formulation, as d2rpick calibrate writes it.  [default: measured with OpenRadioss]",
         *("file", "FILE"),
     )

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import IO, TYPE_CHECKING, Any
 
 from d2rpick.api import arguments
 from d2rpick.base.errors import if_written
-from d2rpick.base.records import dataclass
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import chain
 from os.path import abspath
@@ -20,7 +20,6 @@ from d2rpick.api.asked import request_of
 from d2rpick.api.request import Request, needed_time, time_or_window
 from d2rpick.base.errors import INTERNAL_ERROR, FormatError
 from d2rpick.base.files import append_whole, record_of, signed
-from d2rpick.base.records import dataclass, replace
 from d2rpick.base.workers import Farm, on_cores
 from d2rpick.choice import study as core
 from d2rpick.choice.study import FAILED, UNREADABLE, Question, Stamp, StudyRow, stamps

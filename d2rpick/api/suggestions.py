@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Unpack
 
@@ -11,7 +12,6 @@ from d2rpick.api.asked import Asked, ask, request_of
 from d2rpick.api.cards import CardOptions, Cards, JudgedCard, judged as card_judged
 from d2rpick.api.request import FRACTION, MIN_MEAN_ENERGY, time_or_window
 from d2rpick.base.errors import ArgumentError
-from d2rpick.base.records import dataclass, replace
 from d2rpick.choice import answers, of_run
 from d2rpick.histories.digits import as_read
 

@@ -6,7 +6,7 @@ from bisect import bisect_right
 from errno import EBADF
 from typing import TYPE_CHECKING, Final, TypeVar
 
-from d2rpick.base.records import NamedTuple
+from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Sequence

@@ -13,7 +13,7 @@ from errno import ELOOP
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from d2rpick.base.errors import D2RPickError
-from d2rpick.base.records import NamedTuple
+from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:
     from io import FileIO

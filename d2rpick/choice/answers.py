@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import Caution, RangeError
-from d2rpick.base.records import NamedTuple, dataclass
 from d2rpick.choice.candidates import Candidate, Candidates, Pair, find_candidates, judge
 from d2rpick.choice.expectation import Expectation, against_td, expectation, most_energy
 from d2rpick.choice.quality import Quality, quality_of

@@ -12,13 +12,13 @@ measured ratio to the others.
 from __future__ import annotations
 
 import hashlib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from d2rpick.base.errors import Caution, ConfigurationError, DeckError, FormatError
-from d2rpick.base.records import dataclass
 from d2rpick.choice.cost import ELEMENT_SHARE, MEASURED, POINT, RIGID_NODE, Weights
 from d2rpick.deck import ls_dyna_inventory, main_decks, radioss_inventory
 from d2rpick.deck.ls_dyna_parts import read_parts

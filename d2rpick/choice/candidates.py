@@ -6,13 +6,13 @@ They are judged as columns; a `Candidate` is made only where one is looked at.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate, chain, pairwise
-from typing import TYPE_CHECKING, Any, Final, overload
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, overload
 
 import numpy as np
 
-from d2rpick.base.records import NamedTuple, dataclass
 from d2rpick.choice.expectation import Objection, objections
 from d2rpick.histories.digits import not_before
 from d2rpick.vibration import measures

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
-from d2rpick.base.records import NamedTuple
 from d2rpick.choice.warnings import end_of_flight, end_of_load
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.digits import above, first_as_read

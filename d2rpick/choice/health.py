@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from d2rpick.base.errors import Caution, RangeError
-from d2rpick.base.records import NamedTuple
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.flight.flight import MOST_WORK
 from d2rpick.flight.internal_energy import largest
 from d2rpick.flight.work import FEWEST_STATES, work_beyond_gravity

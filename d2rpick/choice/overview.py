@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.errors import Caution, FormatError, RangeError, if_written, listing
-from d2rpick.base.records import NamedTuple
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.flights import flights_of
 from d2rpick.choice.health import Health, assess, cautions_of_health, refuse_unsound, unsound
 from d2rpick.choice.question import Reference, Settings

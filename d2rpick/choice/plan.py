@@ -11,12 +11,12 @@ Each window that locks in energy costs a run of its own, so a short one is left 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from d2rpick.base.errors import Caution
-from d2rpick.base.records import NamedTuple, dataclass, replace
 from d2rpick.choice.flights import flights_of, last_td
 from d2rpick.choice.health import refuse_unsound
 from d2rpick.choice.of_run import suggest_of

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from d2rpick.base.records import NamedTuple, dataclass, field
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
 from d2rpick.vibration.measures import run_time_share

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from d2rpick.base.errors import Caution, FormatError, RangeError, are, name_units
-from d2rpick.base.records import dataclass, replace
 from d2rpick.choice.candidates import ONE_BODY
 from d2rpick.choice.cost import CostModel, Share, Weights
 from d2rpick.choice.deck_of_run import (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from statistics import median, median_high
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -12,7 +13,6 @@ import numpy as np
 
 from d2rpick.base import __version__
 from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, Caution, D2RPickError, RangeError, listing, one_line
-from d2rpick.base.records import dataclass, field, replace
 from d2rpick.choice.of_run import suggest_of
 from d2rpick.choice.question import read
 from d2rpick.choice.ranking import EQUALLY_GOOD

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.errors import Caution, FormatError, RangeError, if_written, listing
-from d2rpick.base.records import NamedTuple
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.momentum import believed
 from d2rpick.histories.history import Given, History

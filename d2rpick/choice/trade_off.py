@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import accumulate
 from typing import TYPE_CHECKING, Final
@@ -9,7 +10,6 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.errors import Caution, RangeError
-from d2rpick.base.records import dataclass, replace
 from d2rpick.choice.answers import Suggestion, suggest_at
 from d2rpick.choice.candidates import find_candidates, judged_of
 from d2rpick.choice.flights import longest_flight

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import click
@@ -20,7 +21,6 @@ from d2rpick.api.request import (
     time_or_window,
 )
 from d2rpick.base.errors import ArgumentError, DeckError, printable
-from d2rpick.base.records import replace
 from d2rpick.cli import options
 from d2rpick.cli.options import ANSWER, DECK, DECK_OF_PARTS, FILES, HISTORY, ONE_RUN, RESULT, WINDOW
 from d2rpick.cli.output import IN_WORDS, Output, check_switched, in_words, opened

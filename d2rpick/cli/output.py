@@ -6,6 +6,7 @@ import os
 import re
 import sys
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, TextIO
 
 import click
@@ -14,7 +15,6 @@ from d2rpick.api.cards import Cards, JudgedCard
 from d2rpick.api.request import OPTIONS, UNLIMITED, Request, dashed, option, options_of
 from d2rpick.base.errors import FORESEEN, ArgumentError, D2RPickError, listing, one_line, printable
 from d2rpick.base.files import write_whole
-from d2rpick.base.records import dataclass, replace
 from d2rpick.cli.progress import on_terminal, reading
 
 if TYPE_CHECKING:

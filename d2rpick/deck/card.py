@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from d2rpick.base.records import NamedTuple
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.expression import ExpressionError, names_in, number
 from d2rpick.deck.fields import STANDARD, Field, Row, T, Value
 

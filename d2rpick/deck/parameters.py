@@ -7,7 +7,7 @@ import re
 from typing import TYPE_CHECKING
 
 from d2rpick.base.graph import reached
-from d2rpick.base.records import NamedTuple
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.expression import REFERENCE, ExpressionError, Number, evaluate, names_in, number
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ import os
 import re
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.records import NamedTuple
+from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:
     from d2rpick.deck.fields import Field

@@ -12,7 +12,7 @@ from itertools import chain
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import DeckError
-from d2rpick.base.records import NamedTuple
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.card import Card, Transform
 from d2rpick.deck.fields import LONG, STANDARD, Field, Problem, Row
 from d2rpick.deck.parameters import Scope

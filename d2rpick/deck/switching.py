@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from d2rpick.base.records import NamedTuple
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.card import Card
 from d2rpick.deck.fields import Field, Row, Value
 from d2rpick.deck.reader import SWITCHING, Deck

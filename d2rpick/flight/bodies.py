@@ -6,11 +6,10 @@ part moves as the part does: its momentum is kept, and nothing in it is frozen e
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from d2rpick.base.records import NamedTuple
 from d2rpick.flight.position_error import Drift, apart_in_flight, drift_in_flight
 
 if TYPE_CHECKING:

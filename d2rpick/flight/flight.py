@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.records import NamedTuple
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.flight.internal_energy import landing_after, moves_as_a_whole, quiet_time, settled_from
 from d2rpick.flight.window import SHORTEST, all_windows, marks, unheld
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.records import NamedTuple
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.flight.window import FEWEST, SHORTEST
 from d2rpick.histories.samples import find_crossings, window
 

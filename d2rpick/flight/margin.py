@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.records import NamedTuple
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.samples import window
 
 if TYPE_CHECKING:

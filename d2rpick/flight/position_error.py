@@ -10,11 +10,10 @@ from __future__ import annotations
 
 from functools import cached_property
 from itertools import chain
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.base.records import NamedTuple
 from d2rpick.flight.rotation import least_rests, least_ways, off_the_circle, periods_of, steady_rotation
 from d2rpick.flight.turning import Flying, turning_in_flight
 from d2rpick.flight.window import FEWEST

@@ -6,11 +6,10 @@ these are taken off is how the parts move against each other, seen from a frame 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.base.records import NamedTuple
 from d2rpick.histories.samples import bent, integral
 
 if TYPE_CHECKING:

@@ -16,11 +16,10 @@ its mounts is not seen.  Places come from where the deck puts the parts, and the
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.base.records import NamedTuple
 from d2rpick.histories.samples import integral, window
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ import numpy as np
 
 from d2rpick.base.errors import ChangedError, FormatError
 from d2rpick.base.files import FileState, at_rest, settled_state
-from d2rpick.base.records import NamedTuple
+from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, TypeAlias, TypeVar
 
 import numpy as np
 
 from d2rpick.base.errors import HistoryError, RangeError
-from d2rpick.base.records import NamedTuple, dataclass, field, fields, replace
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.digits import told_apart
 from d2rpick.histories.samples import find_turns, window
 from d2rpick.histories.surroundings import UNKNOWN, Surroundings

@@ -11,7 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Final, Protocol, cast
 
 from d2rpick.base.errors import FormatError
-from d2rpick.base.records import NamedTuple
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.companions import check_companions, check_legs
 from d2rpick.histories.database import Database, Legs
 from d2rpick.histories.names import Selection

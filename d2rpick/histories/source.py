@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.base.files import STDIN, FileState, bound, unpacked_beyond
-from d2rpick.base.records import NamedTuple
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.content import OnDisk, stored
 from d2rpick.histories.names import in_seconds, near_miss
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import re
 from collections import Counter
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base import __version__
 from d2rpick.base.errors import Caution, name_units, printable
 from d2rpick.base.files import STDIN
-from d2rpick.base.records import dataclass, field, replace
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, kind_of, many, one_of, row
 from d2rpick.rules import RULES, Checked, CheckedWindow, find_rules

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from d2rpick.base.errors import listing, printable
-from d2rpick.base.records import NamedTuple
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice import health as limits
 from d2rpick.flight.flight import MOST_WORK
 from d2rpick.report.tables import measure

@@ -12,8 +12,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import ConfigurationError
-from d2rpick.base.records import NamedTuple
 from d2rpick.base.settings import RULE_KEYS, nearest_settings, refuse_unknown
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck import radioss_files
 from d2rpick.deck.reader import Deck, read_deck
 from d2rpick.deck.source import SourceFile

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, one_line
-from d2rpick.base.records import NamedTuple
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.ls_dyna_parts import Constraint, Parts, read_constraints, read_parts, read_sections
 from d2rpick.deck.switching import Event, Header, SwitchSet, Window, Windows, find_windows, read_switching
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import time
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import Caution, D2RPickError, FormatError, HistoryError
 from d2rpick.base.files import append_whole, record_of, signed, write_whole
-from d2rpick.base.records import dataclass
 from d2rpick.choice.deck_of_run import in_deck
 from d2rpick.deck.model import DISCRETE
 from d2rpick.deck.writing import RESTARTS, DrivenDeck

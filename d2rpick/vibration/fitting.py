@@ -13,11 +13,10 @@ from __future__ import annotations
 
 from functools import partial
 from itertools import combinations
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.base.records import NamedTuple
 from d2rpick.histories.samples import integral, median
 from d2rpick.vibration.modes import BLOCK, energy_and_jacobian, sum_and_jacobian
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from functools import cache, partial
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.base.records import NamedTuple
 from d2rpick.histories.history import Memory
 from d2rpick.vibration import fitting
 from d2rpick.vibration.fitting import MAX_MISFIT

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from d2rpick.base.records import NamedTuple
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.samples import narrow
 
 if TYPE_CHECKING:

@@ -8,13 +8,13 @@ around td, and the deformations that can be compared with those at td, if any ar
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from d2rpick.base.errors import listing
-from d2rpick.base.records import NamedTuple, dataclass, replace
 from d2rpick.vibration import measures
 from d2rpick.vibration.fitting import MAX_MISFIT
 from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD, Identification, samples_per_period

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from math import floor
 from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
 
-from d2rpick.base.records import dataclass
 from d2rpick.histories.samples import narrow
 
 if TYPE_CHECKING:

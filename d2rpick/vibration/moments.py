@@ -5,13 +5,13 @@ The energy around a td is known by its samples, or by modes that describe them.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.base.records import NamedTuple, dataclass
 from d2rpick.histories.samples import find_crossings, find_turns, first_above
 from d2rpick.vibration import measures
 from d2rpick.vibration.modes import Mode

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from functools import partial
 from math import ceil, log
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from d2rpick.base.records import NamedTuple
 from d2rpick.histories.history import History, Memory, Samples
 from d2rpick.vibration.identify import Identification, identify
 from d2rpick.vibration.modes import BLOCK

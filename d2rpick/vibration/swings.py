@@ -7,11 +7,10 @@ on a smooth floor, another mode holds the rest of the energy there, and nothing 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.base.records import NamedTuple
 from d2rpick.histories.samples import find_turns
 from d2rpick.vibration.measures import wrong_sign
 

@@ -7,11 +7,10 @@ what one mode leaves of a record.
 from __future__ import annotations
 
 from math import sqrt
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.base.records import NamedTuple
 from d2rpick.histories.samples import integral
 from d2rpick.vibration.fitting import cell_means
 from d2rpick.vibration.identify import MIN_SAMPLES_BESIDE, MIN_SAMPLES_PER_PERIOD, identify_beside, samples_per_period

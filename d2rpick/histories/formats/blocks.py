@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from d2rpick.base import __version__
-from d2rpick.base.records import NamedTuple
 
 if TYPE_CHECKING:
     import re

@@ -11,12 +11,11 @@ from __future__ import annotations
 
 from array import array
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from d2rpick.base.errors import FormatError
-from d2rpick.base.records import NamedTuple
 from d2rpick.histories.content import content_of, line_at
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, Stretch, head, like_example

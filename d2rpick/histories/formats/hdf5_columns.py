@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from d2rpick.base.errors import FormatError
-from d2rpick.base.records import NamedTuple
 from d2rpick.histories.formats.hdf5_damage import check_data
 
 if TYPE_CHECKING:

@@ -6,10 +6,9 @@ import re
 from collections import Counter
 from itertools import islice
 from operator import itemgetter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.base.errors import FormatError, listing
-from d2rpick.base.records import NamedTuple
 from d2rpick.histories.formats.text import HEAD, Text
 from d2rpick.histories.names import is_time, is_unit, unit_of
 

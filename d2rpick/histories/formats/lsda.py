@@ -18,12 +18,11 @@ import re
 import struct
 from array import array
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from d2rpick.base.errors import FormatError
-from d2rpick.base.records import NamedTuple
 from d2rpick.histories.content import Content, content_of
 from d2rpick.histories.formats.blocks import repeats
 

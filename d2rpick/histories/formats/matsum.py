@@ -11,10 +11,9 @@ from __future__ import annotations
 import re
 from collections import Counter
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import FormatError
-from d2rpick.base.records import NamedTuple
 from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, written_head
 from d2rpick.histories.formats.fixed_text import PORTIONS, Blocks, Portions
 from d2rpick.histories.names import Part, Selection

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from functools import cached_property
 from itertools import chain, islice
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import FormatError
 from d2rpick.base.files import beyond, long_line
-from d2rpick.base.records import NamedTuple
 from d2rpick.histories.content import Content, OnDisk, line_at
 
 if TYPE_CHECKING:

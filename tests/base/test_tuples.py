@@ -1,0 +1,40 @@
+"""Named tuples of the project behave as those of typing do."""
+
+from __future__ import annotations
+
+import pickle
+import typing
+
+from d2rpick.base.tuples import NamedTuple
+
+
+class Ours(NamedTuple):
+    """A pair."""
+
+    first: int
+    second: str = "two"
+
+    @property
+    def both(self) -> str:
+        """The two of them."""
+        return f"{self.first} {self.second}"
+
+
+class Theirs(typing.NamedTuple):
+    """A pair."""
+
+    first: int
+    second: str = "two"
+
+
+def test_fields_defaults_and_names_are_those_of_typing() -> None:
+    assert (Ours._fields, Ours._field_defaults) == (Theirs._fields, Theirs._field_defaults)
+    assert (Ours.__module__, Ours.__doc__) == (Theirs.__module__, Theirs.__doc__)
+    assert repr(Ours(1)) == repr(Theirs(1)).replace("Theirs", "Ours")
+
+
+def test_it_is_a_tuple_with_what_its_class_defines() -> None:
+    one = Ours(1)
+    assert one == (1, "two")
+    assert one._replace(first=3).both == "3 two"
+    assert pickle.loads(pickle.dumps(one)) == one
