@@ -186,9 +186,7 @@ def loaded(*args: str) -> frozenset[str]:
 @cache
 def beside(libraries: str) -> frozenset[str]:
     """Modules of a process that imports nothing but some libraries."""
-    command = [sys.executable, "-c", f"import sys, {libraries}; print(*sys.modules)"]
-    found = subprocess.run(command, capture_output=True, text=True, check=True, timeout=TIME_LIMIT)
-    return frozenset(found.stdout.split())
+    return frozenset(printed_by(f"import sys, {libraries}; print(*sys.modules)").split())
 
 
 def share(modules: frozenset[str]) -> float:

@@ -10,7 +10,7 @@ import os
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn, TypedDict
 
-from d2rpick.api.request import OPTIONS, Number
+from d2rpick.api.request import OPTIONS, TIME, Number
 from d2rpick.base.errors import DeckError
 
 if TYPE_CHECKING:
@@ -49,14 +49,14 @@ class Choosing(TypedDict, total=False):
     step_ratio: float
 
 
-def number(name: str, value: object, low: float = -math.inf, high: float = math.inf) -> float:
+def number(name: str, value: object, limits: Number = TIME) -> float:
     """Give a finite number within its limits.
 
     Examples
     --------
     >>> number("td", 1)
     1.0
-    >>> number("margin", -1, 0.0)
+    >>> number("margin", -1, Number(0.0))
     Traceback (most recent call last):
     ValueError: margin is -1, a number of at least 0 was expected
     """
@@ -65,10 +65,8 @@ def number(name: str, value: object, low: float = -math.inf, high: float = math.
     found = float(value)
     if not math.isfinite(found):
         raise ValueError(f"{name} is {found}, a finite number was expected")
-    if found < low:
-        raise ValueError(f"{name} is {found:g}, a number of at least {low:g} was expected")
-    if found > high:
-        raise ValueError(f"{name} is {found:g}, a number of at most {high:g} was expected")
+    if limit := limits.missed(found):
+        raise ValueError(f"{name} is {found:g}, a number {limit} was expected")
     return found
 
 
@@ -80,9 +78,9 @@ def without_unit(value: object) -> str:
     return "" if seconds is None else f": give a number in the unit of the history, {seconds:g} where it is s"
 
 
-def optional(name: str, value: object) -> float | None:
-    """Give a finite number, None where none is given."""
-    return None if value is None else number(name, value)
+def optional(name: str, value: object, limits: Number = TIME) -> float | None:
+    """Give a finite number within its limits, None where none is given."""
+    return None if value is None else number(name, value, limits)
 
 
 def window(name: str, value: object) -> tuple[float, float] | None:
@@ -151,7 +149,7 @@ def whole(name: str, value: object, low: int) -> int:
     """
     if isinstance(value, bool) or not hasattr(value, "__index__"):
         raise TypeError(f"{name} is {value!r}, a whole number was expected")
-    return int(number(name, value, low))
+    return int(number(name, value, Number(low)))
 
 
 def paths(name: str, value: Path | Iterable[Path]) -> tuple[str, ...]:
@@ -202,9 +200,9 @@ def chosen(choosing: Choosing) -> dict[str, Any]:
     if (oscillator is None) != (given.get("v0") is None):
         raise ValueError("oscillator and v0 go together: the one vibrates because of the other")
     for name in given.keys() - {"replay", "strict", "fit_window"}:
-        limits = OPTIONS[name].kind
+        limits: Any = OPTIONS[name].kind
         if given[name] is not None or name == "tolerance":
-            given[name] = number(name, given[name], *limits[:2] if isinstance(limits, Number) else ())
+            given[name] = number(name, given[name], limits)
     given["fit_window"] = window("fit_window", given.get("fit_window"))
     given["no_verify"] = not given.pop("replay", True)
     given["strict"] = bool(given.get("strict"))

@@ -69,10 +69,7 @@ def _checked(name: str, value: Any, option: Option) -> Any:
     if isinstance(kind, range):
         return arguments.whole(name, value, kind.start)
     if isinstance(kind, Number):
-        found = arguments.number(name, value, *kind[:2])
-        if kind.above and not found > kind.low:
-            raise ValueError(f"{name} is {found:g}, a number above {kind.low:g} was expected")
-        return found
+        return arguments.number(name, value, kind)
     if not isinstance(value, str):
         raise TypeError(f"{name} is {value!r}, a text was expected")
     if kind == "solver" and value not in solvers():

@@ -14,7 +14,7 @@ from d2rpick.choice.cost import Weights, weights_as_toml
 from d2rpick.report.tables import positional
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable
     from pathlib import Path
 
     import pandas as pd
@@ -192,11 +192,7 @@ def calibrate(runs: arguments.Path | Iterable[arguments.Path]) -> Calibration:
     >>> round(found.weights.element_share, 2)
     0.65
     """
-    return fitted(arguments.paths("runs", runs))
-
-
-def fitted(runs: Sequence[str]) -> Calibration:
-    """Fit the cost of elements to what the runs in folders took."""
-    observations, cautions = calibration.observations_of_runs(runs)
-    command = ("calibrate", *positional(runs))
+    names = arguments.paths("runs", runs)
+    observations, cautions = calibration.observations_of_runs(names)
+    command = ("calibrate", *positional(names))
     return Calibration.of(calibration.calibrate(observations), cautions=cautions, command=command)

@@ -9,7 +9,7 @@ from d2rpick.api import arguments
 from d2rpick.api.answer import RunAnswer, frame_of
 from d2rpick.api.asked import Asked, ask, request_of
 from d2rpick.api.cards import CardOptions, Cards, JudgedCard, judged
-from d2rpick.api.request import check_window
+from d2rpick.api.request import NOT_NEGATIVE, check_window
 from d2rpick.base.errors import ArgumentError
 from d2rpick.choice import plan as planning, trade_off
 
@@ -219,7 +219,7 @@ def plan(
     >>> [(round(tr, 3), round(td, 3)) for tr, td in found.windows]
     [(0.097, 0.37)]
     """
-    shortest = None if min_rigid is None else arguments.number("min_rigid", min_rigid, 0.0)
+    shortest = arguments.optional("min_rigid", min_rigid, NOT_NEGATIVE)
     windows = [arguments.window(f"done[{number}]", list(pair)) or (0.0, 0.0) for number, pair in enumerate(done)]
     asked = ask(run, request_of(run, parts, flying, deck, weights, choosing))
     return planned(asked, shortest, windows, before)

@@ -31,6 +31,12 @@ class Number(NamedTuple):
     high: float = inf
     above: bool = False
 
+    def missed(self, value: float) -> str:
+        """Say which limit a value is beyond, nothing where it is within."""
+        if value < self.low or (self.above and value == self.low):
+            return f"{'above' if self.above else 'of at least'} {self.low:g}"
+        return f"of at most {self.high:g}" if value > self.high else ""
+
 
 TIME, POSITIVE, NOT_NEGATIVE, FRACTION = Number(), Number(0.0, above=True), Number(0.0), Number(0.0, 1.0)
 MIN_MEAN_ENERGY: Final = 0.7  # of the reference's; in computed runs that were switched well it was 0.77 and more
@@ -58,6 +64,10 @@ def option(text: str, kind: Any = "text", metavar: str | None = None, *, default
     """Describe the field of a table of options; what can be repeated is an empty tuple where it is not given."""
     default = () if more.get("many") else default
     return field(default=default, metadata={"option": Option(text, kind, metavar, **more)})
+
+
+def _of_oscillator(text: str, kind: Number = POSITIVE, *others: str) -> Any:
+    return option(text, kind, instead_of=(*others, "fit_window", "no_verify"))
 
 
 @cache
@@ -127,20 +137,12 @@ class Request:
     )
     max_kinetic_share: float | None = option("Reject a td with a larger kinetic share.", NOT_NEGATIVE, "K")
     max_residual: float | None = option("Reject a pair with a larger residual.", NOT_NEGATIVE, "R")
-    stiffness: float | None = option("Spring k.", POSITIVE, instead_of=("fit_window", "no_verify"))
-    mass: float | None = option("Suspended mass M.", POSITIVE, instead_of=("fit_window", "no_verify"))
-    frame_mass: float | None = option(
-        "Frame mass m (or give --beta).", POSITIVE, instead_of=("beta", "fit_window", "no_verify")
-    )
-    beta: float | None = option(
-        "Mass ratio M/m (instead of --frame-mass).", POSITIVE, instead_of=("frame_mass", "fit_window", "no_verify")
-    )
-    alpha: float | None = option(
-        "Rate of damping proportional to mass.", NOT_NEGATIVE, instead_of=("fit_window", "no_verify")
-    )
-    v0: float | None = option(
-        "Velocity of the frame at time 0; all else at rest.", TIME, instead_of=("vz0", "fit_window", "no_verify")
-    )
+    stiffness: float | None = _of_oscillator("Spring k.")
+    mass: float | None = _of_oscillator("Suspended mass M.")
+    frame_mass: float | None = _of_oscillator("Frame mass m (or give --beta).", POSITIVE, "beta")
+    beta: float | None = _of_oscillator("Mass ratio M/m (instead of --frame-mass).", POSITIVE, "frame_mass")
+    alpha: float | None = _of_oscillator("Rate of damping proportional to mass.", NOT_NEGATIVE)
+    v0: float | None = _of_oscillator("Velocity of the frame at time 0; all else at rest.", TIME, "vz0")
     fit_window: tuple[float, float] | None = option(
         "Identify the oscillator only here.", TIME, "LO HI", pair=True, instead_of=("stiffness", "no_verify")
     )

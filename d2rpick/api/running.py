@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.api import arguments
 from d2rpick.api.cards import numbers
+from d2rpick.api.request import NOT_NEGATIVE
 from d2rpick.histories.names import Selection
 
 if TYPE_CHECKING:
@@ -75,23 +76,14 @@ def first(
     ...
     d2rpick.base.errors.ArgumentError: `wait` is not given, and sample_data/rollover_box.k does not tell it: ...
     """
-    names = arguments.part_names("parts", parts)
-    least = None if wait is None else arguments.number("wait", wait, 0.0)
-    later = None if after is None else arguments.number("after", after, 0.0)
-    return prepared(
-        arguments.one_path("deck", deck), arguments.one_path("output_dir", output_dir), names, least, later, overwrite
-    )
-
-
-def prepared(
-    deck: str, folder: str, parts: tuple[str, ...], wait: float | None, after: float | None, overwrite: bool
-) -> FirstRun:
-    """Write the copy of the deck."""
     from d2rpick.deck.writing import write_deck
     from d2rpick.running.first import first_card
 
-    found = first_card(deck, numbers("parts", parts), wait, after)
-    files = write_deck(deck, found.card, folder, overwrite=overwrite)
+    names = arguments.part_names("parts", parts)
+    times = arguments.optional("wait", wait, NOT_NEGATIVE), arguments.optional("after", after, NOT_NEGATIVE)
+    main, folder = arguments.one_path("deck", deck), arguments.one_path("output_dir", output_dir)
+    found = first_card(main, numbers("parts", names), *times)
+    files = write_deck(main, found.card, folder, overwrite=overwrite)
     return FirstRun(tuple(files), found.wait.time, found.wait.reason, found.notes)
 
 

@@ -10,7 +10,7 @@ from d2rpick.api import arguments
 from d2rpick.api.answer import RunAnswer, frame_of
 from d2rpick.api.asked import Asked, ask, request_of
 from d2rpick.api.cards import CardOptions, Cards, JudgedCard, judged as card_judged
-from d2rpick.api.request import MIN_MEAN_ENERGY, time_or_window
+from d2rpick.api.request import FRACTION, MIN_MEAN_ENERGY, time_or_window
 from d2rpick.base.errors import ArgumentError
 from d2rpick.choice import answers
 from d2rpick.histories.digits import as_read
@@ -241,7 +241,7 @@ def verify(
     True
     """
     pair = arguments.optional("tr", tr), arguments.optional("td", td)
-    least = arguments.number("min_mean_energy", min_mean_energy, 0.0, 1.0)
+    least = arguments.number("min_mean_energy", min_mean_energy, FRACTION)
     asked = ask(run, request_of(run, parts, flying, deck, weights, choosing))
     return judged(asked, *pair, switched, least)
 

@@ -9,14 +9,13 @@ from concurrent.futures.process import BrokenProcessPool
 from itertools import islice
 from multiprocessing import Pipe, get_all_start_methods, get_context, set_forkserver_preload
 from threading import Thread
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeVar
 
 from d2rpick.base.errors import D2RPickError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
     from multiprocessing.connection import Connection
-    from types import TracebackType
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -29,20 +28,6 @@ _WAITING = 2
 _LEAST_ON_CLUSTER = 64
 # [s] until a scheduler has to answer.
 _PATIENCE = 10
-
-
-class Farm(Protocol):
-    """What computes calls."""
-
-    def answers(self, function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Finished]:
-        """Compute ``function`` for all items, taken as there is room; answers come as they are finished."""
-
-    def __enter__(self) -> Self: ...
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Give up what has not begun."""
 
 
 def cores() -> int:
@@ -61,17 +46,17 @@ class Finished(NamedTuple):
     error: BaseException | None
 
 
-class Here:
-    """In the calling process, one call after the other."""
+class Farm:
+    """What computes calls: this one in the calling process, one after the other."""
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        pass
+        """Give up what has not begun."""
 
     def answers(self, function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Finished]:
-        """Compute each call when its answer is asked for."""
+        """Compute ``function`` for all items, taken as there is room; answers come as they are finished."""
         return (_computed(number, function, item) for number, item in enumerate(items))
 
 
@@ -82,7 +67,7 @@ def _computed(number: int, function: Callable[[Item], Any], item: Item) -> Finis
         return Finished(number, None, error)
 
 
-class Cores:
+class Cores(Farm):
     """A pool of processes on this machine, which have imported ``module`` before they begin."""
 
     def __init__(self, processes: int, module: str) -> None:
@@ -90,9 +75,6 @@ class Cores:
         self.processes, self.room = processes, (1 + _WAITING) * processes
         self._held, self._leash = Pipe(duplex=False)  # the processes see when this end of it is closed
         self._pool = self._new(processes)
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._pool.shutdown(wait=False, cancel_futures=True)
@@ -182,10 +164,10 @@ def _start_server(module: str) -> None:
 
 def on_cores(processes: int, module: str) -> Farm:
     """Choose where to compute on this machine; for a single process, in this one."""
-    return Cores(processes, module) if processes > 1 else Here()
+    return Cores(processes, module) if processes > 1 else Farm()
 
 
-class Cluster:
+class Cluster(Farm):
     """A Dask cluster that is running already, under the address of its scheduler, which has to answer in time [s].
 
     Raises
@@ -207,9 +189,6 @@ class Cluster:
             raise D2RPickError(f"{address}: no answer from a Dask scheduler ({what}); check the address") from None
         self.threads = sum(self._client.nthreads().values())
         self.room = max(_LEAST_ON_CLUSTER, (1 + _WAITING) * self.threads)
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._client.close()

@@ -20,39 +20,31 @@ from d2rpick.base.errors import one_line
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-# Each command in a line, for the help, which does without the modules behind them: those of a run, of many runs and of
-# decks; and what computes runs of its own.
+# Each command with its module and in a line, for the help, which does without the modules behind them: those of a run,
+# of many runs and of decks; and what computes runs of its own.
 _WORK: Final = {
-    "info": "Show what is in the files of a run.",
-    "drive": "Compute a Radioss run that switches itself.",
-    "plan": "Plan the rigid windows of all flights of a run.",
-    "suggest": "Choose tr for a td, or both times.",
-    "explore": "Show what each td costs.",
-    "parts": "Say which parts may be switched, and what that saves.",
-    "verify": "Judge a pair of times, or a finished switched run.",
-    "study": "Choose tr for many runs, and one tr for all.",
-    "follow": "Watch a run while it is computed: when it flies, when to switch.",
-    "extract": "Write the chosen energy as csv or hdf5.",
-    "card": "Print solver input for switching windows.",
-    "first": "Write a deck whose first run switches itself.",
-    "check": "Check the switches of decks, also against a run.",
-    "rule": "Explain a rule of check, or list all.",
-    "calibrate": "Fit the cost of elements to runs of a site.",
+    "info": ("one_run", "Show what is in the files of a run."),
+    "drive": ("running", "Compute a Radioss run that switches itself."),
+    "plan": ("one_run", "Plan the rigid windows of all flights of a run."),
+    "suggest": ("one_run", "Choose tr for a td, or both times."),
+    "explore": ("one_run", "Show what each td costs."),
+    "parts": ("one_run", "Say which parts may be switched, and what that saves."),
+    "verify": ("one_run", "Judge a pair of times, or a finished switched run."),
+    "study": ("study", "Choose tr for many runs, and one tr for all."),
+    "follow": ("running", "Watch a run while it is computed: when it flies, when to switch."),
+    "extract": ("one_run", "Write the chosen energy as csv or hdf5."),
+    "card": ("decks", "Print solver input for switching windows."),
+    "first": ("running", "Write a deck whose first run switches itself."),
+    "check": ("decks", "Check the switches of decks, also against a run."),
+    "rule": ("decks", "Explain a rule of check, or list all."),
+    "calibrate": ("study", "Fit the cost of elements to runs of a site."),
 }
 _EXPERIMENTS: Final = {
-    "replay": "Compute the floating oscillator in closed form.",
-    "rollover": "Compute a box that trips or falls, flies and lands.",
-    "reproduce": "Reproduce the published results.",
+    "replay": ("models", "Compute the floating oscillator in closed form."),
+    "rollover": ("models", "Compute a box that trips or falls, flies and lands."),
+    "reproduce": ("models", "Reproduce the published results."),
 }
 COMMANDS: Final = _WORK | _EXPERIMENTS
-# Modules of those that stand in one of another name.
-_MODULES: Final = {
-    **dict.fromkeys(("info", "extract", "suggest", "explore", "verify", "parts"), "one_run"),
-    **dict.fromkeys(_EXPERIMENTS, "models"),
-    **dict.fromkeys(("drive", "follow", "first"), "running"),
-    **dict.fromkeys(("card", "check", "rule"), "decks"),
-    "calibrate": "study",
-}
 COULD_NOT_RUN: Final = 2
 BROKEN_PIPE: Final = 141  # what a shell reports for a program that SIGPIPE ended
 _Made = TypeVar("_Made", bound=click.Command)
@@ -98,12 +90,12 @@ class _Group(Documented, click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         for title, commands in (("Commands", _WORK), ("Experiments", _EXPERIMENTS)):
             with formatter.section(title):
-                formatter.write_dl(list(commands.items()))
+                formatter.write_dl([(name, line) for name, (_, line) in commands.items()])
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:  # noqa: ARG002
         if name not in COMMANDS:
             return None
-        command: click.Command = getattr(importlib.import_module(f"d2rpick.cli.{_MODULES.get(name, name)}"), name)
+        command: click.Command = getattr(importlib.import_module(f"d2rpick.cli.{COMMANDS[name][0]}"), name)
         return command
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from d2rpick.api.models import HISTORIES, Box, Motion, Scanning, unbalanced
+from d2rpick.api.request import options_of
 from d2rpick.base.errors import ArgumentError, D2RPickError
 from d2rpick.cli import options
 from d2rpick.cli.options import FILES, RESULT
@@ -23,9 +24,10 @@ _NEEDED: Final = {"required": True}
 
 
 @options.command
-@options.takes_all(
-    *(Motion, "motion"), stiffness=_NEEDED, mass=_NEEDED, alpha={"default": 0.0}, t_end=_NEEDED, dt=_NEEDED
-)
+@options.takes(
+    *options_of(Motion), of=[Motion],
+    stiffness=_NEEDED, mass=_NEEDED, alpha={"default": 0.0}, t_end=_NEEDED, dt=_NEEDED,
+)  # fmt: skip
 @options.takes("plot", *FILES, plot="Draw displacements and energies to FILE (png, svg, pdf).")
 def replay(motion: Motion, output: Output) -> None:
     r"""Compute the floating oscillator in closed form, with or without switching.
@@ -55,7 +57,7 @@ def replay(motion: Motion, output: Output) -> None:
 
 
 @options.command
-@options.takes_all(Box, "box")
+@options.takes(*options_of(Box), of=[Box])
 @options.takes(
     *("output_format", "plot", *FILES, "exit_zero"),
     output_format={

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from functools import wraps
+from functools import cache, wraps
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -24,9 +24,7 @@ if TYPE_CHECKING:
 
 WINDOW = tuple[float, float] | None
 Decorated = Any  # a command function; click's decorators do not say more
-# What commands take of the tables, and under which name they get it.
-TABLES: Final[dict[str, Any]] = {"request": Request, "cards": Cards, "output": Output}
-_OPTIONS: Final = {name: (table, one) for table, of in TABLES.items() for name, one in options_of(of).items()}
+TABLES: Final[tuple[Any, ...]] = (Request, Cards, Output)
 FILES: Final = ("output_file", "overwrite", "quiet")
 RESULT: Final = ("output_format", "exit_zero", *FILES)
 HISTORY: Final = "HISTORY"  # stands for the argument, not the option of that name
@@ -120,20 +118,25 @@ def command(function: Decorated) -> click.Command:
     return documented(Command)(function)
 
 
-def takes(*names: str, forms: Iterable[str] = (), **other: Any) -> Callable[[Decorated], Decorated]:
-    """Give a command options of the tables, passed on as one object for each table that they are of.
+def takes(
+    *names: str, of: Sequence[Any] = TABLES, forms: Iterable[str] = (), **other: Any
+) -> Callable[[Decorated], Decorated]:
+    """Give a command options of tables, passed on as one object for each, by the name of its class in small letters.
 
     Parameters
     ----------
     *names : str
         Of options, in the order of the help.
+    of : sequence of classes
+        The tables.
     forms : str
         Forms of the result, the first by default.
     **other : str or dict
         Of an option by its name: the help of this command, or what click is told otherwise.
     """
-    tables = {table: [one for one in names if one in options_of(of)] for table, of in TABLES.items()}
-    tables["request"] += ["history"] * (HISTORY in names)
+    tables = {table: [one for one in names if one in options_of(table)] for table in of}
+    if HISTORY in names:
+        tables[Request].append("history")
     if choices := list(forms):
         about = {"type": click.Choice(choices), "default": choices[0], "show_default": True}
         other["output_format"] = about
@@ -147,41 +150,39 @@ def takes(*names: str, forms: Iterable[str] = (), **other: Any) -> Callable[[Dec
             given = {name for name in values if ctx.get_parameter_source(name) is not ParameterSource.DEFAULT}
             for table, taken in tables.items():
                 if taken:
-                    more = {"given": given & {*taken}} if table == "request" else {}
-                    values[table] = TABLES[table](**{name: values.pop(name) for name in taken}, **more)
+                    more = {"given": given & {*taken}} if table is Request else {}
+                    values[table.__name__.lower()] = table(**{name: values.pop(name) for name in taken}, **more)
             return function(*args, **values)
 
         if "quiet" in names:
-            run = _flags(run)
+            for flag in _FLAGS:
+                run = flag(run)
         for name in reversed(names):
-            run = _decorator(name, other.get(name, {}))(run)
+            as_in_table = of is TABLES and name not in other
+            run = (_as_in_table(name) if as_in_table else _decorator(of, name, other.get(name, {})))(run)
         return run
 
     return decorate
 
 
-def takes_all(table: Any, name: str, **other: Any) -> Callable[[Decorated], Decorated]:
-    """Give a command all options of a table of its own, passed on as one object under a name; ``other`` as above."""
-
-    def decorate(function: Decorated) -> Decorated:
-        @wraps(function)
-        def run(*args: Any, **values: Any) -> Any:
-            values[name] = table(**{one: values.pop(one) for one in options_of(table)})
-            return function(*args, **values)
-
-        for one, about in reversed(options_of(table).items()):
-            run = option(one, about, **{"default": table.__dataclass_fields__[one].default, **other.get(one, {})})(run)
-        return run
-
-    return decorate
+def _shared(decorate: Callable[[Decorated], Decorated]) -> Callable[[Decorated], Decorated]:
+    """Give all commands the same object of an option: a module has commands, of which one is called."""
+    made = decorate(lambda: None).__click_params__[0]
+    again: Any = lambda *_, **__: made  # noqa: E731  click takes what makes an option for its class
+    return click.option(cls=again)
 
 
-def _decorator(name: str, other: Any) -> Callable[[Decorated], Decorated]:
+@cache
+def _as_in_table(name: str) -> Callable[[Decorated], Decorated]:
+    return _shared(_decorator(TABLES, name, {}))
+
+
+def _decorator(tables: Sequence[Any], name: str, other: Any) -> Callable[[Decorated], Decorated]:
     if name == HISTORY:
         return click.argument("history", metavar="HISTORY...", nargs=-1, required=True, type=click_type("file"))
-    table, one = _OPTIONS[name]
+    table = next(one for one in tables if name in options_of(one))
     more = {"help": other} if isinstance(other, str) else other
-    return option(name, one, **{"default": TABLES[table].__dataclass_fields__[name].default, **more})
+    return option(name, options_of(table)[name], **{"default": table.__dataclass_fields__[name].default, **more})
 
 
 def option(name: str, one: Option, **other: Any) -> Callable[[Decorated], Decorated]:
@@ -233,21 +234,19 @@ def judging_run(request: Request) -> Run | None:
     return open_run(request)
 
 
-def _flags(function: Decorated) -> Decorated:
-    """What every command can be told and none asks for itself: it is kept in the context."""
-    for name, text in (
-        ("debug", "Show the traceback of an error."),
-        ("show-settings", "Print every option with its value and its source, and do nothing else."),
-        ("verbose", "Say all that is known, and on stderr what was read and how long it took."),
-    ):
-        short = ["-v"] if name == "verbose" else []
-        flag = click.option(*short, f"--{name}", is_flag=True, expose_value=False, callback=_remember, help=text)
-        function = flag(function)
-    return function
-
-
 def _remember(ctx: click.Context, option: click.Parameter, value: bool) -> None:
     ctx.meta[f"d2rpick.{dashed(option.name or '')}"] = value
+
+
+# What every command can be told and none asks for itself: it is kept in the context.
+_FLAGS: Final = [
+    _shared(click.option(*names, is_flag=True, expose_value=False, callback=_remember, help=text))
+    for names, text in (
+        (["--debug"], "Show the traceback of an error."),
+        (["--show-settings"], "Print every option with its value and its source, and do nothing else."),
+        (["-v", "--verbose"], "Say all that is known, and on stderr what was read and how long it took."),
+    )
+]
 
 
 def repeat() -> list[str]:

@@ -42,16 +42,7 @@ _ANSWER: Final = r"(?m)^(\* |(recommended|best of|make rigid|verdict|common tr) 
 ARGUMENTS: Final = (
     *OPTIONS,
     *options_of(Cards),
-    "td",
-    "td_window",
-    "tr",
-    "min_rigid",
-    "overwrite",
-    "write_as",
-    "done",
-    "before",
-    "wait",
-    "min_mean_energy",
+    *("td", "td_window", "tr", "min_rigid", "overwrite", "write_as", "done", "before", "wait", "min_mean_energy"),
 )
 _OTHERS: Final = {"parts": "part", "channels": "channel", "replay": "no_verify", "run": "history"}
 _FOR_PROGRAMS: Final = {"json", "ndjson", "csv", "value"}

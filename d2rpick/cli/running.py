@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -55,19 +55,7 @@ CMD = ("text", "CMD")
     report="Write windows, energy and evidence to one HTML page.",
     forms=FORMATS["drive"],
 )
-def drive(
-    deck: str,
-    folder: str,
-    part: tuple[str, ...],
-    wait: float | None,
-    margin: float | None,
-    starter: str | None,
-    engine: str | None,
-    threads: int,
-    resume: bool,
-    dry_run: bool,
-    output: Output,
-) -> None:
+def drive(deck: str, folder: str, resume: bool, dry_run: bool, output: Output, **asked: Any) -> None:
     r"""Compute a Radioss run that switches itself: no reference is needed.
 
     DECK, a starter deck with one engine file, is copied into RUNDIR.  Each flight begins when no force has acted for
@@ -86,7 +74,7 @@ def drive(
 
     output = output.beside(deck)
     told = (lambda _: None) if output.quiet else tell
-    driving = Driving(deck, Path(folder), told, part, wait, margin, starter=starter, engine=engine, threads=threads)
+    driving = Driving(deck, Path(folder), told, **asked)
     output.notes(driving.deck.notes, driving.cautions)
     if dry_run:
         return click.echo("\n".join(_plan(driving)))
@@ -189,8 +177,8 @@ def first(
     d2rpick first --part 1 --wait 0.02 sample_data/falling_plate/plate_0000.rad -o first/
     d2rpick first --part 1 --wait 0.02 --after 0.05 sample_data/falling_plate/plate_0000.rad -o later/
     """
-    from d2rpick.api.running import prepared
+    from d2rpick.api.running import first as write
 
-    found = prepared(deck, output_dir, part, wait, after, output.overwrite)
+    found = write(deck, output_dir, parts=part or None, wait=wait, after=after, overwrite=output.overwrite)
     output.notes(found.notes, ())
     click.echo("\n".join(f"written  {printable(name)}" for name in found.files))

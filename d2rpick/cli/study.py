@@ -20,7 +20,7 @@ from d2rpick.report.formats import FORMATS
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from d2rpick.api.ledger import Ledger
+    from d2rpick.api.studies import Ledger
     from d2rpick.base.workers import Farm
 
 
@@ -73,8 +73,7 @@ def study(
     d2rpick study --td 0.37 --part box --resume runs.ndjson -f json sample_data/rolloverT01.gz
     d2rpick study --td 0.064 --tolerance 0.1 -f ndjson sample_data/energy.csv sample_data/energy.glstat
     """
-    from d2rpick.api.ledger import Ledger, fingerprint, line
-    from d2rpick.api.studies import question_of, rows_of, summary
+    from d2rpick.api.studies import Ledger, fingerprint, line, question_of, rows_of, summary
 
     if scheduler and jobs:
         raise click.UsageError("--scheduler and --jobs exclude each other: the cluster has its own processes")
@@ -186,9 +185,9 @@ def calibrate(folders: tuple[str, ...], output: Output) -> None:
     d2rpick calibrate sample_data/flying_box
     d2rpick calibrate -f toml -o site.toml sample_data/flying_box
     """
-    from d2rpick.api.costs import fitted
+    from d2rpick.api.costs import calibrate as fit
 
     output = output.beside()
-    answer = fitted(folders)
+    answer = fit(folders)
     output.notes((), answer.cautions)
     output.answer(answer)

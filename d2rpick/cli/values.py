@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from d2rpick.api.runs import Run
 
-
-if TYPE_CHECKING:
     FloatType = click.ParamType[float]
 else:
     FloatType = click.ParamType  # generic from click 8.4 on
@@ -38,7 +36,6 @@ class NumberType(FloatType):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """Read a number or fail with what was found and what was expected."""
-        low, high, above = self.limits
         try:
             number = float(value)
         except ValueError:
@@ -47,9 +44,7 @@ class NumberType(FloatType):
             self.fail(f"{value!r} is not a number{without_unit(value)}", param, ctx)
         if not math.isfinite(number):
             self.fail(f"{value!r} is not a finite number", param, ctx)
-        limit = f"{'above' if above else 'of at least'} {low:g}" if number < low or (above and number == low) else ""
-        limit = limit or (f"of at most {high:g}" if number > high else "")
-        if limit:
+        if limit := self.limits.missed(number):
             self.fail(f"{value} was found, a number {limit} was expected", param, ctx)
         return number
 

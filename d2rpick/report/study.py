@@ -69,7 +69,7 @@ _MEANING: Final = (
     "Answer of d2rpick study; times in the unit of the histories. With -f ndjson each run is a line by $defs/line, the "
     "last line is by $defs/last."
 )
-# Newline-delimited JSON: a line for each run, as `d2rpick.api.ledger` writes it, and what follows them.
+# Newline-delimited JSON: a line for each run, as `d2rpick.api.studies` writes it, and what follows them.
 _CURVE: Final = kind_of(many(many("number")), minItems=2, maxItems=2)
 _LINE: Final = row(
     *RUN.fields,

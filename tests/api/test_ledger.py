@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from d2rpick.api.ledger import Ledger, fingerprint, line
+from d2rpick.api.studies import Ledger, fingerprint, line
 from d2rpick.base.errors import FormatError
 from d2rpick.choice import study
 from d2rpick.choice.question import Settings

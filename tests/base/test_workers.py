@@ -11,10 +11,10 @@ from subprocess import PIPE, Popen
 import pytest
 
 from d2rpick.base.errors import D2RPickError
-from d2rpick.base.workers import Cores, Farm, Here, cores
+from d2rpick.base.workers import Cores, Farm, cores
 from tests.command import TIME_LIMIT
 
-FARMS = [Here, lambda: Cores(2, __name__)]
+FARMS = [Farm, lambda: Cores(2, __name__)]
 
 
 def square(number: int) -> int:

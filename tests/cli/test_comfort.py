@@ -13,7 +13,7 @@ from d2rpick.base import __version__
 from d2rpick.cli import COMMANDS, d2rpick
 from d2rpick.cli.manual import manual
 from d2rpick.rules import RULES
-from tests.command import ENERGY, GLSTAT, MATSUM, ROLLOVER, ROOT, TIME_LIMIT, answer, put, refused, run
+from tests.command import DECK, ENERGY, GLSTAT, MATSUM, ROLLOVER, ROOT, TIME_LIMIT, answer, put, run
 
 
 def test_settings_are_shown_with_their_sources_and_nothing_is_done(
@@ -84,30 +84,6 @@ def test_channels_are_completed_from_the_history_that_was_typed() -> None:
     assert offered == "internal_energy"  # one word for the shell, and yet the channel
     one, other = (answer("suggest", "--td", "0.064", "--energy", name, GLSTAT) for name in (offered, "internal energy"))
     assert one["recommended"] == other["recommended"]
-
-
-@pytest.mark.parametrize(
-    ("args", "told"),
-    [
-        (("--td", "64", ENERGY), "was it meant in ms? Then give --td 0.064, in the unit of the record"),
-        (
-            ("--td-window", "60", "70", ENERGY),
-            "was it meant in ms? Then give --td-window 0.06 0.07, in the unit of the record",
-        ),
-        (("--td", "0.064", "--after", "86", ENERGY), "Then give --after 0.086, in the unit of the record"),
-        (("--td", "0.064", "--fit-window", "10", "60", ENERGY), "Then give --fit-window 0.01 0.06, in the unit of"),
-        (("--td-window", "0.06", "0.2", ENERGY), "--td-window 0.06 0.2 reaches outside the record, 0 to 0.15\n"),
-        (("--td", "0.16", ENERGY), "--td 0.16 lies outside the record, 0 to 0.15\n"),
-        (("--td", "0.6", ENERGY), "--td 0.6 lies outside the record, 0 to 0.15\n"),
-        (("--td", "2", ENERGY), "--td 2 lies outside the record, 0 to 0.15\n"),  # cut early, or 2 ms
-        (("--td", "64ms", ENERGY), "give a number in the unit of the history, 0.064 where it is s"),
-        (("64", ENERGY), "a time is given as --td, a number in the unit of the record"),
-        (("64ms", ENERGY), "a time is given as --td, a number in the unit of the record, 0.064 where it is s"),
-        (("--td", "0.064", ENERGY.replace("energy", "enrgy")), "(did you mean 'energy.csv'?)"),
-    ],
-)
-def test_a_near_miss_is_named(args: tuple[str, ...], told: str) -> None:
-    assert told in refused("suggest", *args) + "\n"
 
 
 def test_a_td_far_outside_is_not_explained_by_a_unit() -> None:
@@ -229,3 +205,107 @@ def test_the_manual_is_roff_without_warnings() -> None:
     )
     assert not shown.stderr
     assert "d2rpick" in shown.stdout
+
+
+ASKED = ("suggest", "--td", "0.064", ENERGY)
+
+
+@pytest.fixture
+def settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The file that counts in the working folder, which lies below that of the file."""
+    inner = tmp_path / "inner"
+    inner.mkdir()
+    monkeypatch.chdir(inner)
+    return tmp_path / "pyproject.toml"
+
+
+def shown(*args: str) -> dict[str, str]:
+    """The settings that are not the default, with their values and sources."""
+    lines = run(*args, "--show-settings").stdout.splitlines()
+    return dict(line.split(" = ", 1) for line in lines if not line.endswith("# default"))
+
+
+def test_the_command_line_counts_before_the_environment_and_that_before_the_settings(
+    settings: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings.write_text("[tool.d2rpick]\nmargin = 0.001\nmax-residual = 0.3\n[tool.d2rpick.suggest]\nmargin = 0.002\n")
+    assert shown(*ASKED)["margin"] == f"0.002  # settings, {settings}"
+    assert shown("verify", "--tr", "0.01", *ASKED[1:])["margin"] == f"0.001  # settings, {settings}"
+    monkeypatch.setenv("D2RPICK_SUGGEST_MARGIN", "0.003")
+    found = shown(*ASKED, "--max-residual", "0.4")
+    assert found["margin"] == "0.003  # environment, D2RPICK_SUGGEST_MARGIN"
+    assert found["max-residual"] == "0.4  # command line"
+
+
+def test_an_answer_names_what_came_from_the_settings_and_can_be_asked_again_without_them(settings: Path) -> None:
+    settings.write_text("[tool.d2rpick]\nmargin = 0.001\nenergy = 'internal_energy'\nno-verify = true\n")
+    told = run(*ASKED)
+    words = "--energy internal_energy --margin 0.001 --no-verify"
+    assert told.stderr.startswith(f"note: {words} by {settings}\n")
+    assert not run(*ASKED, "-q").stderr
+    found = json.loads(run(*ASKED, "-q", "-f", "json").stdout)
+    assert found["command"][-5:] == words.split()
+    settings.unlink()
+    again = json.loads(run(*found["command"]).stdout)
+    assert again["candidates"] == found["candidates"]
+
+
+def test_settings_give_way_to_what_excludes_them_and_wait_for_what_they_belong_to(settings: Path) -> None:
+    settings.write_text(
+        "[tool.d2rpick]\nno-verify = true\nweights = 'site.json'\nstep-ratio = 4\nnode = 7\nafter = 0.01\n"
+    )
+    assert {"fit-window", "after"} == {*shown(*ASKED, "--fit-window", "0", "0.1")} - {"td", "history"}
+    assert {"no-verify", "after", "weights", "step-ratio", "deck"} == {
+        *shown(*ASKED, "--deck", DECK),
+    } - {"td", "history"}
+    assert "../site.json" in shown(*ASKED, "--deck", DECK)["weights"]  # files lie where the settings do
+    assert run("check", DECK).exit_code == 0  # without a history nothing is judged
+    assert "node" in shown("card", "--solver", "radioss", "--tr", "1", "--td", "2")
+
+
+def test_an_oscillator_in_the_settings_gives_way_to_what_excludes_it(settings: Path) -> None:
+    settings.write_text("[tool.d2rpick]\nstiffness = 1\nmass = 1\nbeta = 2\nalpha = 0\nv0 = 1\n")
+    given = {*shown(*ASKED)} - {"td", "history"}
+    assert given == {"stiffness", "mass", "beta", "alpha", "v0"}
+    for option in (("--no-verify",), ("--fit-window", "0", "0.1")):
+        assert not given & {*shown(*ASKED, *option)}
+    assert given - {*shown(*ASKED, "--frame-mass", "2")} == {"beta"}
+
+
+def test_the_check_takes_its_history_and_what_fails_it_from_the_settings(settings: Path) -> None:
+    settings.write_text(f"[tool.d2rpick]\nhistory = ['{ENERGY}']\nfail-on = 'warning'\nignore = ['D2R202']\n")
+    result = run("check", DECK)
+    assert result.exit_code == 1
+    assert "D2R203" in result.stdout
+    assert "D2R202" in result.stdout  # rules are set beside the deck
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("margn = 1", "unknown key 'margn', one of "),
+        ("margn = 1", "; did you mean 'margin'?"),
+        ("[tool.d2rpick.sugest]\nmargin = 1", "unknown key 'sugest'"),
+        ("[tool.d2rpick.suggest]\ndone = 'x'", "suggest: unknown key 'done'"),
+        ("margin = -1", "margin: -1 was found, a number of at least 0 was expected"),
+        ("margin = [1]", "margin is [1], a number or a text was expected"),
+        ("no-verify = 1", "no-verify is 1, true or false was expected"),
+        ("tolerance = true", "tolerance is True, a number or a text was expected"),
+        ("fit-window = [1]", "fit-window: "),
+    ],
+)
+def test_settings_that_are_none_are_named_with_their_file(settings: Path, text: str, message: str) -> None:
+    settings.write_text(f"[tool.d2rpick]\n{text}\n")
+    result = run(*ASKED)
+    assert result.exit_code == 2
+    assert result.stderr.startswith(f"d2rpick: {settings}: ")
+    assert message in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+def test_python_asks_without_settings(settings: Path) -> None:
+    settings.write_text("[tool.d2rpick]\nno-verify = true\n")
+    import d2rpick
+
+    assert d2rpick.suggest(d2rpick.read(ENERGY), td=0.064).basis == "oscillator"
+    assert answer(*ASKED)["basis"] == "energy"

@@ -226,7 +226,7 @@ def test_a_damaged_line_of_a_resume_file_is_passed_over(damage: str, tmp_path: P
 
 @pytest.mark.slow
 def test_no_changed_byte_of_a_resume_file_gives_another_row(tmp_path: Path) -> None:
-    from d2rpick.api.ledger import Ledger
+    from d2rpick.api.studies import Ledger
     from d2rpick.choice.question import Settings
     from d2rpick.choice.study import Question, ask
 

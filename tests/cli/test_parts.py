@@ -11,7 +11,7 @@ from d2rpick.choice.situation import examine
 from d2rpick.choice.warnings import cautions_of
 from d2rpick.histories.history import EXACT, Given, History, Momenta
 from d2rpick.histories.names import Part
-from tests.command import BOX as ROLLOVER_T01, answer, codes, put, refused, replayed, run
+from tests.command import BOX as ROLLOVER_T01, answer, codes, put, replayed, run
 from tests.json_schemas import checked
 from tests.records import ENERGY, TIME
 
@@ -76,20 +76,6 @@ def test_td_behind_the_contact_that_the_momentum_shows_is_no_free_flight() -> No
     assert found["recommended"] is None
     (message,) = (w["message"] for w in found["warnings"] if w["code"] == "no-free-flight")
     assert "no free flight at td = 0.3822; the nearest flight lasts from 0.0910" in message
-
-
-@pytest.mark.parametrize(
-    ("options", "says"),
-    [
-        (("--part", "bax"), ["no part 'bax'", "did you mean", "1 'box', 2 'step', 3 'sled'"]),
-        (("--part", "7"), ["no part 7", "1 'box', 2 'step', 3 'sled'"]),
-        (("--part", "box", "--flying", "7"), ["no part 7", "1 'box'"]),
-        (("--part", "box", "--energy", "1"), ["--energy and --part exclude each other"]),
-    ],
-)
-def test_parts_that_are_not_there_are_named_with_those_that_are(options: tuple[str, ...], says: list[str]) -> None:
-    told = refused("suggest", "--td", "0.37", *options, ROLLOVER_T01).lower()
-    assert [word for word in says if word.lower() not in told] == []
 
 
 def test_a_part_without_energy_is_named(tmp_path: Path) -> None:

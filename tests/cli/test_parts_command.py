@@ -124,13 +124,6 @@ def test_a_deck_is_never_written_over(tmp_path: Path, command: str) -> None:
     assert own.read_bytes() == DECK.read_bytes()
 
 
-def test_recommended_needs_a_deck_and_stands_alone() -> None:
-    result = run("plan", "--part", "recommended", MATSUM)
-    assert (result.exit_code, "--part recommended needs --deck" in result.stderr) == (2, True)
-    result = run("plan", "--part", "recommended", "--part", "3", *WITH_DECK)
-    assert (result.exit_code, "stands for a whole set" in result.stderr) == (2, True)
-
-
 def test_a_cost_that_is_not_known_is_a_warning(tmp_path: Path) -> None:
     cut = put(tmp_path / "main.k", DECK.read_text("utf-8").replace("*END", "*INCLUDE\nabsent.k\n*END"))
     found = checked("plan", "--part", "1,2", "--deck", str(cut), MATSUM)

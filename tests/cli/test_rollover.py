@@ -16,7 +16,7 @@ from d2rpick.models.box_run import Outcome, RigidWindow, history_of, simulate
 from d2rpick.report import figures_models
 from d2rpick.report.formats import Shown, write
 from d2rpick.report.rollover import Scan
-from tests.command import codes, refused, run
+from tests.command import codes, run
 from tests.json_schemas import check_by_schema
 
 SMALL = ("--mesh", "4", "--dt", "5e-4")
@@ -142,46 +142,3 @@ def test_a_scan_at_whose_td_nothing_can_be_recommended_says_so() -> None:
 def test_a_run_that_does_not_balance_its_energy_says_so() -> None:
     assert "warning: energy-balance:" in run("rollover", *SHORT, "--damping", "300").stderr
     assert run("rollover", *SHORT).stderr == ""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("args", "complaint"),
-    [
-        (("--tr", "0.1"), "--tr and --td need each other"),
-        (("--tr", "0.2", "--td", "0.1"), "is not before"),
-        (("--tr", "0.1", "--td", "0.2", "--tr", "0.2", "--td", "0.3"), "--tr 0.2 is not after --td 0.2"),
-        (("--tr", "0.1", "--td", "0.2", "--tr", "0.3"), "as many"),
-        (("--tilt", "10"), "--tilt belongs to --drop"),
-        (("--scan", "--drop", "1"), "--scan and --drop exclude each other"),
-        (("--scan", "--td", "0.3", "--td", "0.4"), "takes one --td"),
-        (("--tr", "0.2", "--td", "0.5"), "after the end of the run"),
-        (("--tr", "-1", "--td", "0.1"), "at least 0"),
-        (("--scan", "--td", "0", "--mesh", "4"), "no time for tr"),
-        (("--stiffness", "1e15"), "choose softer bars"),
-        (("--mesh", "100000"), "200"),
-        (("--scan", "--tr", "0.1"), "exclude each other"),
-        (("--scan", "--write-as", "csv"), "exclude each other"),
-        (("--jobs", "2"), "needs --scan"),
-        (("-f", "json"), "needs --scan"),
-        (("--dt", "1e-9"), "more than"),
-        (("--mesh", "3"), "4"),
-        (("--scan", "--td", "0.5", "--mesh", "4"), "end of the flight"),
-        (("-o", "run.txt"), "--write-as"),
-    ],
-)
-def test_what_cannot_be_run_is_refused_in_one_line(args: tuple[str, ...], complaint: str) -> None:
-    assert complaint in refused("rollover", *args)
-
-
-@pytest.mark.parametrize(
-    ("options", "told"),
-    [
-        (("--dt", "1e308"), "holds no number of steps"),
-        (("--stiffness", "1e308"), "holds no number of steps"),
-        (("--drop", "1e308"), "infinite"),
-        (("--speed", "1e300"), "infinite"),
-    ],
-)
-def test_what_becomes_infinite_or_holds_no_number_of_steps_is_no_record(options: tuple[str, str], told: str) -> None:
-    assert told in refused("rollover", *options, "--t-end", "0.001", "--mesh", "4")

@@ -1,4 +1,4 @@
-"""Plans of the falling box held against the runs that are switched so: ``python -m tests.drop_plans``.
+"""Plans of the falling box held against the runs that are switched so: ``python -m tests.test_drops``.
 
 Twenty sets of parameters, fixed before any of them was run: height of the fall and tilt on a grid, the speed across,
 the stiffness of the ground and of the bars in turn.  Each supported window has to end before the landing of the
@@ -9,6 +9,8 @@ import tempfile
 from itertools import product
 from pathlib import Path
 from typing import NamedTuple
+
+import pytest
 
 from d2rpick.choice.plan import plan_of
 from d2rpick.choice.question import Settings, read
@@ -51,6 +53,13 @@ def outcome(parameters: Parameters, interval: float = INTERVAL) -> Outcome:
     contacts = switched.landings
     after = tuple(next((start for start, _ in contacts if start > tr), None) for tr, _ in windows)
     return Outcome(windows, after)
+
+
+@pytest.mark.slow
+def test_supported_windows_end_before_the_landing_of_the_switched_run() -> None:
+    found = outcome(SETS[12], interval=3e-4)  # at most two steps of the model a state
+    assert found.windows
+    assert found.kept, found
 
 
 if __name__ == "__main__":
