@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from d2rpick.base.errors import Caution, RangeError
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.candidates import Candidate, Candidates, Pair, judge
 from d2rpick.choice.health import OF_THE_MODEL, assess, cautions_of_engine, cautions_of_health, refuse_unsound
 from d2rpick.choice.quality import EQUALLY_GOOD, ROUNDING, Quality, candidates_at, over_limits, quality_of

@@ -12,11 +12,12 @@ Each window that locks in energy costs a run of its own, so a short one is left 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.base.errors import Caution
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.answers import suggest_of
 from d2rpick.choice.flights import flights_of, last_td
 from d2rpick.choice.health import WRONG_ENERGY, cautions_of_engine, refuse_unsound

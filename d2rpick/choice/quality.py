@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from itertools import chain, pairwise
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.candidates import Candidates, judged_of
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE
 from d2rpick.histories.digits import above

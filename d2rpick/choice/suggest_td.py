@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import sqrt
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.flights import longest_flight
 from d2rpick.choice.quality import LIKE_LEVELS, ROUNDING, candidates_at, like_quality
 from d2rpick.choice.situation import Situation, looking

@@ -5,11 +5,12 @@ Warnings have stable codes for scripts, and sentences for people.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from d2rpick.base.errors import Caution, listing, name_units
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.digits import above, first_as_read, not_after, window_as_read
 from d2rpick.vibration import measures

@@ -13,10 +13,11 @@ from __future__ import annotations
 
 from functools import partial
 from itertools import combinations
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.samples import integral, median
 from d2rpick.vibration.modes import BLOCK, energy_and_jacobian, sum_and_jacobian
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from functools import partial
 from math import ceil, log
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.history import History, Memory, Samples
 from d2rpick.histories.samples import integral
 from d2rpick.vibration.fitting import cell_means

@@ -6,9 +6,10 @@ import re
 from collections import Counter
 from itertools import islice
 from operator import itemgetter
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from d2rpick.base.errors import FormatError, listing
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.formats.text import HEAD, Text
 from d2rpick.histories.names import is_time, is_unit, unit_of
 
@@ -32,7 +33,7 @@ _NUMBER = {
 }  # fmt: skip
 _MISSING = frozenset({"", "nan", "+nan", "-nan", "inf", "+inf", "-inf", "infinity", "-infinity", "na", "n/a", "null"})
 # What a spreadsheet writes above a table, and anybody may, for a separator that belongs to no number.
-_SEP_LINE = re.compile(r'sep=(?![\w.+"-])([!-~])', re.IGNORECASE)
+_SEP_LINE = re.compile(r'(?i:sep=)(?![\w.+"-])([!-~])')
 _DECIMAL_PART = re.compile(r"[+-]?0\d+")
 
 # Rows looked at to find the layout: more than any header has lines.

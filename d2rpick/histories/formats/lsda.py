@@ -18,11 +18,12 @@ import re
 import struct
 from array import array
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from d2rpick.base.errors import FormatError
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.content import Content, content_of
 from d2rpick.histories.formats.blocks import repeats
 

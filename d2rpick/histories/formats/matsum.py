@@ -11,9 +11,10 @@ from __future__ import annotations
 import re
 from collections import Counter
 from functools import partial
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import FormatError
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, written_head
 from d2rpick.histories.formats.fixed_text import Blocks
 from d2rpick.histories.names import Part, Selection

@@ -10,11 +10,12 @@ from __future__ import annotations
 
 from functools import cached_property
 from itertools import accumulate
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.base.errors import FormatError, listing
+from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.content import Content, content_of
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats.radioss_records import INT, RUN, WIDTH, Records, integers, is_binary, is_text, records_of
