@@ -91,6 +91,10 @@ class Command(Documented):
             import shlex  # not above: start-up
 
             tell(f"note: {shlex.join(words)} by {ctx.meta['d2rpick.settings']}")
+        # Numpy before the modules of a run: its import makes many calls, and as deep as theirs each may meet the end of
+        # a piece of the stack of Python 3.11, which maps memory for it and unmaps it again.
+        if ctx.params.get("history"):
+            import numpy as np  # noqa: F401
         try:
             return super().invoke(ctx)
         except ArgumentError as error:
