@@ -85,7 +85,6 @@ SET: Final = row(
           "by how much the body is turned at td from where it should be [degrees]; null where the parts do not tell"),
     Field("reasons", "texts"),
     keys.CANDIDATE.field("position_error_is_lower_bound")._replace(key="position_is_lower_bound"),
-    later=("position_is_lower_bound",),
 )  # fmt: skip
 _HISTORY: Final = row(
     Field("source", "texts", get=lambda run: run.sources),

@@ -65,7 +65,7 @@ WINDOW: Final = row(
     *(_BEST.field(key) for key in _POSITION),
     keys.QUALITY[0]._replace(meaning="of the pair; null without one, and for a window that is done"),
     _BEST.field("position_error_is_lower_bound"),
-    closed=True, later=("position_error_is_lower_bound",),
+    closed=True,
 )  # fmt: skip
 DOCUMENT: Final = Document("d2rpick/plan/1", "Answer of d2rpick plan; times in the unit of the history.", row(
     *keys.FRAME,
