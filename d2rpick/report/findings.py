@@ -14,7 +14,8 @@ from d2rpick.base.files import STDIN
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, csv_of, kind_of, many, one_of, row
 from d2rpick.rules import RULES, Checked, CheckedWindow, find_rules
-from d2rpick.rules.base import MAIN_DECK, Example, Finding, Rule, Severity, Unreadable, grouped
+from d2rpick.rules.base import Finding, Severity, Unreadable, grouped
+from d2rpick.rules.rule import MAIN_DECK, Example, Rule
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

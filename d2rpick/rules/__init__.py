@@ -18,7 +18,8 @@ from d2rpick.deck.radioss_files import HEAD, recognises
 from d2rpick.deck.reader import Deck, read_deck
 from d2rpick.deck.source import SourceFile
 from d2rpick.rules import reading, runs, sets, switched_parts, times
-from d2rpick.rules.base import LS_DYNA, Case, Finding, Rule, RunCase, Severity
+from d2rpick.rules.base import LS_DYNA, Case, Finding, RunCase, Severity
+from d2rpick.rules.rule import Rule
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

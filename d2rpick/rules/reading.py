@@ -9,28 +9,8 @@ from d2rpick.deck.card import Field, Problem
 from d2rpick.deck.ls_dyna_parts import element_cards
 from d2rpick.deck.reader import UNKNOWN_KIND, cure, cuts
 from d2rpick.deck.switching import SwitchSet, misspelt
-from d2rpick.rules.base import (
-    BACK,
-    BOTH,
-    END,
-    ERROR,
-    GOOD,
-    HEAD,
-    INFO,
-    LS_DYNA,
-    PARTS,
-    PASSES,
-    THERE,
-    WARNING,
-    Case,
-    Example,
-    Objection,
-    automatic,
-    deck,
-    fails,
-    passes,
-    rule,
-)
+from d2rpick.rules.base import BOTH, ERROR, INFO, LS_DYNA, WARNING, Case, Objection
+from d2rpick.rules.rule import BACK, END, GOOD, HEAD, PARTS, PASS, THERE, Example, automatic, deck, fails, passes, rule
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -92,7 +72,7 @@ def _counts(case: Case) -> Iterator[Objection]:
             yield card.card.here, f"{card.count_problem}; write {rows}"
 
 
-@passes(PASSES, Example(HEAD + _PARAMETER + _BY_NAME))
+@passes(PASS, Example(HEAD + _PARAMETER + _BY_NAME))
 @fails(
     Example(HEAD + _BY_NAME),
     Example("*DEFORMABLE_TO_RIGID\n         ?\n"),
@@ -235,7 +215,7 @@ def _untimed(case: Case) -> Iterator[Objection]:
             yield card.card.here, f"*{card.card.name} {reason}; not judged by time"
 
 
-@passes(PASSES, _elements("*ELEMENT_SHELL_COMPOSITE"), Example(GOOD.replace(END, "*ELEMENT_SHELL_DOF\n")))
+@passes(PASS, _elements("*ELEMENT_SHELL_COMPOSITE"), Example(GOOD.replace(END, "*ELEMENT_SHELL_DOF\n")))
 @fails(_elements("*ELEMENT_SHELL_DOF"), _elements("*ELEMENT_BEAM_PID"))
 @rule("D2R304", INFO, "elements of a kind that is not searched for shared nodes")
 def _unread(case: Case) -> Iterator[Objection]:

@@ -10,23 +10,8 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import name_units
 from d2rpick.deck.radioss_files import AT_REST, NOT_FOLLOWED, THROUGH_WALL
-from d2rpick.rules.base import (
-    ERROR,
-    GOOD_RUN,
-    INFO,
-    RADIOSS,
-    WARNING,
-    WINDOW,
-    Example,
-    Objection,
-    RunCase,
-    engine_files,
-    fails,
-    passes,
-    rule,
-    run_of,
-    starter_deck,
-)
+from d2rpick.rules.base import ERROR, INFO, RADIOSS, WARNING, Objection, RunCase
+from d2rpick.rules.rule import GOOD_RUN, WINDOW, Example, engine_files, fails, passes, rule, run_of, starter_deck
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

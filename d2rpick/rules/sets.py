@@ -8,21 +8,8 @@ from typing import TYPE_CHECKING, Final, Literal
 from d2rpick.base.errors import listing
 from d2rpick.deck.ls_dyna_parts import Entities, read_entities
 from d2rpick.deck.switching import BY_TIME, Header, SwitchSet, Unit
-from d2rpick.rules.base import (
-    BACK,
-    ERROR,
-    PASSES,
-    THERE,
-    WARNING,
-    Case,
-    Example,
-    Objection,
-    automatic,
-    deck,
-    fails,
-    passes,
-    rule,
-)
+from d2rpick.rules.base import ERROR, WARNING, Case, Objection
+from d2rpick.rules.rule import BACK, PASS, THERE, Example, automatic, deck, fails, passes, rule
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -150,7 +137,7 @@ def _mismatch(one: Header, other: Header) -> str:
     return ""
 
 
-@passes(PASSES, _pair((2, 4)))
+@passes(PASS, _pair((2, 4)))
 @fails(deck(automatic(1, "0.02", rigid=["1"], pair=(2, 1)) + BACK))
 @rule("D2R006", WARNING, "PAIRED together with CODE 0")
 def _timed_pair(case: Case) -> Iterator[Objection]:
@@ -214,7 +201,7 @@ def _listed(entities: Entities) -> str:
     return listing(texts, most=_MOST_LISTED)
 
 
-@passes(PASSES, _with_floor(4, 7))
+@passes(PASS, _with_floor(4, 7))
 @fails(_with_floor(4, 7, "0.0"), _with_floor(2, 7, "0.0"))
 @rule("D2R009", WARNING, "TIME3 is 0 with a contact CODE")
 def _delay(case: Case) -> Iterator[Objection]:
@@ -228,7 +215,7 @@ def _delay(case: Case) -> Iterator[Objection]:
             yield header.time3.field, f"{found}; set it to a time in which the contact settles"
 
 
-@passes(PASSES, _with_floor(4, 7))
+@passes(PASS, _with_floor(4, 7))
 @fails(_with_floor(4, 0), _force(3, 0))
 @rule("D2R010", ERROR, "CODE 3 or 4 without a contact or rigid wall (ENTNO 0)")
 def _unnamed(case: Case) -> Iterator[Objection]:

@@ -7,24 +7,8 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.base.errors import name_units
 from d2rpick.base.graph import reached
 from d2rpick.deck.ls_dyna_parts import Parts, element_cards
-from d2rpick.rules.base import (
-    BACK,
-    BOTH,
-    ERROR,
-    INFO,
-    PASSES,
-    THERE,
-    WARNING,
-    Case,
-    Example,
-    Objection,
-    automatic,
-    deck,
-    fails,
-    grouped,
-    passes,
-    rule,
-)
+from d2rpick.rules.base import BOTH, ERROR, INFO, WARNING, Case, Objection, grouped
+from d2rpick.rules.rule import BACK, PASS, THERE, Example, automatic, deck, fails, passes, rule
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
@@ -123,7 +107,7 @@ def _never_back(case: Case) -> Iterator[Objection]:
         yield place, f"{named} made rigid at {card.time:g} and never switched back in this deck"
 
 
-@passes(PASSES, Example(THERE + BACK), deck("*INCLUDE\nmore_parts.k\n" + BACK))
+@passes(PASS, Example(THERE + BACK), deck("*INCLUDE\nmore_parts.k\n" + BACK))
 @fails(
     deck(automatic(1, "0.02", rigid=["7"])),
     *(
@@ -262,7 +246,7 @@ def _left_active(case: Case, *, nodal: bool) -> dict[int, Header]:
     return found
 
 
-@passes(PASSES, _solid("0"), _solid("2", "0.0"))
+@passes(PASS, _solid("0"), _solid("2", "0.0"))
 @fails(_solid("2"), _solid(""), _solid("13"))
 @rule("D2R116", WARNING, "solids whose stresses do not turn with the rigid body", BOTH)
 def _unturned(case: Case) -> Iterator[Objection]:
@@ -281,7 +265,7 @@ def _unturned(case: Case) -> Iterator[Objection]:
         yield those[0][1], f"{found}: {why}; expect an error after a large rotation"
 
 
-@passes(PASSES, _constrained(_NODAL, "         1         0"), _constrained(_NODAL.replace("   5\n", "   6\n")))
+@passes(PASS, _constrained(_NODAL, "         1         0"), _constrained(_NODAL.replace("   5\n", "   6\n")))
 @fails(_constrained(_NODAL), _constrained(_NODAL, "         2         1"))
 @rule("D2R112", ERROR, "a nodal rigid body on a switched part stays active (NRBF)")
 def _d2r112(case: Case) -> Iterator[Objection]:
@@ -292,7 +276,7 @@ def _d2r112(case: Case) -> Iterator[Objection]:
     return _held(case, nodal=True)
 
 
-@passes(PASSES, _constrained(_EXTRA, "         0         1"), _constrained(_JOINT, "         1         0"))
+@passes(PASS, _constrained(_EXTRA, "         0         1"), _constrained(_JOINT, "         1         0"))
 @fails(_constrained(_EXTRA), _constrained(_JOINT), _constrained(_EXTRA.replace("  8  ", "  1  ")))
 @rule("D2R113", WARNING, "extra nodes or a joint on a switched part stay active (NRBF, NCSF)")
 def _d2r113(case: Case) -> Iterator[Objection]:

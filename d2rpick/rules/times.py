@@ -7,24 +7,19 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import name_units
 from d2rpick.deck.switching import BY_SENSOR, BY_TIME, Header, SwitchSet, Window
-from d2rpick.rules.base import (
+from d2rpick.rules.base import BOTH, ERROR, WARNING, Case, Objection, grouped
+from d2rpick.rules.rule import (
     BACK,
-    BOTH,
     END,
-    ERROR,
     GOOD,
     HEAD,
     PARTS,
-    PASSES,
+    PASS,
     THERE,
-    WARNING,
-    Case,
     Example,
-    Objection,
     automatic,
     deck,
     fails,
-    grouped,
     passes,
     rule,
     window,
@@ -94,7 +89,7 @@ def _order(case: Case) -> Iterator[Objection]:
             yield closing.time_field, f"{found} {way_out}"
 
 
-@passes(PASSES, window("0.0", "0.09"))
+@passes(PASS, window("0.0", "0.09"))
 @fails(window("0.0", "0.0"))
 @rule("D2R105", ERROR, "both times of a window are 0 (decimals lost in writing)")
 def _zero(case: Case) -> Iterator[Objection]:
@@ -107,7 +102,7 @@ def _zero(case: Case) -> Iterator[Objection]:
             yield closing.time_field, f"{found}; print times below 0.05 with more than one decimal"
 
 
-@passes(PASSES, Example(THERE + BACK))
+@passes(PASS, Example(THERE + BACK))
 @fails(Example(PARTS + THERE + BACK + END), Example(GOOD.replace("    0.0001", "      0.01")))
 @rule("D2R111", WARNING, "without --history: *DATABASE_GLSTAT/_MATSUM missing, or DT above (td-tr)/200")
 def _sampling(case: Case) -> Iterator[Objection]:
@@ -149,7 +144,7 @@ def _timed(case: Case) -> list[tuple[SwitchSet, Header]]:
     return [(card, header) for card, header in case.headers if card.time is not None and header.code.value == BY_TIME]
 
 
-@passes(PASSES, deck(THERE + automatic(3, "0.02", rigid=["2"])))
+@passes(PASS, deck(THERE + automatic(3, "0.02", rigid=["2"])))
 @fails(window("0.1", "0.1", _SECOND), deck(automatic(1, "0.0", rigid=["1"]) + automatic(2, "0.0", deformable=["2"])))
 @rule("D2R114", ERROR, "all switching times are equal (decimals lost in writing)")
 def _equal(case: Case) -> Iterator[Objection]:
@@ -186,7 +181,7 @@ def _mixed(times: list[float], end: float, what: str) -> str | None:
     return f"the switching times reach {latest:g} but {what}, about 1000 times {way}? give both in the same unit"
 
 
-@passes(PASSES, Example(THERE + BACK), window("-0.01", "0.07"), window("-0.02", "-0.01"), window("0.0", "0.07"))
+@passes(PASS, Example(THERE + BACK), window("-0.01", "0.07"), window("-0.02", "-0.01"), window("0.0", "0.07"))
 @fails(window("20.0", "90.0"), window("2.0e-5", "9.0e-5"))
 @rule("D2R115", ERROR, "the switching times are about 1000 times the termination time, or a thousandth of it")
 def _thousand(case: Case) -> Iterator[Objection]:
@@ -231,7 +226,7 @@ def _faults(case: Case, rule_id: str) -> Iterator[Objection]:
         yield card.time_field, f"{name_units(ids, kind)}: {message}"
 
 
-@passes(*_PASSING, PASSES)
+@passes(*_PASSING, PASS)
 @fails(_pair("13.5867", "68.7534", head=HEAD.replace("       0.2", "     150.0")))
 @rule(
     "D2R206",
@@ -254,7 +249,7 @@ def _units(case: Case) -> Iterator[Objection]:
         yield case.end_time.field, f"{found} {way}: different units of time? give both in the same"
 
 
-@passes(*_PASSING, PASSES)
+@passes(*_PASSING, PASS)
 @fails(_pair("13.5867", "68.7534", head=HEAD.replace("       0.2", "     150.0")), _pair("1.0e-5", "6.0e-5"))
 @rule("D2R207", ERROR, "the switching times are about 1000 times those of the history, or a thousandth of them", BOTH)
 def _thousand_of_history(case: Case) -> Iterator[Objection]:
@@ -271,7 +266,7 @@ def _thousand_of_history(case: Case) -> Iterator[Objection]:
         yield windows[0].opened.by.time_field, found
 
 
-@passes(*_PASSING, PASSES)
+@passes(*_PASSING, PASS)
 @fails(_pair("0.017", ".0687534"), _pair("0.0135", ".0687534", "--tolerance 0.05"))
 @rule("D2R201", ERROR, "the error of the locked-in energy is above --tolerance", BOTH)
 def _d2r201(case: Case) -> Iterator[Objection]:

@@ -15,7 +15,7 @@ from d2rpick.deck.ls_dyna_parts import read_parts
 from d2rpick.deck.reader import read_deck
 from d2rpick.deck.switching import find_windows, read_switching
 from d2rpick.rules import check_deck
-from d2rpick.rules.base import BACK, GOOD, HEAD, PARTS, THERE
+from d2rpick.rules.rule import BACK, GOOD, HEAD, PARTS, THERE
 from tests.benchmarks.timing import own_seconds, ratio
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ import pytest
 
 import d2rpick as d2
 from d2rpick.rules import RULES
-from d2rpick.rules.base import END, GOOD, HEAD, PARTS, THERE, automatic
+from d2rpick.rules.rule import END, GOOD, HEAD, PARTS, THERE, automatic
 from tests.command import BOX, DECK, ENERGY, GLSTAT, MATSUM, answer, refused, run
 from tests.json_schemas import check_by_schema, checked, junit_is_valid, sarif_is_valid
 

@@ -20,7 +20,7 @@ from d2rpick.deck.printing import cards
 from d2rpick.deck.reader import read_deck
 from d2rpick.deck.writing import write_deck
 from d2rpick.rules import RULES, check_deck
-from d2rpick.rules.base import BACK, GOOD, PARTS, THERE
+from d2rpick.rules.rule import BACK, GOOD, PARTS, THERE
 from tests.decks import spans, write
 from tests.sample_deck import DECK
 

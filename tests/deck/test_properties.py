@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 
 from d2rpick.base.errors import D2RPickError
 from d2rpick.rules import check_deck
-from d2rpick.rules.base import END, GOOD, HEAD, PARTS
+from d2rpick.rules.rule import END, GOOD, HEAD, PARTS
 from tests.decks import read, spans, write
 
 TIMES = st.integers(1, 10**6).map(lambda n: n / 1000)

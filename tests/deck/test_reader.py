@@ -10,7 +10,7 @@ from d2rpick.deck.mesh import KINDS, NOT_COUNTED
 from d2rpick.deck.reader import holds_mesh, read_deck
 from d2rpick.deck.source import Block, Held, SourceFile, find_marks
 from d2rpick.deck.switching import read_switching
-from d2rpick.rules.base import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
+from d2rpick.rules.rule import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
 from tests.decks import found, read, spans
 
 WINDOW = [(1, 0.02, 0.09)]

@@ -6,7 +6,7 @@ import pytest
 
 from d2rpick.deck.ls_dyna_inventory import first_shared_nodes
 from d2rpick.deck.ls_dyna_parts import element_cards, read_parts
-from d2rpick.rules.base import PARTS, automatic
+from d2rpick.rules.rule import PARTS, automatic
 from tests.decks import read, spans, wide, windows
 
 Spans = list[tuple[int | None, float, float | None]]

@@ -10,7 +10,8 @@ from hypothesis import given, strategies as st
 
 from d2rpick.report import findings as report, formats
 from d2rpick.rules import RULES, Checked, check_deck
-from d2rpick.rules.base import END, GOOD, HEAD, PARTS, Finding, Severity, automatic
+from d2rpick.rules.base import Finding, Severity
+from d2rpick.rules.rule import END, GOOD, HEAD, PARTS, automatic
 from tests.deck.test_radioss_run import place
 from tests.decks import write
 from tests.json_schemas import check_by_schema, junit_is_valid, sarif_is_valid

@@ -11,7 +11,8 @@ import pytest
 
 from d2rpick.base.errors import ConfigurationError, DeckError
 from d2rpick.rules import RULES, Configuration, check_deck, configuration_for, read_configuration
-from d2rpick.rules.base import END, GOOD, HEAD, PARTS, THERE, Example, Rule, Severity, automatic
+from d2rpick.rules.base import Severity
+from d2rpick.rules.rule import END, GOOD, HEAD, PARTS, THERE, Example, Rule, automatic
 from tests.command import answer, run
 from tests.decks import found, write
 

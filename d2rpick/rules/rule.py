@@ -1,0 +1,159 @@
+"""How a rule of ``check`` is made: its examples, the pieces that these are put together from, and the decorators."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final
+
+from d2rpick.base.tuples import NamedTuple
+from d2rpick.rules.base import LS_DYNA
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping, Sequence
+
+    from d2rpick.rules.base import Objection, Severity
+
+
+MAIN_DECK: Final = "main.k"  # of an example that has no other name
+
+
+class Example(NamedTuple):
+    """A deck, and the files it includes, or that belong to it, by name; ``name`` is that of the deck itself.
+
+    ``history`` are arguments of ``d2rpick replay`` that write the energy history it is checked with, ``options``
+    further ones of ``d2rpick check``.  ``stdin`` tells that it is read from standard input.
+    """
+
+    deck: str
+    files: Mapping[str, str] = MappingProxyType({})
+    history: str = ""
+    options: str = ""
+    stdin: bool = False
+    name: str = MAIN_DECK
+
+
+class Rule(NamedTuple):
+    """A rule: ``passing`` and ``failing`` decks are its documentation and its tests at once."""
+
+    id: str
+    severity: Severity
+    summary: str
+    explanation: str
+    check: Callable[[Any], Iterable[Objection]]  # of a Case; of a RunCase where it looks at Radioss alone
+    passing: tuple[Example, ...]
+    failing: tuple[Example, ...]
+    solvers: tuple[str, ...] = (LS_DYNA,)  # whose decks it looks at
+
+
+# Pieces that the examples are put together from: decks of LS-DYNA, and runs of Radioss.
+
+HEAD = """\
+*KEYWORD
+*CONTROL_TERMINATION
+       0.2
+*DATABASE_GLSTAT
+    0.0001
+*DATABASE_MATSUM
+    0.0001
+"""
+PARTS = """\
+*PART
+door
+         1         1         1
+*PART
+frame
+         2         1         1
+"""
+
+
+def automatic(
+    swset: int,
+    time1: str,
+    *,
+    rigid: Sequence[str] = (),
+    deformable: Sequence[str] = (),
+    code: int = 0,
+    pair: tuple[int, int] = (0, 0),
+    counts: tuple[int, int] | None = None,
+) -> str:
+    """Write a card; ``pair`` is RELSW and PAIRED, ``counts`` D2R and R2D where they are to be wrong."""
+    d2r, r2d = counts or (len(rigid), len(deformable))
+    relsw, paired = pair
+    lines = [
+        "*DEFORMABLE_TO_RIGID_AUTOMATIC",
+        "$    swset      code     time1     time2     time3     entno     relsw    paired",
+        f"{swset:10d}{code:10d}{time1:>10s}       0.0       0.0         0{relsw:10d}{paired:10d}",
+        "$     nrbf      ncsf       rwf     dtmax       d2r       r2d    offset",
+        f"         0         0         0       0.0{d2r:10d}{r2d:10d}       0.0",
+        *(f"{line:>10s}         0      PART" if len(line) <= 10 else line for line in rigid),
+        *(f"{line:>10s}      PART" for line in deformable),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+THERE = automatic(1, "0.02", rigid=["1"])
+BACK = automatic(2, "0.09", deformable=["1"])
+END = "*END\n"
+GOOD = HEAD + PARTS + THERE + BACK + END
+
+
+def deck(*cards: str) -> Example:
+    """Put cards into a deck that has two parts."""
+    return Example(HEAD + PARTS + "".join(cards) + END)
+
+
+def window(tr: str, td: str, more: str = "") -> Example:
+    """Write a deck that switches part 1 by time."""
+    return deck(automatic(1, tr, rigid=["1"]), automatic(2, td, deformable=["1"]), more)
+
+
+PASS = Example(GOOD)
+
+GROUP: Final = "/GRNOD/PART/7\nbox\n         1\n"
+_SHELL: Final = "/SHELL/1\n         1         1         2         3         4\n"
+_BODY: Final = "/RBODY/1\nbox\n{}         0         0         0                   0         7\n"
+
+
+def starter_deck(group: str = GROUP, body: str = "      1808", more: str = "") -> str:
+    """Write a starter deck: a part that is one rigid body, by its group of nodes, and whatever there is ``more``."""
+    head = "#RADIOSS STARTER\n/BEGIN\nbox\n      2022         0\n/TITLE\na box\n/PART/1\nbox\n         1         1\n"
+    return f"{head}{_SHELL}{_BODY.format(body)}{group}{more}/END\n"
+
+
+def engine_files(*legs: tuple[str, str], cap: str = "1e-5 1e-5", node: str = "1808") -> dict[str, str]:
+    """Write engine files: end and state of every leg."""
+    files = {}
+    for number, (stop, state) in enumerate(legs, start=1):
+        limit = f"/DTIX\n{cap}\n" if state == "ON" and cap else ""
+        switch = f"/RBODY/{state}\n{node}\n" if state else ""
+        files[f"box_{number:04d}.rad"] = f"/RUN/box/{number}\n{stop:>20}\n/VERS/2022\n{switch}{limit}"
+    return files
+
+
+def run_of(files: dict[str, str], deck: str = "") -> Example:
+    """Put a starter deck and its engine files together."""
+    return Example(deck or starter_deck(), files, name="box_0000.rad")
+
+
+WINDOW: Final = (("0.02", "OFF"), ("0.09", "ON"), ("0.2", "OFF"))
+GOOD_RUN: Final = run_of(engine_files(*WINDOW))
+
+
+def rule(
+    id_: str, severity: Severity, summary: str, solvers: tuple[str, ...] = (LS_DYNA,)
+) -> Callable[[Callable[[Any], Iterable[Objection]]], Rule]:
+    """Make a rule of a function that finds what is wrong with a case; its docstring is the explanation."""
+    passing = (PASS if LS_DYNA in solvers else GOOD_RUN,)
+    return lambda check: Rule(
+        id_, severity, summary, " ".join((check.__doc__ or "").split()), check, passing, (), solvers
+    )
+
+
+def passes(*examples: Example) -> Callable[[Rule], Rule]:
+    """Name decks that pass a rule; without any it is that of `GOOD`, or `GOOD_RUN`."""
+    return lambda rule: rule._replace(passing=examples)
+
+
+def fails(*examples: Example) -> Callable[[Rule], Rule]:
+    """Name decks that fail a rule."""
+    return lambda rule: rule._replace(failing=examples)
