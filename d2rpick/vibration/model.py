@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
@@ -258,7 +257,7 @@ class Evidence(NamedTuple):
     span: Span | None = None
     given: bool = False
     prescribed: bool = False
-    models: Mapping[str, SignedModel] = MappingProxyType({})
+    models: Mapping[str, SignedModel] = {}
 
     @property
     def parts(self) -> SignedParts | None:
@@ -291,10 +290,10 @@ def _best(whole: Vibration, evidence: Evidence) -> Vibration:
     if not evidence.signed:
         return whole
     basis, model, td, names = evidence.signed, evidence.models[evidence.signed], whole.td, [*MODELS]
-    known, modes = model.known_at(td), whole.whole
+    modes = whole.whole
     if names.index(basis) < names.index("oscillator"):
-        return _with_signs(whole, basis, model) if known or whole.compared else _sunk(whole)
-    if not known or whole.doubts or not doubtful(whole):
+        return _with_signs(whole, basis, model) if whole.compared or model.known_at(td) else _sunk(whole)
+    if whole.doubts or not doubtful(whole) or not model.known_at(td):
         return whole
     if not isinstance(modes, ModalEnergy):
         return _with_signs(whole, basis, model)

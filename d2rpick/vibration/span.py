@@ -32,6 +32,19 @@ if TYPE_CHECKING:
         def __call__(self, time: Samples, energy: Samples, *, quick: bool = False) -> Identification:
             """Fit and judge an oscillator, as `identify` does."""
 
+    class Damped(Protocol):
+        """What is fitted to an energy: modes, or waves whose deformations add up."""
+
+        @property
+        def alpha(self) -> float:
+            """Damping [1/time]."""
+
+        def energy(self, t: Samples | float) -> Samples:
+            """E [energy]."""
+
+        def vibration_energy(self, t: Samples | float) -> Samples:
+            """V [energy]."""
+
 
 # Where windows that are tried for an oscillator begin, as shares of what comes before td, and where they end, of what
 # comes after: by such steps one of them lies in any flight of some periods and fills most of it.
@@ -277,7 +290,7 @@ def resolved(time: Samples, energy: Samples, fit: Identification) -> Identificat
     return fit._replace(hidden_share=min(hidden, 1.0))
 
 
-def hidden_share(time: Samples, energy: Samples, model: Mode | Modes) -> float:
+def hidden_share(time: Samples, energy: Samples, model: Damped) -> float:
     """Share of the vibration energy that a further mode may have in what a model leaves over, at most 1 [-]."""
     return min(_share(_spectrum(time, energy, model)), 1.0)
 
@@ -300,7 +313,7 @@ def _explains(two: Identification, one: Identification, n: int) -> bool:
     return min(energies) > SMALLEST * sum(energies) and gain > 2 * _certain(n) * two.rms**2
 
 
-def _spectrum(time: Samples, energy: Samples, mode: Mode | Modes) -> _Spectrum:
+def _spectrum(time: Samples, energy: Samples, mode: Damped) -> _Spectrum:
     """Lines of what ``mode`` leaves over, from one period in the record to the fastest that the samples show."""
     span = float(time[-1] - time[0])
     count = min(time.size - 1, _MOST_LINES)

@@ -17,15 +17,15 @@ import numpy as np
 
 from d2rpick.histories.samples import stretches
 from d2rpick.vibration.fitting import factors_of
-from d2rpick.vibration.modes import Mode, Modes
 from d2rpick.vibration.span import hidden_share
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import Samples
+    from d2rpick.vibration.modes import Mode, Modes
 
     Complex = NDArray[np.complex128]
     Places = NDArray[np.intp]
@@ -40,27 +40,29 @@ _AS_GOOD, _ROUNDING = 1.5, 1e-12
 _LARGEST_EXPONENT: Final = 100.0
 
 
-class Waves(Modes):
-    r"""A signed deformation, the sum of those of the modes that meet in one part, each with a damping of its own.
+class Waves(NamedTuple):
+    r"""A signed deformation, the sum of the modes that meet in one part.
 
-    .. math:: q(t) = \sum_i q_i(t)
+    .. math:: q(t) = \mathrm{Re} \sum_i w_i e^{\lambda_i (t - t_0)}
 
-    A vibration is measured by its modes, each with the energies q_i^2 and (q_i'/w_0i)^2, w_0i its undamped rate.  What
-    crosses between two modes in the energy of a part is zero on average over time, and other parts take it back, since
-    the shapes of modes are orthogonal in mass and stiffness.
+    ``rates`` are the lambda of shape (m,), with positive imaginary and no positive real parts [1/time]; ``weights`` are
+    the w [sqrt(energy)]; ``origin`` is t_0 [time].  A vibration is measured by its modes, each with the energies q_i^2
+    and (q_i'/w_0i)^2, w_0i its undamped rate.  What crosses between two modes in the energy of a part is zero on
+    average over time, and other parts take it back, since the shapes of modes are orthogonal in mass and stiffness.
     """
 
-    @classmethod
-    def at(cls, rates: Complex, weights: Complex, origin: float) -> Waves:
-        """Give the real part of the sum of weights times exp(rate (t - origin)), without a rate that grows, (m,)."""
-        each = zip(rates.tolist(), weights.tolist(), strict=True)
-        return cls(tuple(_Wave(rate.imag, -2 * rate.real, one.real, -one.imag, origin) for rate, one in each))
+    rates: Complex
+    weights: Complex
+    origin: float
 
     @property
     def alpha(self) -> float:
         """Damping, the mean of the waves by their energies [1/time]."""
-        weights = [mode.cosine**2 + mode.sine**2 for mode in self.modes]
-        return float(np.average([mode.alpha for mode in self.modes], weights=weights))
+        return float(-2 * np.average(self.rates.real, weights=np.abs(self.weights) ** 2))
+
+    def amplitudes(self, t: Samples | float) -> Samples:
+        """Signed deformations of all waves, of the shape of ``t`` with an axis before it [sqrt(energy)]."""
+        return np.asarray(self._each(t).real)
 
     def deformation(self, t: Samples | float) -> Samples:
         """q(t) [sqrt(energy)]."""
@@ -70,11 +72,19 @@ class Waves(Modes):
         """q(t)^2 [energy]."""
         return self.deformation(t) ** 2
 
+    def kinetic_energy(self, t: Samples | float) -> Samples:
+        """Kinetic energy of the modes [energy]."""
+        turned = (self.rates / np.abs(self.rates)).reshape(-1, *(1,) * np.ndim(t))
+        return np.asarray(((self._each(t) * turned).real ** 2).sum(axis=0))
 
-class _Wave(Mode):
-    def _of_waves(self, make: Callable[[Samples, Samples, Samples], Samples], t: Samples | float) -> Samples:
-        """Make the same up to where the wave is beyond all that was seen: before that it stays so."""
-        return super()._of_waves(make, np.maximum(t, self.origin - 2 * _LARGEST_EXPONENT / (self.alpha or 1e-100)))
+    def vibration_energy(self, t: Samples | float) -> Samples:
+        """Internal and kinetic energy of the modes [energy]."""
+        return np.asarray((self.amplitudes(t) ** 2).sum(axis=0) + self.kinetic_energy(t))
+
+    def _each(self, t: Samples | float) -> Complex:
+        s = np.multiply.outer(self.rates, np.asarray(t, dtype=np.float64) - self.origin)
+        waves = np.exp(np.minimum(s.real, _LARGEST_EXPONENT) + 1j * s.imag)
+        return np.asarray(waves * self.weights.reshape(-1, *(1,) * np.ndim(t)))
 
 
 def fit_waves(time: Samples, deformation: Samples) -> Waves | None:
@@ -94,8 +104,8 @@ def fit_waves(time: Samples, deformation: Samples) -> Waves | None:
     --------
     >>> t = np.linspace(0.0, 6.0, 301)
     >>> found = fit_waves(t, np.exp(-0.1 * t) * np.sin(5.0 * t) + 0.5 * np.exp(-0.1 * t) * np.cos(8.0 * t))
-    >>> sorted(f"{mode.omega:.6f} {mode.alpha:.6f}" for mode in found.modes)
-    ['5.000000 0.200000', '8.000000 0.200000']
+    >>> [f"{rate.real:.6f} {rate.imag:.6f}" for rate in sorted(found.rates, key=lambda rate: rate.imag)]
+    ['-0.100000 5.000000', '-0.100000 8.000000']
     """
     if time.size < _LEAST_SAMPLES or not np.any(deformation):
         return None
@@ -124,7 +134,7 @@ def _fit(space: Samples, step: float, time: Samples, deformation: Samples) -> tu
     found = np.linalg.lstsq(basis * weight[:, np.newaxis], deformation * weight, rcond=None)[0]
     rest = deformation - basis @ found
     weights = found[: rates.size] + 1j * found[rates.size :]
-    return float(rest @ rest), Waves.at(rates, weights, float(time[0]))
+    return float(rest @ rest), Waves(rates, weights, float(time[0]))
 
 
 # One way must be this many times smoother than the other to be believed.  At 24 samples per period of a chain of two
@@ -232,7 +242,7 @@ class PartMotion(NamedTuple):
     That is the share of the vibration energy that a further mode may have unseen [-].
     """
 
-    model: Mode | Modes
+    model: Waves | Mode | Modes
     unclear: Samples
     hidden: float
 

@@ -2,8 +2,10 @@
 
 import io
 import json
+import pickle
 import shutil
 from collections.abc import Callable, Collection, Mapping, Sequence
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -265,6 +267,17 @@ def test_the_format_that_was_named_is_in_the_command_that_repeats_it(tmp_path: P
     for found in (*answers, d2.study([file], td, **reading), d2.check(DECK, history=run)):
         same(found.to_dict(), answer(*found.command))
     assert "--input-format" not in d2.suggest(d2.read(ENERGY), td).command
+
+
+@pytest.mark.parametrize("asked", [d2.suggest, d2.explore, d2.plan])
+def test_answers_can_be_copied(asked: Callable[..., Any]) -> None:
+    found = asked(d2.read(ENERGY))
+    same(deepcopy(found).to_dict(), found.to_dict())
+
+
+def test_a_verdict_goes_to_another_process() -> None:
+    found = d2.verify(d2.read(ENERGY), tr=0.0135867, td=0.0687534)
+    same(pickle.loads(pickle.dumps(found)).to_dict(), found.to_dict())
 
 
 def test_numbers_of_numpy_stand_in_the_command_as_numbers() -> None:

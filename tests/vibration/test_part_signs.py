@@ -157,7 +157,7 @@ def test_the_residual_of_switched_runs_is_predicted(estimated: bool) -> None:
 def test_parts_that_vibrate_no_more_than_a_solver_errs_have_no_residual() -> None:
     situation = seen(chain.TD_LATE)
     parts = sure(situation.evidence.parts)
-    started = Waves.at(
+    started = Waves(
         np.array([-300 + 900j]), np.array([101 * np.sqrt(parts.vibration_energy(chain.TD_LATE))]), parts.time[0]
     )
     sunk = copy(parts)
