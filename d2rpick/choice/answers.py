@@ -6,9 +6,9 @@ The command line, ``study``, ``check --history``, ``card`` and Python go this on
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, TypeVar
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import Caution, RangeError
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.candidates import Candidate, Candidates, Pair, judge

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import accumulate, chain, pairwise
 from typing import TYPE_CHECKING, Any, Final, overload
 
 import numpy as np
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.tuples import NamedTuple, Record
 from d2rpick.choice.warnings import Objection, objections
 from d2rpick.histories.digits import not_before

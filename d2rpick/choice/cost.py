@@ -15,9 +15,9 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import ConfigurationError, are, name_units
 from d2rpick.histories.source import Source
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import Caution, FormatError, RangeError, are, name_units
 from d2rpick.choice.answers import suggest_of, verify_of
 from d2rpick.choice.candidates import ONE_BODY

@@ -6,12 +6,13 @@ That is the flight, the vibration, the level, and whether anything vibrates.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property, partial
+from functools import cache, partial
 from math import inf
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import RangeError
 from d2rpick.flight.flight import Flight, Seen, find_flight, landed, seen_flight
 from d2rpick.flight.internal_energy import largest, round_off

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from itertools import accumulate
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import Caution, RangeError
 from d2rpick.choice.answers import Suggestion, suggest_at, suggest_of
 from d2rpick.choice.candidates import judged_of

@@ -8,13 +8,13 @@ from __future__ import annotations
 import importlib
 import os
 import sys
-from functools import cached_property
 from inspect import cleandoc
 from typing import TYPE_CHECKING, Any, Final, NoReturn, TypeVar
 
 import click
 
 from d2rpick.base import __version__
+from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import one_line
 
 if TYPE_CHECKING:

@@ -6,11 +6,11 @@ p(t) = p0 + g t - alpha int p dt: linear in p0, g and alpha.
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from d2rpick.base.caching import cached_property
 from d2rpick.flight.window import (
     FEWEST,
     ROUND_OFF,

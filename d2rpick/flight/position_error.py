@@ -11,11 +11,11 @@ does: its momentum is kept, and nothing in it is frozen elsewhere.
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.base.caching import cached_property
 from d2rpick.flight.rotation import moving_apart, off_the_circle, periods_of, shows_rotation
 from d2rpick.flight.turning import Flying, turning_in_flight
 from d2rpick.flight.window import FEWEST

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, TypeAlias, TypeVar
 
 import numpy as np
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import HistoryError, RangeError
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.digits import told_apart

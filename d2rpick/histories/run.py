@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
-from functools import cached_property
 from itertools import compress
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, if_written, listing
 from d2rpick.histories.database import check_sum, doubts
 from d2rpick.histories.history import Balance, Given, History, Momenta, Samples, Track

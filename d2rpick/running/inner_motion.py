@@ -8,11 +8,11 @@ such a gap for flight, and a body that is frozen there never makes the push that
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import RangeError
 from d2rpick.deck.pieces import inner_period
 from d2rpick.flight.flight import Flight

@@ -9,11 +9,12 @@ known.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import listing
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.vibration import MODELS, measures

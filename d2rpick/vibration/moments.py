@@ -6,13 +6,13 @@ The energy around a td is known by its samples, or by modes that describe them.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise
 from math import sqrt
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.caching import cached_property
 from d2rpick.histories.samples import find_crossings, find_turns
 from d2rpick.vibration import measures
 from d2rpick.vibration.modes import Mode

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from d2rpick.base.caching import cached_property
 from d2rpick.histories.history import Memory
 from d2rpick.vibration import measures
 from d2rpick.vibration.identify import Identification, identify, identify_several

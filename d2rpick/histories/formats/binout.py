@@ -11,11 +11,11 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.database import DIGITS, Database
 from d2rpick.histories.formats.lsda import DirectoryLayout, Lsda, Variable, recognises

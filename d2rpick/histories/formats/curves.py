@@ -9,12 +9,12 @@ curves; for each ``number 'name'`` and pairs.
 from __future__ import annotations
 
 import re
-from functools import cached_property
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats.layout import as_number, unique

@@ -11,12 +11,12 @@ import os
 import signal
 import struct
 from contextlib import contextmanager, suppress
-from functools import cached_property
 from importlib import import_module
 from typing import TYPE_CHECKING, BinaryIO, Final
 
 import numpy as np
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, listing, printable
 from d2rpick.base.files import beyond, unpacked_beyond
 from d2rpick.histories.database import DIGITS, Database

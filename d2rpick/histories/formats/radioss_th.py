@@ -8,12 +8,12 @@ How a record lies in the file is said in `radioss_records`.
 
 from __future__ import annotations
 
-from functools import cached_property
 from itertools import accumulate
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.content import Content, content_of

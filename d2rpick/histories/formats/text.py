@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from functools import cached_property
 from itertools import chain, islice
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError
 from d2rpick.base.files import beyond, long_line
 from d2rpick.histories.content import Content, OnDisk, line_at
