@@ -191,17 +191,19 @@ def _each(named: Sequence[str], rules: Configuration, judge: HistoryJudge | None
             folder, file = os.path.split(deck)
             real = os.path.realpath(deck) if os.path.islink(deck) else os.path.join(real_folder(folder), file)  # noqa: PTH114, PTH118
             if real not in seen:
-                found = _found(deck, configured, judge)
+                found = _found(deck, configured, judge, folder)
                 others = [] if isinstance(found, Checked) and found.solver == LS_DYNA else run_files(deck)
                 seen.update([real, *map(os.path.realpath, others)])
                 yield found
 
 
-def _found(name: str, configured: Callable[[str], Configuration], judge: HistoryJudge | None) -> Checked | Unreadable:
+def _found(
+    name: str, configured: Callable[[str], Configuration], judge: HistoryJudge | None, folder: str
+) -> Checked | Unreadable:
     """Check a deck by the configuration nearest to it; what is wrong with either does not hide other decks."""
     source = ""
     try:
-        configuration = configured(os.path.dirname(name))  # noqa: PTH120  a name with a NUL byte has none
+        configuration = configured(folder)
         source = configuration.source
         content = sys.stdin.buffer.read() if name == STDIN else None
         if judge and content is None:

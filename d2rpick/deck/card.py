@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.graph import reached
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.deck.expression import REFERENCE, ExpressionError, Number, evaluate, names_in, number
+from d2rpick.deck.expression import REFERENCE, ExpressionError, Number, evaluate, names_in, number, of_kind, plain
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -101,9 +101,10 @@ class Row:
 
     def cell(self, position: int) -> str:
         """Text of a field alone; all are kept, since they are asked for one after the other, and again."""
-        if self._cells is None:
-            self._cells = [text.strip() for text in self._pieces()]
-        return self._cells[position] if position < len(self._cells) else ""
+        cells = self._cells
+        if cells is None:
+            cells = self._cells = [*map(str.strip, self._pieces())]
+        return cells[position] if position < len(cells) else ""
 
     def _pieces(self) -> list[str]:
         line, width = self.text, self.width
@@ -204,14 +205,11 @@ class Card:
         text = row.cell(position)
         if not text:
             return Value(default, row, "", (), position)
-        try:
-            exact = float(self.scope.value(text) if "&" in text or text[0] == "<" else number(text))
-            value, problem = kind(exact), ""
-            if value != exact:
-                value, problem = default, f"{text!r} is not an integer"
-        except (ExpressionError, OverflowError) as error:
-            value, problem = default, str(error)
-        return Value(value, row, problem, names_in(text) if "&" in text else (), position)
+        parameters: tuple[str, ...] = ()
+        if (found := plain(kind, text)) is None:
+            found, parameters = of_kind(kind, text, self.scope.value), names_in(text)
+        value, problem = found
+        return Value(default if problem else value, row, problem, parameters, position)
 
     def positive(self, row: Row, position: int) -> float | None:
         """Read a positive number, or None; of an include in other units none is known."""

@@ -10,7 +10,7 @@ import math
 import operator
 import re
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -49,6 +49,28 @@ def number(text: str) -> Number:
     if exponent is None and "." not in mantissa:
         return _checked(int(mantissa))
     return _checked(float(f"{mantissa}e{exponent or 0}"))
+
+
+@lru_cache(4096)
+def plain(kind: Callable[[float], Any], text: str) -> tuple[Any, str] | None:
+    """Give what `of_kind` says of a text that is a number by itself; None of one that is to be evaluated."""
+    return None if "&" in text or text[0] == "<" else of_kind(kind, text, number)
+
+
+def of_kind(kind: Callable[[float], Any], text: str, value: Callable[[str], Number]) -> tuple[Any, str]:
+    """Value of a text as a number of a kind, int or float; or why it has none.
+
+    Examples
+    --------
+    >>> of_kind(int, "2.0", number), of_kind(int, "2.5", number)
+    ((2, ''), (None, "'2.5' is not an integer"))
+    """
+    try:
+        exact = float(value(text))
+        found = kind(exact)
+    except (ExpressionError, OverflowError) as error:
+        return None, str(error)
+    return (found, "") if found == exact else (None, f"{text!r} is not an integer")
 
 
 def real(text: str) -> float:

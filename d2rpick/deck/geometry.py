@@ -12,11 +12,11 @@ The mass of a part is spread evenly over its elements, each of which counts as a
 from __future__ import annotations
 
 import math
-from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.base.caching import cached_property
 from d2rpick.deck.mesh import NO_NODE, Elements
 from d2rpick.deck.model import DISCRETE
 

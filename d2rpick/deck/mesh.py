@@ -7,11 +7,11 @@ taken one by one.  Columns of Radioss: Altair's public help for the elements, an
 from __future__ import annotations
 
 import math
-from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import name_units
 from d2rpick.deck.expression import ExpressionError, real
 from d2rpick.deck.radioss_deck import Starter, number_of

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
-from functools import cached_property
 from itertools import pairwise
 from math import inf
 from typing import TYPE_CHECKING, Final, NamedTuple, TypeVar
 
 import numpy as np
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.graph import reached
 from d2rpick.deck.mesh import NO_NODE, Elements, NodeTable, distinct
 

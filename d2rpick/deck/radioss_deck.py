@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import TYPE_CHECKING, Final, NamedTuple
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.graph import reached
 from d2rpick.deck.card import Card, Field, Row, Scope, Value
 from d2rpick.deck.expression import ExpressionError, number, real

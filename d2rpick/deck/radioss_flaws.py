@@ -6,11 +6,11 @@ public help for /RWALL, /RBODY, /INIVEL and /INIV, and runs computed with OpenRa
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import in_rows
 from d2rpick.deck.mesh import KINDS, NOT_COUNTED, elements_of, nodes_of
 from d2rpick.deck.radioss_deck import Body, Start, Starter, number_of, reals

@@ -10,10 +10,10 @@ import math
 import os
 import re
 from dataclasses import dataclass, field
-from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import DeckError, are, in_rows, name_units
 from d2rpick.deck.card import Field, Value
 from d2rpick.deck.radioss_deck import (

@@ -7,10 +7,11 @@ import re
 from bisect import bisect_right
 from collections import defaultdict
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import lru_cache
 from itertools import chain
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import DeckError
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.card import LONG, STANDARD, Card, Field, Problem, Row, Scope, Transform
@@ -129,7 +130,7 @@ class Deck:
         """Cards of a deck that was read whose keyword is one of ``names``, or one with an option behind ``_``."""
         found = [self._by_name[name] for name in names if name in self._by_name]
         if len(found) < 2:
-            return [*chain(*found)]
+            return [*found[0]] if found else []
         chosen = {*chain(*found)}
         return [card for card in self.cards if card in chosen]
 
@@ -138,10 +139,8 @@ class Deck:
         """Cards by their names, and by what stands there before an ``_``: every rule asks for some."""
         found: defaultdict[str, list[Card]] = defaultdict(list)
         for card in self.cards:
-            end = len(name := card.name)
-            while end > 0:
-                found[name[:end]].append(card)
-                end = name.rfind("_", 0, end)
+            for name in _stems(card.name):
+                found[name].append(card)
         return found
 
     def silences(self, rule: str, file: str, line: int) -> bool:
@@ -168,6 +167,12 @@ class Deck:
         for cards in found.values():
             cards.sort(key=lambda card: card.line)
         return found
+
+
+@lru_cache(1024)  # decks use the same keywords
+def _stems(name: str) -> tuple[str, ...]:
+    """Give a name, and what stands there before an ``_``."""
+    return tuple(name[:at] for at in range(len(name), 0, -1) if name[at : at + 1] in ("", "_"))
 
 
 def read_deck(path: str, content: bytes | SourceFile | None = None) -> Deck:

@@ -1,148 +1,27 @@
-"""A deck file: where its keywords stand, found without a look at each line of its mesh, and the lines between two.
-
-All bytes are of one state of the file: a deck is saved by an editor, or written anew by a pre-processor, while its rows
-are still to be read.  A small file is held in memory.  A big one is opened whenever some of it is wanted, so that no
-number of includes uses up the open files of a process; a file that is not as it was then is an error.  Files are not
-mapped into memory: where a mapped page is cut off, the system ends the process.
-"""
+"""A deck file: where its keywords stand, found without a look at each line of its mesh, and the lines between two."""
 
 from __future__ import annotations
 
-import os
+import _thread
 import re
 from bisect import bisect_right
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import islice, zip_longest
-from threading import Thread
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import DeckError
-from d2rpick.base.files import FileState, at_rest, beyond, bound, long_line
+from d2rpick.base.files import beyond, bound, long_line
+from d2rpick.deck.stored import HELD, Held, stored
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, MutableSequence, Sequence
-    from io import FileIO
 
-    Filling = Callable[[bytearray, int, int], int]  # puts the bytes from one place to another first, and counts them
-
-
-_HELD: Final = 1 << 18  # a file up to this size is held in memory: a deck may have thousands of them
-_WINDOW: Final = 1 << 16  # bytes read at a time where few are wanted: more will be, close to them
-_KEPT: Final = 8  # windows held: the ends of a deck's large blocks are looked at again and again
+    from d2rpick.deck.stored import OnDisk
 
 
-class Held:
-    """Bytes in memory."""
-
-    def __init__(self, data: bytes) -> None:
-        self._data, self.size = data, len(data)
-
-    def read(self, begin: int, end: int) -> bytes:
-        """Bytes from ``begin`` to ``end``, less where the file ends before."""
-        return self._data[begin:end]
-
-    @contextmanager
-    def opened(self) -> Iterator[Filling]:
-        """Give a function that puts bytes into a buffer."""
-        yield self._fill
-
-    def _fill(self, room: bytearray, begin: int, end: int) -> int:
-        data = self._data[begin:end]
-        room[: len(data)] = data
-        return len(data)
-
-
-class OnDisk:
-    """Bytes of a file that are read when they are asked for; DeckError when it is not as it was at first.
-
-    ``window`` bytes are read at a time where few are wanted.
-    """
-
-    def __init__(self, name: str, state: FileState, window: int = _WINDOW) -> None:
-        self.size = state.size
-        self._name, self._state, self._window = name, state, window
-        self._windows: dict[int, bytes] = {}  # by where they begin, the oldest first
-
-    def read(self, begin: int, end: int) -> bytes:
-        """Bytes from ``begin`` to ``end``, less where the file ends before."""
-        end = min(end, self.size)
-        if begin >= end:
-            return b""
-        if end - begin > self._window:
-            return self._read(begin, end)
-        low = begin // self._window * self._window
-        if end > low + len(window := self._windows.get(low, b"")):
-            window = self._read(low, min(-(-end // self._window) * self._window, self.size))
-            self._windows[low] = window
-            if len(self._windows) > _KEPT:
-                del self._windows[next(iter(self._windows))]
-        return window[begin - low : end - low]
-
-    @contextmanager
-    def opened(self) -> Iterator[Filling]:
-        """Give a function that puts bytes into a buffer; what it gave is sure when the context is left."""
-        with _opened(self._name) as file:
-            yield lambda room, begin, end: self._fill(file, room, begin, end)
-            if not FileState.of(file).is_as(self._state):
-                raise self._changed()
-
-    def _read(self, begin: int, end: int) -> bytes:
-        room = bytearray(end - begin)
-        with self.opened() as fill:
-            fill(room, begin, end)
-        return bytes(room)
-
-    def _fill(self, file: FileIO, room: bytearray, begin: int, end: int) -> int:
-        done, wanted = 0, memoryview(room)[: end - begin]
-        while done < len(wanted):  # a single call may give less
-            count = _read_at(file, wanted[done:], begin + done)
-            if not count:
-                raise self._changed()
-            done += count
-        return done
-
-    def _changed(self) -> DeckError:
-        found = f"{self._name}: the file was rewritten or replaced while it was read"
-        return DeckError(f"{found}; read it again when it is complete")
-
-
-def stored(name: str) -> Held | OnDisk:
-    """Bytes of a file: held in memory where it is small or no regular file.
-
-    Raises
-    ------
-    DeckError
-        If it cannot be opened, is a device, or changes all the time.
-    """
-    with _opened(name) as file:
-        state = at_rest(name, file, DeckError)
-    if isinstance(state, bytes):
-        return Held(state)
-    on_disk = OnDisk(name, state)
-    return Held(on_disk.read(0, state.size)) if state.size <= _HELD else on_disk
-
-
-def _read_at(file: FileIO, room: memoryview, begin: int) -> int:
-    """Put bytes from a place on into ``room``, and count them; in one call where the system has one for that."""
-    if hasattr(os, "preadv"):
-        return os.preadv(file.fileno(), [room], begin)
-    file.seek(begin)
-    return file.readinto(room)
-
-
-def _opened(name: str) -> FileIO:
-    try:
-        return open(name, "rb", buffering=0)  # noqa: PTH123  start-up; it is given back
-    except FileNotFoundError:
-        raise DeckError(f"{name}: no such file; check the name and the folder") from None
-    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
-        reason = getattr(error, "strerror", None) or error
-        raise DeckError(f"{name}: cannot be read ({reason}); check the name and the permissions") from None
-
-
-_SEARCHED: Final = 1 << 20  # bytes looked at together: they stay in the cache, always in the same place
+_SEARCHED: Final = 3 << 18  # bytes looked at together: they stay in the cache, always in the same place
 _HELPERS: Final = 1  # threads beside the first: the system copies bytes for all at once, but one at a time searches
 _ALONE: Final = 4  # pieces that one thread searches before another one would have begun
 _LOOKBACK: Final = 32  # bytes in front of a piece, where blanks before its first mark stand, or a head that it cuts
@@ -159,15 +38,12 @@ def find_marks(
     A file of more than ``alone`` pieces of so many bytes is searched by ``helpers`` threads beside this one.
     """
     search = _Search(file, piece)
-    threads = [Thread(target=search.help) for _ in range(helpers if len(search.pieces) > alone else 0)]
-    for thread in threads:
-        thread.start()
     try:
+        for _ in range(helpers if len(search.pieces) > alone else 0):
+            search.call_for_help()
         search.go_on()
     finally:
         search.stop()
-        for thread in threads:
-            thread.join()
     return search.result()
 
 
@@ -181,6 +57,23 @@ class _Search:
         self._room: Callable[[Iterable[int]], MutableSequence[int]] = list if len(self.pieces) == 1 else _compact
         self._waiting: Iterator[int] = iter(self.pieces)
         self._found: dict[int, Sequence[int]] = {}
+        self._helping: list[_thread.LockType] = []  # each is released by its thread in the end
+
+    def call_for_help(self) -> None:
+        """Have a thread begin beside this one, which does not wait for it: that would take as long as two pieces."""
+        helping = _thread.allocate_lock()
+        helping.acquire()
+        with suppress(RuntimeError):  # there may be no more threads: then there is no help
+            _thread.start_new_thread(self._help, (helping,))
+            self._helping.append(helping)
+
+    def _help(self, helping: _thread.LockType) -> None:
+        """Search beside others; the pieces of a thread with which something goes wrong are left to `result`."""
+        try:
+            with suppress(DeckError, OSError):
+                self.go_on()
+        finally:
+            helping.release()
 
     def go_on(self) -> None:
         """Search what waits, all of it in one buffer: fresh memory costs more than what is put into it."""
@@ -195,13 +88,10 @@ class _Search:
         self._found |= found  # not before: only now it is sure that the file did not change
 
     def stop(self) -> None:
-        """Let nothing wait: where this thread was interrupted, no other one goes on."""
+        """Let nothing wait, so that no other thread goes on where this one was interrupted, and wait for those."""
         self._waiting = iter(())
-
-    def help(self) -> None:
-        """Search beside others; the pieces of a thread with which something goes wrong are left to `result`."""
-        with suppress(DeckError, OSError):
-            self.go_on()
+        for helping in self._helping:
+            helping.acquire()
 
     def result(self) -> Sequence[int]:
         """All that was found; what a helper left is searched here, where an error is heard."""
@@ -314,7 +204,7 @@ class SourceFile:
         return data.decode("latin-1")
 
     def _refuse_long_line(self, data: bytes, start: int) -> None:
-        if (at := long_line(data, self._longest)) >= 0:
+        if len(data) > self._longest and (at := long_line(data, self._longest)) >= 0:
             raise DeckError(f"{self.name}:{self.line_at(start + at)}: the line has {beyond('LINE')}")
 
     def sha256(self) -> str:
@@ -336,7 +226,7 @@ class SourceFile:
     @cached_property
     def silences(self) -> bool:
         """Whether comments may silence rules; of a large file, which is not read for that, it is not known."""
-        return self._file.size > _HELD or b"d2rpick" in self.read(0).lower()
+        return self._file.size > HELD or b"d2rpick" in self.read(0).lower()
 
     def line_at(self, offset: int) -> int:
         """Return the number of the line, from 1, that holds the byte at ``offset``."""

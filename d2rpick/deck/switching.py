@@ -11,9 +11,9 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Final, Literal
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.card import Field, Row, Value
 from d2rpick.deck.reader import SWITCHING, Deck

@@ -233,8 +233,8 @@ def _findings(case: Case, configuration: Configuration) -> Iterator[Finding]:
 def _read(path: str, content: bytes | None, judge: Judge | None) -> Case:
     """Read a deck by what it is: a run of Radioss, or an LS-DYNA deck."""
     source = SourceFile(path, content)
-    given = content is not None or os.path.isfile(path)  # noqa: PTH113  a pipe gives its bytes once
-    if given and recognises(source.read(0, HEAD)):
+    of_radioss = source.read(0, 1) != b"*" and recognises(source.read(0, HEAD))
+    if of_radioss and (content is not None or os.path.isfile(path)):  # noqa: PTH113  a pipe gives its bytes once
         from d2rpick.deck.radioss_run import read_run  # not above: start-up
 
         run = read_run(path, content)

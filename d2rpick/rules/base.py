@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cached_property
 from typing import TYPE_CHECKING, TypeVar
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, one_line
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.ls_dyna_parts import Constraint, Parts, read_constraints, read_parts, read_sections

@@ -8,7 +8,8 @@ import pytest
 from d2rpick.base.errors import DeckError
 from d2rpick.deck.mesh import KINDS, NOT_COUNTED
 from d2rpick.deck.reader import holds_mesh, read_deck
-from d2rpick.deck.source import Block, Held, SourceFile, find_marks
+from d2rpick.deck.source import Block, SourceFile, find_marks
+from d2rpick.deck.stored import Held
 from d2rpick.deck.switching import read_switching
 from d2rpick.rules.rule import BACK, END, GOOD, HEAD, PARTS, THERE, automatic
 from tests.decks import found, read, spans

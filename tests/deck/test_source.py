@@ -17,13 +17,14 @@ from hypothesis import given, strategies as st
 
 from d2rpick.base.errors import DeckError
 from d2rpick.base.files import FileState
-from d2rpick.deck.source import Held, OnDisk, SourceFile, find_marks
+from d2rpick.deck.source import SourceFile, find_marks
+from d2rpick.deck.stored import Held, OnDisk
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from d2rpick.deck.source import Filling
+    from d2rpick.deck.stored import Filling
 
 HEAD = b"-----BEGIN PGP MESSAGE"
 MARK = b"\xef\xbb\xbf"
@@ -115,6 +116,14 @@ class Failing(Held):
 def test_what_goes_wrong_in_a_thread_is_said() -> None:
     with pytest.raises(OSError, match="Input/output"):
         find_marks(Failing(b"*NODE\n" * 100), 64, alone=0)
+
+
+def test_where_no_more_threads_are_allowed_one_searches_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none_left(*_: object) -> None:
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr("_thread.start_new_thread", none_left)
+    assert [*find_marks(Held(b"*NODE\n" * 100), 64, alone=0)] == [*range(0, 600, 6)]
 
 
 class Interrupted(Held):
