@@ -192,8 +192,10 @@ def _grow(
     for _ in range(_MOST_REFITS):
         if not fit.follows or fit.mode is None:
             return None, fit
-        grown = span_of(history, min(td, window.end), fit, bounds)
         least = max(_LEAST_PERIODS * 2 * np.pi / fit.mode.omega, _MOST * (window.end - window.start))
+        # of a period far beyond the record, means over a part of it would be of far more samples than there are
+        possible = least <= bounds.end - bounds.start
+        grown = span_of(history, min(td, window.end), fit, bounds) if possible else None
         if grown is None or grown.end - grown.start < least:
             reason = fit.reason or "an oscillator fits only a part of the record"
             return None, fit._replace(describes_record=False, reason=reason)

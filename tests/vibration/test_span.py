@@ -1,5 +1,7 @@
 """The window in which a record stays with an oscillator, what is tried to find it, and what may hide in its rest."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -53,6 +55,17 @@ def test_a_refusal_on_a_few_samples_names_the_misfit_of_all() -> None:
     ):
         assert (found.mode, found.describes_record) == (None, False)
         assert found.reason
+
+
+def test_an_energy_that_only_rises_takes_no_memory_for_periods_beyond_the_record() -> None:
+    energy = (8192e3 + np.arange(2000.0)).astype(np.float32).astype(np.float64)
+    tracemalloc.start()
+    span, fit = described_span(table(np.arange(2000.0), energy), 1000.0, Span(0.0, 1999.0))
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert (span, fit.describes_record) == (None, False)
+    assert "vibration period" in fit.reason
+    assert most < 100 * energy.nbytes
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.02])
