@@ -302,19 +302,20 @@ def _oscillator(
         return _resolved(history, fit, fits), span_of(history, td, fit, bounds) if fit.describes_record else None
     if settings.oscillator:
         given = fits.remembered("given", partial(judge_given, settings.oscillator))
-        span, fit = described_span(history, td, bounds, given, whole=whole)
+        span, fit = described_span(history, td, bounds, given, whole=whole, memory=fits)
         return fit, span
     known = fits.once(("described", bounds), list[tuple[Identification, Span]])
     around = [one for one in known if one[1].start <= td <= one[1].end]
     if quick and around:
         return around[0]
     one = fits.remembered("one", partial(identify, memory=fits))
-    span, fit = described_span(history, td, bounds, partial(one, quick=True) if quick else one, whole=whole)
+    fitter = partial(one, quick=True) if quick else one
+    span, fit = described_span(history, td, bounds, fitter, whole=whole, memory=fits)
     if span is None:
         fitter = partial(
             fits.remembered("several", partial(identify_several, memory=fits)), quick=True
         )  # nobody asks why it is refused
-        span, several = described_span(history, td, bounds, fitter, whole=whole)
+        span, several = described_span(history, td, bounds, fitter, whole=whole, memory=fits)
         fit = several if span else fit
     fit = _resolved(history, fit, fits)
     if span and span.end - span.start >= _MOST_OF_RECORD * (bounds.end - bounds.start):

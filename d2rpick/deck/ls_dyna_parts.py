@@ -141,14 +141,13 @@ def _take_parts(card: Card, parts: Parts) -> None:
     if not options <= _FOLLOWED:
         parts.all_known = False
         return
-    rows = list(card.rows)
-    while len(rows) > 1:  # a title, the ids, and what the options add
-        _, ids, *rest = rows
-        _add(card, rows[:2], material_of(card, ids, 2), parts)
-        skip = sum(_EXTRA_LINES.get(option, 0) for option in options)
-        if "INERTIA" in options and rest and card.integer(rest[0], 4).value == _ROTATED:
-            skip += 1
-        rows = rest[skip:]
+    rows, at = card.rows, 0
+    added = sum(_EXTRA_LINES.get(option, 0) for option in options)
+    while at + 1 < len(rows):  # a title, the ids, and what the options add
+        _add(card, rows[at : at + 2], material_of(card, rows[at + 1], 2), parts)
+        at += 2
+        turned = "INERTIA" in options and at < len(rows) and card.integer(rows[at], 4).value == _ROTATED
+        at += added + turned
 
 
 def _add(card: Card, lines: Sequence[Row], material: str, parts: Parts) -> None:

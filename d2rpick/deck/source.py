@@ -116,8 +116,14 @@ def _starred(piece: bytearray, first: int, end: int) -> list[int]:
         before = piece[max(0, at - _LOOKBACK) : at].rstrip(b" ")
         if before.endswith(b"\n") or (not before and at < _LOOKBACK):
             found.append(at)
-        at = piece.find(b"*", at + 1, end)
+        at = _below(piece, b"*", at, end)
     return found
+
+
+def _below(piece: bytearray, letter: bytes, at: int, end: int) -> int:
+    """Place of the next such letter below the line of ``at``: one line may have many, and begins once."""
+    line = piece.find(b"\n", at, end)
+    return piece.find(letter, line, end) if line >= 0 else -1
 
 
 def _encrypted(piece: bytearray, first: int, end: int) -> list[int]:
@@ -128,7 +134,7 @@ def _encrypted(piece: bytearray, first: int, end: int) -> list[int]:
         before = bytes(piece[max(0, start - 1) : max(0, start)])
         if start >= 0 and piece.startswith(_PGP, start, end) and before in (b"", b"\n"):
             found.append(start)
-        at = piece.find(b"G", at + 1, end)
+        at = _below(piece, b"G", at, end)
     return found
 
 

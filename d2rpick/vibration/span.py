@@ -23,7 +23,7 @@ from d2rpick.vibration.identify import (
 from d2rpick.vibration.modes import BLOCK, Mode, Modes
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
     from typing import Protocol
 
     class Fitter(Protocol):
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
         def __call__(self, time: Samples, energy: Samples, *, quick: bool = False) -> Identification:
             """Fit and judge an oscillator, as `identify` does."""
+
+    Reach = Callable[[float, Identification], "Span | None"]  # how far the record around a time stays with a fit
 
     class Damped(Protocol):
         """What is fitted to an energy: modes, or waves whose deformations add up."""
@@ -75,7 +77,13 @@ class Span(NamedTuple):
 
 
 def described_span(
-    history: History, td: float, bounds: Span, fitter: Fitter = identify, *, whole: bool = False
+    history: History,
+    td: float,
+    bounds: Span,
+    fitter: Fitter = identify,
+    *,
+    whole: bool = False,
+    memory: Memory | None = None,
 ) -> tuple[Span | None, Identification]:
     """Find the longest window around td that one oscillator describes, or the last one before td.
 
@@ -93,6 +101,8 @@ def described_span(
         Gives the oscillator for some samples: `identify`, `identify_several` or one that is given.
     whole : bool
         Try nothing shorter than the bounds and their part up to td: it is known that no load acts there.
+    memory : Memory
+        Of the record: how far it stays with which fit is looked for once.
 
     Returns
     -------
@@ -102,13 +112,23 @@ def described_span(
         Of that window; when there is none, of the bounds up to td, with the reason of its refusal.
     """
     quick, up_to_td = partial(fitter, quick=True), Span(bounds.start, _mark(td, bounds))
+    reach = partial(_reach, history, bounds, memory or Memory())
     refused = {}
     for window in _windows(td, bounds, whole=whole):
-        span, fit = _grow(history, td, window, bounds, fitter if window == up_to_td else quick)
+        span, fit = _grow(history, td, window, bounds, fitter if window == up_to_td else quick, reach)
         if span:
             return span, fit
         refused[window] = fit
     return None, refused[up_to_td]
+
+
+def _reach(history: History, bounds: Span, memory: Memory, anchor: float, fit: Identification) -> Span | None:
+    """Give the `span_of` a fit; all times in it have the same, which every td near it asks for."""
+    known = memory.once(("spans", fit.mode, fit.rms, fit.structure, bounds), list[Span])
+    span = next((one for one in known if one.start <= anchor <= one.end), None)
+    if span is None and (span := span_of(history, anchor, fit, bounds)):
+        known.append(span)
+    return span
 
 
 def span_of(history: History, anchor: float, fit: Identification, bounds: Span) -> Span | None:
@@ -185,7 +205,7 @@ def _mark(time: float, bounds: Span, after: int = 0) -> float:
 
 
 def _grow(
-    history: History, td: float, window: Span, bounds: Span, fitter: Fitter
+    history: History, td: float, window: Span, bounds: Span, fitter: Fitter, reach: Reach
 ) -> tuple[Span | None, Identification]:
     """Fit a window, extend it while the record stays with the fit, refit, repeat until it stays."""
     fit, span = fitter(*history.between(*window)), window
@@ -195,21 +215,21 @@ def _grow(
         least = max(_LEAST_PERIODS * 2 * np.pi / fit.mode.omega, _MOST * (window.end - window.start))
         # of a period far beyond the record, means over a part of it would be of far more samples than there are
         possible = least <= bounds.end - bounds.start
-        grown = span_of(history, min(td, window.end), fit, bounds) if possible else None
+        grown = reach(min(td, window.end), fit) if possible else None
         if grown is None or grown.end - grown.start < least:
             reason = fit.reason or "an oscillator fits only a part of the record"
             return None, fit._replace(describes_record=False, reason=reason)
         if grown == (fit.start, fit.end):
             if not fit.describes_record:  # too short, say
                 return None, fit
-            return _cleared(history, grown, fit, bounds, fitter)
+            return _cleared(history, grown, fit, bounds, fitter, reach)
         span = grown
         fit = fitter(*history.between(*span))
     return (span, fit) if fit.describes_record else (None, fit)
 
 
 def _cleared(
-    history: History, span: Span, fit: Identification, bounds: Span, fitter: Fitter
+    history: History, span: Span, fit: Identification, bounds: Span, fitter: Fitter, reach: Reach
 ) -> tuple[Span, Identification]:
     """Fit the window once more without half a period at the ends where the record leaves it.
 
@@ -227,7 +247,7 @@ def _cleared(
     core = fitter(*history.between(*inner))
     if not core.describes_record or core.rms > _MUCH_BETTER * fit.rms:
         return span, fit
-    return span_of(history, (inner.start + inner.end) / 2, core, bounds) or span, core
+    return reach((inner.start + inner.end) / 2, core) or span, core
 
 
 class Fits(Memory):
