@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 # Candidates that are looked at together, at most: arrays of more are no faster, and noise makes tens of thousands a td.
 _MOST: Final = 20_000
+_MORE: Final = 8  # times as many td at once as before: the first may have few candidates, and the last many
 # A residual that may be so much higher is worth a note.
 MUCH_HIGHER = 0.1
 ONE_BODY = "the parts become one rigid body"
@@ -303,7 +304,8 @@ def judged_of(situations: Sequence[Situation], *, in_flight: bool = False, most:
         found = moments_of([one.vibration for one in asked], asked[0].settings.tolerance, starts)
         kept = [_at_start(one) or _distinct(one, moments) for one, moments in zip(asked, found, strict=True)]
         yield Judged.of(asked, kept)
-        first, together = first + together, max(1, most // max(1, *map(len, kept)))
+        first += together
+        together = max(1, min(_MORE * together, most // max(1, *map(len, kept))))
 
 
 def judge(situation: Situation, times: Iterable[float]) -> Candidates:

@@ -76,6 +76,13 @@ def test_candidates_of_many_td_are_those_of_each_also_where_few_fit_together() -
     assert list(judged_of([])) == []
 
 
+def test_a_first_td_with_few_candidates_does_not_let_all_others_be_judged_at_once() -> None:
+    energy = np.r_[np.zeros(20), 4 + np.random.default_rng(1).random(4000)]
+    look = looking(of(energy, np.arange(energy.size, dtype=float)), PLAIN)
+    situations = [look(td) for td in (10.0, *np.linspace(3900, 4000, 40))]
+    assert max(judged.place.size for judged in judged_of(situations, most=4000)) < 40_000
+
+
 @pytest.mark.parametrize("noise", [0.0, 0.8])
 def test_a_candidate_alone_is_the_one_among_all(noise: float) -> None:
     clean = vibration()
