@@ -49,7 +49,9 @@ MAX_MISFIT: Final = 0.4  # beyond, more than 16 % of the variance is unexplained
 _FAR_TOO_MUCH: Final = 1.2  # times that: the variance of two thousand samples is known to a thirtieth
 STARTS: Final = 3  # refined at most: with noise the first in rank may not be the one that ends best
 CERTAIN: Final = 0.01  # of the variance unexplained: no second start need be tried
-_MAX_STEPS: Final = 40  # a good start needs 4 to 8
+_MAX_STEPS: Final = 40
+_USUAL: Final = 10  # a good start needs 4 to 8
+_DRIFT: Final = 0.1 * 2 * np.pi  # rate over the record: a tenth of a period is a drift, and stays one
 
 
 def fit_few(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int, worst: float) -> Samples | None:
@@ -63,7 +65,7 @@ def fit_few(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int, wo
 
 def fit(few: Samples | None, s: Samples, e: Samples, size: int, worst: float = np.inf) -> Samples | None:
     """Return the parameters for all samples from those of `fit_few`; None without, and as for `fit_all`."""
-    best = fit_all(few, partial(energy_and_jacobian, size=size), s, e, worst)
+    best = fit_all(few, partial(energy_and_jacobian, size=size), s, e, worst, slice(1))
     if best is None:
         return None
     if best[5] < 0:  # q and -q make the same energy; the preload is taken positive
@@ -73,12 +75,12 @@ def fit(few: Samples | None, s: Samples, e: Samples, size: int, worst: float = n
     return best
 
 
-def fit_all(best: Samples | None, model: Model, s: Samples, e: Samples, worst: float) -> Samples | None:
-    """Return the best fit to all samples from the ``best`` one to a few of them.
+def fit_all(best: Samples | None, model: Model, s: Samples, e: Samples, worst: float, rates: slice) -> Samples | None:
+    """Return the best fit to all samples from the ``best`` one to a few of them; ``rates`` are where it has those.
 
     None without that, or where ``worst`` is finite and these or some more of the samples are left with a structure that
     is too large.  A fit that leaves far too much of some of the samples is not brought to its best for all of them: it
-    is refused, and would crawl.
+    is refused, and would crawl.  Where ``worst`` is finite, no other one that is sure to be refused crawls for long.
     """
     quick, few = np.isfinite(worst), _few(s, e)
     if best is None or (quick and _structured(best, model, *few)):
@@ -92,7 +94,12 @@ def fit_all(best: Samples | None, model: Model, s: Samples, e: Samples, worst: f
             return None
         if left > _FAR_TOO_MUCH * MAX_MISFIT**2 * some[0].size * float(np.var(some[1])):
             return best
-    return minimise(best, model, s, e)[0]
+    more = _few(s, e, BLOCK)
+
+    def doomed(found: Samples) -> bool:
+        return quick and (np.abs(found[rates]).min() < _DRIFT or _structured(found, model, *more))
+
+    return minimise(best, model, s, e, doomed=doomed)[0]
 
 
 def _few(s: Samples, e: Samples, most: int = COARSE) -> tuple[Samples, Samples]:
@@ -202,13 +209,19 @@ def _starts(poles: NDArray[np.complex128], s: Samples, e: Samples, *, size: int)
 
 @np.errstate(over="ignore", invalid="ignore")  # a trial step too far; it is rejected
 def minimise(
-    parameters: Samples, model: Model, s: Samples, e: Samples, hopeless: float = np.inf, near: float = 1e-12
+    parameters: Samples,
+    model: Model,
+    s: Samples,
+    e: Samples,
+    hopeless: float = np.inf,
+    near: float = 1e-12,
+    doomed: Callable[[Samples], bool] = lambda _: False,
 ) -> tuple[Samples, float]:
     """Refine parameters by Levenberg-Marquardt; return them and the sum of squares.
 
     Parameters that the model gives no derivatives by stay.  It ends where a step gains no more than ``near`` of the
     sum of squares, and early where steps like the last would not bring
-    the sum of squares down to ``hopeless``.
+    the sum of squares down to ``hopeless``, or it takes more steps than usual to an end that is ``doomed``.
     """
     damping = 1e-4  # of the unit diagonal: starts are close, so steps may be long
     cost, normal, gradient = _normal_equations(parameters, model, s, e)
@@ -229,7 +242,7 @@ def minimise(
                 break
         else:
             damping *= 10
-        if expected <= near * cost + 1e-31 * e.size:
+        if expected <= near * cost + 1e-31 * e.size or (left == _MAX_STEPS - _USUAL and doomed(parameters)):
             break
     return parameters, cost
 
@@ -283,7 +296,7 @@ def fit_several(pencil: Pencil, s: Samples, e: Samples, count: int, worst: float
     """
     few = _few(s, e)
     best = refine(_starts_of_several(pencil, count, *few), sum_and_jacobian, *few, worst)
-    return fit_all(best, sum_and_jacobian, s, e, worst)
+    return fit_all(best, sum_and_jacobian, s, e, worst, slice(1, None, 3))
 
 
 def _starts_of_several(pencil: Pencil, count: int, s: Samples, e: Samples) -> list[Samples]:
