@@ -110,6 +110,8 @@ SEARCHES = (
     ("wide window", ("suggest", "--td-window", "0.3", "0.9"), 3.0),
     ("explore", ("explore", "--steps", "200"), 10.0),
 )
+# No flight is seen: each td looks at windows of its own, down to short ones.
+UNSEEN = (*SEARCHES[1:2], ("explore", ("explore", "--td", "0.9", "--steps", "200"), 15.0))
 STARTS = (
     *((("info", f"sample_data/rollover_box{kind}"), 1.5) for kind in (".h5", ".binout", ".matsum", "T01")),
     (("plan", "sample_data/energy.csv"), 2.0),
@@ -161,6 +163,11 @@ ROWS = (
         for kind in ("clean", "noise 1 %")
         for states in (10_000, 100_000)
         for what, command, most in SEARCHES
+    ),
+    *(
+        Row(f"{what} / --td, {trouble}, 1e4", choosing("search_to_td", trouble, 10_000, *command), most)
+        for trouble in ("a rise", "a rise and a vibration", "noise alone", "below zero")
+        for what, command, most in UNSEEN
     ),
     Row("suggest of 50 parts, 2000 states / reading matsum", choosing("parts_to_matsum", 50)),
     Row("suggest of 500 parts, 2000 states / reading matsum", choosing("parts_to_matsum", 500), most=4.0),

@@ -169,13 +169,15 @@ def _noisy(states: int) -> Path:
 
 
 def _trouble(name: str, states: int) -> Path:
-    """A record of a kind that is hard to choose in: many modes, noise, impacts."""
+    """A record of a kind that is hard to choose in: many modes, noise, impacts, energies that rise or are negative."""
     rng = np.random.default_rng(14)
     many = zip(rng.uniform(8, 40, 200), rng.uniform(0.3, 1, 200), rng.uniform(0, np.pi, 200), strict=True)
+    rise = {"a rise": 3.0, "a rise and a vibration": 3.0}.get(name, 0.0)
+    level = {"noise alone": 4.0, "below zero": -4.0}.get(name, 0.0)
     impacts = {"several flights": [(0.05, 6.0), (0.35, 4.0), (0.7, 3.0)], "chaotic contact": _chaotic(40)}
-    modes = {"200 modes": tuple(many), "chaotic contact": _MODES}.get(name, _THREE)
-    noise = {"noise 1 %": 0.01, "noise 10 %": 0.1}.get(name, 0.0)
-    return _ringing(f"{name}{states}.csv", states, modes, noise, impacts.get(name, ()))
+    modes = {"200 modes": tuple(many), "chaotic contact": _MODES, "a rise": (), "noise alone": ()}.get(name, _THREE)
+    noise = {"noise 1 %": 0.01, "noise 10 %": 0.1, "noise alone": 0.01}.get(name, 0.0)
+    return _ringing(f"{name}{states}.csv", states, modes, noise, impacts.get(name, ()), (level, rise))
 
 
 def _chaotic(count: int) -> list[tuple[float, float]]:
@@ -192,11 +194,12 @@ def _ringing(
     modes: Sequence[tuple[float, float, float]],
     noise: float,
     impacts: Sequence[tuple[float, float]] = (),
+    line: tuple[float, float] = (0.0, 0.0),
 ) -> Path:
-    """Energy of modes of one damping, with white noise [of its largest] and impacts at (time, height)."""
+    """Energy of modes of one damping over a line, with white noise [of its largest] and impacts at (time, height)."""
     time = np.linspace(0.0, 1.0, states)
-    energy = sum(share * np.sin(2 * np.pi * cycles * time + phase) ** 2 for cycles, share, phase in modes)
-    energy = energy * np.exp(-0.8 * time)
+    swings = (share * np.sin(2 * np.pi * cycles * time + phase) ** 2 for cycles, share, phase in modes)
+    energy = sum(swings, np.zeros(states)) * np.exp(-0.8 * time) + line[0] + line[1] * time
     energy += sum((height * np.exp(-(((time - at) / 0.004) ** 2)) for at, height in impacts), np.zeros(states))
     white = np.random.default_rng(14).standard_normal(states)
     return _written(name, time, energy + noise * energy.max() * white)
