@@ -38,6 +38,7 @@ _HIGHEST: Final = 10**17  # no id comes near: a longer number would overflow
 NO_NODE: Final = -1  # in place of a node that there is not
 _DENSE: Final = 50_000_000  # up to this id a table of all ids is small enough
 NOTHING: Final = -1  # in place of what is not an id
+_FEW: Final = 1000  # lines whose fields are read together: a deck may have a card for each of its elements
 
 
 def layout(*widths: int) -> Layout:
@@ -71,7 +72,11 @@ class Lines:
 
     def integers(self, fields: Layout) -> Integers:
         """Ids in these fields, shape (lines, fields): 0 for a blank, `NOTHING` for what is not an id."""
-        found = np.stack([_integers(self._field(*place)) for place in fields], axis=1)
+        columns = [self._field(*place) for place in fields]
+        if len(self) < _FEW and len({width for _, width in fields}) == 1:
+            found = _integers(np.concatenate(columns)).reshape(len(fields), len(self)).T
+        else:
+            found = np.stack([*map(_integers, columns)], axis=1)
         for row, texts in self._texts.items():
             found[row] = [_id(self._value(text)) for text in self._pieces(texts, fields)]
         return found

@@ -243,8 +243,8 @@ class SourceFile:
         with self._file.opened() as fill:
             for at in range(position, offset, together):
                 line += room.count(b"\n", 0, fill(room, at, min(at + together, offset)))
-        if known == len(self._counted) - 1 and offset > position:
-            self._counted.append((offset, line))
+        if offset > position:
+            self._counted.insert(known + 1, (offset, line))
         return line
 
 

@@ -188,6 +188,10 @@ ROWS = (
     Row("check of a 50 MB deck / dynars.parse_deck", deck("check_to_dynars"), most=1.0),
     Row("  memory for the cards [MB]", deck("memory"), most=32.0),
     Row("check of 1000 small decks / finding their cards, CPU", deck("many_to_parse"), most=4.0),
+    *(
+        Row(f"check of 20,000 {trouble} / loop over lines, CPU", deck("troubled_to_loop", trouble), most)
+        for trouble, most in (("parts on one card", 100.0), ("rigid bodies", 400.0), ("boxes of comments", 25.0))
+    ),
     Row("check / import click: processes", lambda: process_ratio("click", *CHECK), most=1.5),
     Row("loop over lines / glstat, 1e5 states", reading("glstat_to_loop"), least=8.0),
     Row("glstat, 1e5 states / bare read", reading("glstat_to_bare_read"), most=4.0),

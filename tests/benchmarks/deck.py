@@ -15,7 +15,7 @@ from d2rpick.deck.ls_dyna_parts import read_parts
 from d2rpick.deck.reader import read_deck
 from d2rpick.deck.switching import find_windows, read_switching
 from d2rpick.rules import check_deck
-from d2rpick.rules.rule import BACK, GOOD, HEAD, PARTS, THERE
+from d2rpick.rules.rule import BACK, END, GOOD, HEAD, PARTS, THERE
 from tests.benchmarks.timing import own_seconds, ratio
 
 if TYPE_CHECKING:
@@ -98,6 +98,22 @@ def to_loop(what: str) -> float:
     ours = {"cards": find_cards, "lines of cards": number_cards, "inventory": inventory}[what]
     with large_deck() as path:
         return ratio(lambda: ours(path), lambda: line_loop(path), _ROUNDS)
+
+
+def troubled_to_loop(trouble: str) -> float:
+    """Checking a deck of 20,000 of something over a loop over its lines: CPU of this process."""
+    numbers = range(10, 20_010)
+    deck = {
+        "parts on one card": "*PART\n" + "".join(f"door\n{n:10d}{1:10d}{1:10d}\n" for n in numbers),
+        "rigid bodies": "".join(
+            f"*CONSTRAINED_NODAL_RIGID_BODY\n{n:10d}{0:10d}{n:10d}\n*SET_NODE_LIST\n{n:10d}\n{n:10d}\n" for n in numbers
+        ),
+        "boxes of comments": f"$ {'*' * 70}\n$ {'G' * 70}\n" * len(numbers),
+    }[trouble]
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "main.k"
+        path.write_text(HEAD + PARTS + THERE + deck + BACK + END, "ascii")
+        return ratio(lambda: check(path), lambda: sum(1 for _ in path.open("rb")), _ROUNDS, cost=own_seconds)
 
 
 def check_to_dynars() -> float | None:

@@ -126,6 +126,33 @@ def test_where_no_more_threads_are_allowed_one_searches_all(monkeypatch: pytest.
     assert [*find_marks(Held(b"*NODE\n" * 100), 64, alone=0)] == [*range(0, 600, 6)]
 
 
+class Counting(Held):
+    """Bytes that count how many of them are asked for."""
+
+    asked = 0
+
+    @contextmanager
+    def opened(self) -> Iterator[Filling]:
+        def counting(room: bytearray, begin: int, end: int) -> int:
+            self.asked += end - begin
+            return fill(room, begin, end)
+
+        with super().opened() as fill:
+            yield counting
+
+
+def test_lines_are_counted_once_in_whatever_order_they_are_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = b"*NODE\n1\n" * 500
+    source = SourceFile("deck.k", text)
+    file = Counting(text)
+    monkeypatch.setattr(source, "_file", file)
+    blocks = [*source.blocks()]
+    file.asked = 0
+    assert blocks[-1].line == 999
+    assert [block.line for block in blocks] == [*range(1, 1000, 2)]
+    assert file.asked < 3 * len(text)
+
+
 class Interrupted(Held):
     """Bytes of which the main thread reads none: it is interrupted before."""
 
