@@ -6,7 +6,7 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING or sys.version_info >= (3, 12):
-    from functools import cached_property as cached_property  # noqa: PLC0414  given on
+    from functools import cached_property as cached_property  # noqa: PLC0414, TID251  given on
 else:
 
     class cached_property:  # noqa: D101, N801  documented there
