@@ -4,13 +4,14 @@ import tracemalloc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from itertools import pairwise
 from random import Random
 from typing import TypeVar
 
 import numpy as np
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats.binout import Binout

@@ -160,7 +160,7 @@ class SourceFile:
         If it cannot be opened; from any method, if the file was rewritten or replaced since then.
     """
 
-    def __init__(self, name: str, content: bytes | OnDisk | None = None, piece: int = _PIECE) -> None:
+    def __init__(self, name: str, content: bytes | Held | OnDisk | None = None, piece: int = _PIECE) -> None:
         self.name, self._piece = name, piece
         self._file = stored(name) if content is None else Held(content) if isinstance(content, bytes) else content
         self._counted = [(0, 1)]  # (offset, number of the line that holds it), ascending

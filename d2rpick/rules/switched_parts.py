@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from heapq import nsmallest
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import name_units
@@ -139,6 +138,8 @@ def _exists(case: Case) -> Iterator[Objection]:
 
 def _nearest(number: int, parts: Parts) -> str:
     """List the nearest ids of the deck, with their titles."""
+    from heapq import nsmallest  # not above: start-up
+
     near = sorted(nsmallest(_NEAREST, parts.materials, key=lambda part: abs(part - number)))
     listed = (f"{part} {parts.titles[part]!r}" if parts.titles[part] else str(part) for part in near)
     return f" (nearest to {number}: {', '.join(listed)})"

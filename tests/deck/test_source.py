@@ -141,12 +141,10 @@ class Counting(Held):
             yield counting
 
 
-def test_lines_are_counted_once_in_whatever_order_they_are_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_lines_are_counted_once_in_whatever_order_they_are_asked_for() -> None:
     text = b"*NODE\n1\n" * 500
-    source = SourceFile("deck.k", text)
     file = Counting(text)
-    monkeypatch.setattr(source, "_file", file)
-    blocks = [*source.blocks()]
+    blocks = [*SourceFile("deck.k", file).blocks()]
     file.asked = 0
     assert blocks[-1].line == 999
     assert [block.line for block in blocks] == [*range(1, 1000, 2)]
