@@ -122,7 +122,7 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
         parts=tuple(_overviews(run)),
         flights=flights,
         should_write=None if states == 0 or any(one.parts for one in run.momenta(None, None)) else _missing(run),
-        health=_health(run, [flight for _, flight in flights], rigid),
+        health=_health(run, history, [flight for _, flight in flights], rigid),
         notes=tuple(dict.fromkeys(notes)),
         alarms=(*(unsound(history) if history else ()), *_of_rigid_legs(rigid), *told),
     )
@@ -182,8 +182,8 @@ def _of_rigid_legs(rigid: Sequence[Times]) -> Iterator[Caution]:
         yield Caution("rigid-legs", f"parts are rigid from {when}: {told}")
 
 
-def _health(run: Run, flights: Sequence[FreeFlight], rigid: Sequence[Times]) -> Health | None:
-    balance = balance_of(run.databases, run.parts)
+def _health(run: Run, history: History | None, flights: Sequence[FreeFlight], rigid: Sequence[Times]) -> Health | None:
+    balance = balance_of(run.databases, run.parts, known=history.balance if history else None)
     if balance is None or not balance.time.size:
         return None
     if rigid:

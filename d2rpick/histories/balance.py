@@ -45,10 +45,13 @@ _VELOCITIES: Final = (
 )
 
 
-def balance_of(databases: Sequence[Legs], parts: Sequence[Part] | None, until: float = np.inf) -> Balance | None:
+def balance_of(
+    databases: Sequence[Legs], parts: Sequence[Part] | None, until: float = np.inf, known: Balance | None = None
+) -> Balance | None:
     """Read the balance of the whole model, and the hourglass energy of ``parts``, up to a time [time].
 
-    None where the files have nothing of it that can be judged, or leave open which columns are meant.
+    ``known`` are its `terms_of`, where they were read already.  None where the files have nothing of it that can be
+    judged, or leave open which columns are meant.
     """
     whole = _whole(databases)
     of_parts = _hourglass_of(databases, parts, until) if parts else ()
@@ -57,7 +60,7 @@ def balance_of(databases: Sequence[Legs], parts: Sequence[Part] | None, until: f
         return None
     if whole is None:
         return Balance(databases[0].part_time, hourglass_of_parts=of_parts)
-    terms = _terms(whole, until)
+    terms = known or _terms(whole, until)
     return terms and replace(terms, hourglass_of_parts=of_parts)
 
 
