@@ -80,7 +80,7 @@ def fit_all(best: Samples | None, model: Model, s: Samples, e: Samples, worst: f
 
     None without that, or where ``worst`` is finite and these or some more of the samples are left with a structure that
     is too large.  A fit that leaves far too much of some of the samples is not brought to its best for all of them: it
-    is refused, and would crawl.  Where ``worst`` is finite, no other one that is sure to be refused crawls for long.
+    is refused, and would crawl.  So would a drift, which is refused too.
     """
     quick, few = np.isfinite(worst), _few(s, e)
     if best is None or (quick and _structured(best, model, *few)):
@@ -94,12 +94,7 @@ def fit_all(best: Samples | None, model: Model, s: Samples, e: Samples, worst: f
             return None
         if left > _FAR_TOO_MUCH * MAX_MISFIT**2 * some[0].size * float(np.var(some[1])):
             return best
-    more = _few(s, e, BLOCK)
-
-    def doomed(found: Samples) -> bool:
-        return quick and (np.abs(found[rates]).min() < _DRIFT or _structured(found, model, *more))
-
-    return minimise(best, model, s, e, doomed=doomed)[0]
+    return minimise(best, model, s, e, doomed=lambda found: quick and np.abs(found[rates]).min() < _DRIFT)[0]
 
 
 def _few(s: Samples, e: Samples, most: int = COARSE) -> tuple[Samples, Samples]:
