@@ -306,7 +306,7 @@ def _best(whole: Vibration, evidence: Evidence) -> Vibration:
 def _with_signs(whole: Vibration, basis: str, model: SignedModel) -> Vibration:
     """Compare signed deformations, while levels and times are those of the whole energy."""
     first = model.comparable_since(whole.td)
-    times = model.time[model.time >= first]
+    times = model.time[np.searchsorted(model.time, first) :]  # a copy for each td would fill the memory
     return replace(
         whole,
         basis=basis,
