@@ -104,26 +104,30 @@ class SignedParts:
     undescribed = "the signs of the parts' deformations cannot be followed from here to td"
 
     def __init__(self, time: Samples, energies: Samples, names: Sequence[str]) -> None:
-        self.time, self._names = time, names
-        self._roots = np.sqrt(np.maximum(energies.T, 0.0), order="C")
-        held = np.sum(self._roots**2, axis=1)
+        self.time, self._names, self._energies = time, names, energies
+        roots = self._roots()
+        held = np.sum(roots**2, axis=1)
         self._order = np.argsort(-held, kind="stable")
         lost, self._main = 0.0, dict[int, PartMotion | str]()
-        for i, known in self._by_zeros(self._order):
+        for i, known in self._by_zeros(self._order, roots):
             motion = known if isinstance(known, PartMotion) else None
             if motion is None or motion.hidden > SMALLEST:
-                motion = by_own_modes(time, self._roots[i] ** 2, motion)
+                motion = by_own_modes(time, roots[i] ** 2, motion)
             self._main[i] = motion or known
             lost += 0.0 if motion else held[i]
             if lost > MOST_UNSIGNED * held.sum():
                 break
         self.unsigned_share = float(lost / held.sum()) if lost else float(not held.any())
 
-    def _by_zeros(self, places: Places) -> Iterator[tuple[int, PartMotion | str]]:
+    def _roots(self) -> Samples:
+        """Roots of the energies, shape (k, n): not kept, since there may be a window for each td."""
+        return np.sqrt(np.maximum(self._energies.T, 0.0), order="C")
+
+    def _by_zeros(self, places: Places, roots: Samples) -> Iterator[tuple[int, PartMotion | str]]:
         """Read the signs of parts from the zeros of their energy, or why there are none."""
         lasting = np.gradient(self.time)
-        for i, own in zip(places.tolist(), all_zeros(self.time, self._roots[places]), strict=True):
-            root = self._roots[i]
+        for i, own in zip(places.tolist(), all_zeros(self.time, roots[places]), strict=True):
+            root = roots[i]
             tracked = np.where(np.searchsorted(own.sure, self.time) % 2, -root, root)
             reason = _no_sign(lasting, tracked, own.sure)
             motion = None if reason else followed(self.time, tracked, own)
@@ -132,7 +136,7 @@ class SignedParts:
     @cached_property
     def _all(self) -> list[PartMotion | str]:
         """All parts: where too much has no sign, no modes of their own are looked for in those that hold less."""
-        found = {**self._main, **dict(self._by_zeros(self._order[len(self._main) :]))}
+        found = {**self._main, **dict(self._by_zeros(self._order[len(self._main) :], self._roots()))}
         return [found[i] for i in sorted(found)]
 
     @property
