@@ -14,7 +14,17 @@ from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 from d2rpick.base.caching import cached_property
 from d2rpick.base.graph import reached
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.deck.expression import REFERENCE, ExpressionError, Number, evaluate, names_in, number, of_kind, plain
+from d2rpick.deck.expression import (
+    LONGEST,
+    REFERENCE,
+    ExpressionError,
+    Number,
+    evaluate,
+    names_in,
+    number,
+    of_kind,
+    plain,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -206,7 +216,7 @@ class Card:
         if not text:
             return Value(default, row, "", (), position)
         parameters: tuple[str, ...] = ()
-        if (found := plain(kind, text)) is None:
+        if len(text) > LONGEST or (found := plain(kind, text)) is None:
             found, parameters = of_kind(kind, text, self.scope.value), names_in(text)
         value, problem = found
         return Value(default if problem else value, row, problem, parameters, position)

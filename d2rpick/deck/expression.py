@@ -23,7 +23,7 @@ _TOKEN: Final = (  # compiled where it is needed
 )
 REFERENCE: Final = r"(?ai)&\s*([a-z_]\w*)"  # this too
 _DEEPEST = 50  # nested parentheses; no deck needs more, and Python's stack is not to be tried
-_LONGEST = 40  # characters of a number: more are no number of a deck
+LONGEST = 40  # characters of a number: more are no number of a deck
 _LONGEST_EXPRESSION = 2000
 _INTEGER_LIMIT = 2**63
 
@@ -42,9 +42,9 @@ def number(text: str) -> Number:
     (12, 0.012, 0.0015, 0.0015)
     """
     text = text.strip()
-    found = _NUMBER.fullmatch(text) if len(text) <= _LONGEST else None
+    found = _NUMBER.fullmatch(text) if len(text) <= LONGEST else None
     if found is None:
-        raise ExpressionError(f"{text[:_LONGEST]!r} is not a number")
+        raise ExpressionError(f"{text[:LONGEST]!r} is not a number")
     mantissa, exponent = found[1], found[2] or found[3]
     if exponent is None and "." not in mantissa:
         return _checked(int(mantissa))
@@ -53,7 +53,7 @@ def number(text: str) -> Number:
 
 @lru_cache(4096)
 def plain(kind: Callable[[float], Any], text: str) -> tuple[Any, str] | None:
-    """Give what `of_kind` says of a text that is a number by itself; None of one that is to be evaluated."""
+    """Give what `of_kind` says of a short text that is a number by itself; None of one that is to be evaluated."""
     return None if "&" in text or text[0] == "<" else of_kind(kind, text, number)
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import DeckError
 from d2rpick.base.files import beyond, bound, long_line
-from d2rpick.deck.stored import HELD, Held, stored
+from d2rpick.deck.stored import HELD_UP_TO, Held, stored
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, MutableSequence, Sequence
@@ -60,7 +60,7 @@ class _Search:
         self._helping: list[_thread.LockType] = []  # each is released by its thread in the end
 
     def call_for_help(self) -> None:
-        """Have a thread begin beside this one, which does not wait for it: that would take as long as two pieces."""
+        """Have a thread begin beside this one, which does not wait until it runs."""
         helping = _thread.allocate_lock()
         helping.acquire()
         with suppress(RuntimeError):  # there may be no more threads: then there is no help
@@ -70,7 +70,7 @@ class _Search:
     def _help(self, helping: _thread.LockType) -> None:
         """Search beside others; the pieces of a thread with which something goes wrong are left to `result`."""
         try:
-            with suppress(DeckError, OSError):
+            with suppress(DeckError, OSError, MemoryError):
                 self.go_on()
         finally:
             helping.release()
@@ -232,7 +232,7 @@ class SourceFile:
     @cached_property
     def silences(self) -> bool:
         """Whether comments may silence rules; of a large file, which is not read for that, it is not known."""
-        return self._file.size > HELD or b"d2rpick" in self.read(0).lower()
+        return self._file.size > HELD_UP_TO or b"d2rpick" in self.read(0).lower()
 
     def line_at(self, offset: int) -> int:
         """Return the number of the line, from 1, that holds the byte at ``offset``."""

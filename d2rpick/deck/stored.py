@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     Filling = Callable[[bytearray, int, int], int]  # puts the bytes from one place to another first, and counts them
 
 
-HELD: Final = 1 << 18  # a file up to this size is held in memory: a deck may have thousands of them
+HELD_UP_TO: Final = 1 << 18  # a file up to this size is held in memory: a deck may have thousands of them
 _WINDOW: Final = 1 << 16  # bytes read at a time where few are wanted: more will be, close to them
 _KEPT: Final = 8  # windows held: the ends of a deck's large blocks are looked at again and again
 
@@ -115,7 +115,7 @@ def stored(name: str) -> Held | OnDisk:
     if isinstance(state, bytes):
         return Held(state)
     on_disk = OnDisk(name, state)
-    return Held(on_disk.read(0, state.size)) if state.size <= HELD else on_disk
+    return Held(on_disk.read(0, state.size)) if state.size <= HELD_UP_TO else on_disk
 
 
 def _read_at(file: FileIO, room: memoryview, begin: int) -> int:

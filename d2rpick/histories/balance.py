@@ -50,8 +50,8 @@ def balance_of(
 ) -> Balance | None:
     """Read the balance of the whole model, and the hourglass energy of ``parts``, up to a time [time].
 
-    ``known`` are its `terms_of`, where they were read already.  None where the files have nothing of it that can be
-    judged, or leave open which columns are meant.
+    ``known`` are its `terms_of`, where they were read already and all times are asked for.  None where the files have
+    nothing of it that can be judged, or leave open which columns are meant.
     """
     whole = _whole(databases)
     of_parts = _hourglass_of(databases, parts, until) if parts else ()

@@ -123,7 +123,7 @@ def described_span(
 
 
 def _reach(history: History, bounds: Span, memory: Memory, anchor: float, fit: Identification) -> Span | None:
-    """Give the `span_of` a fit; all times in it have the same, which every td near it asks for."""
+    """Give the `span_of` a fit; all times in it have the same but for rounding, and every td near it asks for it."""
     known = memory.once(("spans", fit.mode, fit.rms, fit.structure, bounds), list[Span])
     span = next((one for one in known if one.start <= anchor <= one.end), None)
     if span is None and (span := span_of(history, anchor, fit, bounds)):

@@ -4,7 +4,9 @@ import math
 import pytest
 from hypothesis import given, strategies as st
 
-from d2rpick.deck.expression import ExpressionError, evaluate, number
+from d2rpick.deck.expression import ExpressionError, evaluate, number, plain
+from d2rpick.deck.reader import read_deck
+from d2rpick.deck.switching import read_switching
 
 PARAMETERS = {"a": 4, "b": 2.5}
 
@@ -79,3 +81,11 @@ def test_integer_division_drops_the_fraction(x: int, y: int) -> None:
     quotient = evaluate(f"({x})/({y})", lookup)
     assert abs(quotient) == abs(x) // abs(y)
     assert quotient * x * y >= 0
+
+
+def test_texts_that_are_too_long_for_a_number_are_not_kept() -> None:
+    before = plain.cache_info().currsize
+    content = b"*DEFORMABLE_TO_RIGID\n" + b"x" * 100 + b",1\n"
+    (card,) = read_switching(read_deck("deck.k", content))
+    assert next(problem for _, problem in card.problems) == f"{'x' * 40!r} is not a number"
+    assert plain.cache_info().currsize <= before + 1  # the 1 behind it

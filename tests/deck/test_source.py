@@ -126,6 +126,22 @@ def test_where_no_more_threads_are_allowed_one_searches_all(monkeypatch: pytest.
     assert [*find_marks(Held(b"*NODE\n" * 100), 64, alone=0)] == [*range(0, 600, 6)]
 
 
+class Short(Held):
+    """Bytes for which threads beside the first one find no memory."""
+
+    @contextmanager
+    def opened(self) -> Iterator[Filling]:
+        if current_thread() is not main_thread():
+            raise MemoryError
+        with super().opened() as fill:
+            yield fill
+
+
+def test_what_a_thread_has_no_memory_for_the_first_one_searches(capfd: pytest.CaptureFixture[str]) -> None:
+    assert [*find_marks(Short(b"*NODE\n" * 100), 64, alone=0, helpers=3)] == [*range(0, 600, 6)]
+    assert capfd.readouterr() == ("", "")
+
+
 class Counting(Held):
     """Bytes that count how many of them are asked for."""
 
