@@ -20,6 +20,7 @@ from d2rpick.deck.expression import (
     ExpressionError,
     Number,
     evaluate,
+    is_number,
     names_in,
     number,
     of_kind,
@@ -342,7 +343,7 @@ class Scope:
             value = text.strip().strip('"')
         else:
             try:
-                value = evaluate(text, self._number) if uses or not _is_number(text) else number(text)
+                value = evaluate(text, self._number) if uses or not is_number(text) else number(text)
                 value = int(value) if kind == "I" else float(value)
             except ExpressionError as error:
                 value, problem = 0, str(error)
@@ -361,14 +362,6 @@ class Scope:
         if isinstance(definition.value, str):
             raise ExpressionError(f"parameter &{name} is a text, a number was expected")
         return definition.value
-
-
-def _is_number(text: str) -> bool:
-    try:
-        number(text)
-    except ExpressionError:
-        return False
-    return True
 
 
 def _pairs(rows: Sequence[Row], options: set[str]) -> Iterator[tuple[Row, str, str]]:

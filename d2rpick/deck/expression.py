@@ -51,6 +51,15 @@ def number(text: str) -> Number:
     return _checked(float(f"{mantissa}e{exponent or 0}"))
 
 
+def is_number(text: str) -> bool:
+    """Whether `number` reads a text."""
+    try:
+        number(text)
+    except ExpressionError:
+        return False
+    return True
+
+
 @lru_cache(4096)
 def plain(kind: Callable[[float], Any], text: str) -> tuple[Any, str] | None:
     """Give what `of_kind` says of a short text that is a number by itself; None of one that is to be evaluated."""
