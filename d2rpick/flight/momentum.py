@@ -97,7 +97,7 @@ def bodies_apart(momenta: Momenta, members: Sequence[int]) -> tuple[int, ...]:
 
 def _apart(momenta: Momenta, members: Sequence[int]) -> Iterator[int]:
     mass, masses = momenta.mass(members), momenta.masses
-    if not momenta.parts or len(members) < 2 or masses is None or not mass > 0:
+    if not momenta.parts or len(members) < 2 or masses is None or not mass > 0 or momenta.time.size < FEWEST:
         return
     velocity = momenta.of(members) / mass
     room = _OF_ITS_OWN * float(np.abs(velocity).max())

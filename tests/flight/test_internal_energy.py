@@ -134,6 +134,14 @@ def test_what_is_carried_does_not_fly_and_does_not_hide_what_falls() -> None:
     assert found.gravity == pytest.approx(9.81, rel=1e-3)
 
 
+@pytest.mark.parametrize("states", [1, 2, 3])
+def test_a_few_states_show_no_bodies_apart(states: int) -> None:
+    whole = momenta(50 + 0 * TIME, -10 + 0 * TIME, axis=0)
+    few = replace(whole, time=whole.time[:states], values=whole.values[:states])
+    assert bodies_apart(few, (0, 1)) == ()
+    assert flight_around(few, float(few.time[0])) is None
+
+
 def test_bodies_that_hit_each_other_fly_each_for_itself() -> None:
     hit = np.clip((TIME - 0.3) / 0.1, 0, 1)
     body = momenta(50 - 60 * hit, 60 * hit - 10, axis=0)
