@@ -94,7 +94,7 @@ class OfTd:
 
     @property
     def basis(self) -> str:
-        """What the answer rests on: ``"parts"``, ``"oscillator"``, ``"swings"`` or ``"energy"``."""
+        """What the answer rests on: ``"parts"``, ``"oscillator"``, ``"modal"``, ``"swings"`` or ``"energy"``."""
         return self.situation.basis
 
     @property
@@ -134,7 +134,7 @@ class Situation:
 
     @property
     def basis(self) -> str:
-        """What a choice rests on: "parts", "oscillator" (one or several of them), "swings" or "energy"."""
+        """What a choice rests on: "parts", "oscillator" (one or several of them), "modal", "swings" or "energy"."""
         return self.vibration.basis
 
     @property
@@ -195,6 +195,12 @@ class Situation:
     def errors(self, times: Samples) -> Samples:
         """What a tolerance is held against, of the shape of ``times`` [-]: at rest nothing, else the vibration's."""
         return np.zeros(times.shape) if self.at_rest else self.vibration.errors(times)
+
+    @property
+    def most_error(self) -> float:
+        """Largest error of an acceptable tr: the tolerance, of many modes what is better than no vibration [-]."""
+        most = self.vibration.most_lock_in
+        return self.settings.tolerance if most is None else most
 
     @property
     def in_flight(self) -> bool:

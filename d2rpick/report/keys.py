@@ -198,15 +198,16 @@ CANDIDATE: Final = row(
     Field("notes", "texts"),
     Field("run_time_share", "size?", "expected run time over that of the reference, with --cost-share"),
     Field("same_swing", "flag", "the energy turns less than twice from tr to td: hardly anything is saved"),
-    Field("residual_high", "size?"),
+    Field("residual_high", "size?", "the highest residual that the record allows"),
     *_POSITION,
+    Field("residual_low", "size?", "the lowest residual that the record allows", later=True),
 )
 # What tells a tr and does not measure the pair; and the measures that ``verify`` shows first, in their order there.
 _OF_TR: Final = (
     "rank", "tr", "kind", "rising", "tr_low", "tr_high", "acceptable", "recommended", "notes", "same_swing",
 )  # fmt: skip
 _FIRST: Final = (
-    *("energy", "energy_ratio", "level_error", "sign_match", "lock_in_error", "residual", "residual_high"),
+    *("energy", "energy_ratio", "level_error", "sign_match", "lock_in_error", "residual", "residual_high", "residual_low"),
     *("part_mismatch", "timing_tolerance", "rigid_time", "rigid_fraction", "run_time_share"),
 )
 MEASURES: Final = (*_FIRST, *(key for key in CANDIDATE.keys if key not in (*_OF_TR, *_FIRST)))

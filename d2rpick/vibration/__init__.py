@@ -16,11 +16,12 @@ if TYPE_CHECKING:
     from typing import TypeAlias
 
     from d2rpick.histories.history import History, Memory
+    from d2rpick.vibration.modal import ModalVibration
     from d2rpick.vibration.part_signs import SignedParts
     from d2rpick.vibration.span import Span
     from d2rpick.vibration.swings import Swings
 
-    SignedModel: TypeAlias = SignedParts | Swings
+    SignedModel: TypeAlias = SignedParts | ModalVibration | Swings
     Finder: TypeAlias = Callable[[History, Span], SignedModel | None]
 
 
@@ -30,9 +31,17 @@ def _parts(history: History, within: Span) -> SignedModel | None:
     if history.part_energies is None or time.size < 3:
         return None
     from d2rpick.histories.samples import window
+    from d2rpick.vibration.modal import ModalVibration
     from d2rpick.vibration.part_signs import SignedParts
 
     return SignedParts(time, history.part_energies[window(history.time, *within)], history.part_names)
+
+
+def _modal(history: History, within: Span) -> SignedModel | None:
+    """Identify the modes of the structure from the lines of its energy."""
+    from d2rpick.vibration.modal import identify_modal
+
+    return identify_modal(*history.between(*within))
 
 
 def _swings(history: History, within: Span) -> SignedModel | None:
@@ -43,7 +52,13 @@ def _swings(history: History, within: Span) -> SignedModel | None:
 
 
 # By what a choice is said to rest on; an oscillator, and the energy alone, are known of each td in another way.
-MODELS: Final[dict[str, Finder | None]] = {"parts": _parts, "oscillator": None, "swings": _swings, "energy": None}
+MODELS: Final[dict[str, Finder | None]] = {
+    "parts": _parts,
+    "oscillator": None,
+    "modal": _modal,
+    "swings": _swings,
+    "energy": None,
+}
 
 
 def find_models(
