@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import Samples
-    from d2rpick.vibration.lines import Exponentials, Spectrum
+    from d2rpick.vibration.lines import Complex, Exponentials, Spectrum
 
     Mask = NDArray[np.bool_]
 
@@ -87,12 +87,17 @@ class Reading:
         return np.maximum(self.level(t) + within_period.at(t), self.tiny)
 
     def coherence(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """C, how far the modes are in step after td - tr, for pairs of times of one shape, or one of them [energy]."""
-        tr, td = np.broadcast_arrays(np.asarray(tr, dtype=np.float64), np.asarray(td, dtype=np.float64))
-        half, origin = self.modes.poles / 2, self.modes.origin
-        later = np.exp(np.multiply.outer(td - origin, half))
-        earlier = np.exp(np.multiply.outer(tr - origin, half.conj()))
-        return np.asarray(((later * earlier).real @ self._peak_energies))
+        """C, how far the modes are in step after td - tr, for pairs of times whose shapes go together [energy]."""
+        return np.asarray(np.einsum("...k,...k->...", self.earlier(tr), self.later(td)).real)
+
+    def earlier(self, tr: Samples | float) -> Complex:
+        """What tr has in the coherence, of its shape with an axis for modes behind it [energy]."""
+        half = self.modes._replace(poles=self.modes.poles.conj() / 2)
+        return half.waves(tr) * self._peak_energies
+
+    def later(self, td: Samples | float) -> Complex:
+        """What td has in the coherence, of its shape with an axis for modes behind it [-]."""
+        return self.modes._replace(poles=self.modes.poles / 2).waves(td)
 
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
         """X, the product of the deformations at tr and td, within its bounds [energy]."""

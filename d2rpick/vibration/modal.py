@@ -16,6 +16,7 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.vibration.lines import FIRST_PART, even_grid, predict
+from d2rpick.vibration.measures import Profile
 from d2rpick.vibration.midpoint import Reading
 from d2rpick.vibration.swings import SOLVER_FLOOR
 
@@ -23,9 +24,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
+    from scipy.interpolate import CubicSpline
 
     from d2rpick.histories.history import Samples
-    from d2rpick.vibration.lines import Exponentials, Grid, Prediction
+    from d2rpick.vibration.lines import Complex, Exponentials, Grid, Prediction
 
     Mask = NDArray[np.bool_]
 
@@ -181,6 +183,26 @@ class ModalVibration:
         """Elastic energy of the difference of the deformations at tr and td [energy]."""
         apart = self.elastic_energy(tr) - 2 * self.overlap(tr, td) + self.elastic_energy(td)
         return np.maximum(apart, 0.0)
+
+    def profile(self, td: float) -> Profile:
+        """Lock-in errors at those of the ``time`` that come before ``td``, by what is worked out for all td once."""
+        last = int(np.searchsorted(self.time, td))
+        elastic, spline, earlier = self._at_all_times
+        middle = (self.time[:last] + td) / 2
+        at_td = float(self.elastic_energy(td))
+        coherence = (earlier[:last] @ self.reading.later(td)).real
+        overlap = spline(middle) - self.reading.level(middle) / 2 + coherence / 2
+        bound = np.sqrt(elastic[:last] * at_td)
+        separation = elastic[:last] - 2 * np.clip(overlap, -bound, bound) + at_td
+        return Profile(self.time[:last], np.sqrt(np.maximum(separation, 0.0) / self.vibration_energy(td)))
+
+    @cached_property
+    def _at_all_times(self) -> tuple[Samples, CubicSpline, Complex]:
+        """Elastic energy at the ``time``, what gives it between, and what tr has in the coherence."""
+        from scipy.interpolate import CubicSpline  # not above: it costs start-up
+
+        energy = self.reading.elastic_energy(self.time)
+        return np.maximum(energy, 0.0), CubicSpline(self.time, energy), self.reading.earlier(self.time)
 
     def half_width(self, tr: Samples | float, td: Samples | float) -> Samples:
         """Half-width of the band of R^2 of pairs of times [-]."""

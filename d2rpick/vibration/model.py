@@ -26,7 +26,7 @@ from d2rpick.vibration.moments import ModalEnergy, Moments, SampledEnergy, momen
 from d2rpick.vibration.span import residual_bound
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -54,14 +54,14 @@ _NAMED = 5
 class Compared(NamedTuple):
     """Deformations that can be compared with those at td from ``first`` to ``last`` [time].
 
-    ``times`` before td at which their lock-in error is looked at, None of one mode, of which all has a closed form;
-    ``band`` of a residual.
+    ``profile`` gives their lock-in error before a td, and is None of one mode, of which all has a closed form; ``band``
+    is that of a residual.
     """
 
     deformation: Deformation
     first: float
     last: float
-    times: Samples | None
+    profile: Callable[[float], Profile] | None
     band: Band
 
 
@@ -128,9 +128,9 @@ class Vibration:
     @cached_property
     def profile(self) -> Profile | None:
         """Lock-in error before td, whose minima are closest matches; None where there are none."""
-        if self.compared is None or self.compared.times is None:
+        if self.compared is None or self.compared.profile is None:
             return None
-        return Profile.of(self.compared.deformation, self.compared.times, self.td)
+        return self.compared.profile(self.td)
 
     @cached_property
     def least_residual(self) -> float | None:
@@ -347,11 +347,10 @@ def _best(whole: Vibration, evidence: Evidence) -> Vibration:
 def _with_signs(whole: Vibration, basis: str, model: SignedModel) -> Vibration:
     """Compare signed deformations, while levels and times are those of the whole energy."""
     first = model.comparable_since(whole.td)
-    times = model.time[np.searchsorted(model.time, first) :]  # a copy for each td would fill the memory
     return replace(
         whole,
         basis=basis,
-        compared=Compared(model, first, float(model.time[-1]), times, model.residual_band),
+        compared=Compared(model, first, float(model.time[-1]), model.profile, model.residual_band),
         unknown=None,
         undescribed=model.undescribed,
         told=model.told,
@@ -384,7 +383,9 @@ def energy_at(history: History, td: float, evidence: Evidence) -> Vibration:
         return samples(unknown="the oscillator does not describe the record at td", doubts=prescribed)
     if whole.sunk:
         return samples(unknown=whole.sunk, doubts=(SUNK, *prescribed))
-    compared = Compared(whole.mode, *whole.span, _times_before(whole), partial(measures.band_up_to, partial(residual_bound, fit)))
+    times = _times_before(whole)
+    profile = None if times is None else partial(Profile.of, whole.mode, times)
+    compared = Compared(whole.mode, *whole.span, profile, partial(measures.band_up_to, partial(residual_bound, fit)))
     return Vibration("oscillator", whole, compared, undescribed="not described by the oscillator")
 
 

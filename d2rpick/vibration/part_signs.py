@@ -12,6 +12,7 @@ from d2rpick.vibration import measures
 from d2rpick.vibration.amplitudes import SignedAmplitudes
 from d2rpick.vibration.identify import Identification, identify, identify_several
 from d2rpick.vibration.span import SMALLEST, resolved
+from d2rpick.vibration.measures import Profile
 from d2rpick.vibration.swings import SOLVER_FLOOR
 from d2rpick.vibration.waves import PartMotion, all_zeros, followed
 
@@ -192,6 +193,11 @@ class SignedParts(SignedAmplitudes):
     def known_at(self, td: float) -> bool:
         """Whether the energy of the vibration is above a solver's errors at td."""
         return bool(self.vibration_energy(td) >= SOLVER_FLOOR * np.max(self.vibration_energy(self.time)))
+
+    def profile(self, td: float) -> Profile:
+        """Lock-in errors at the times before ``td`` whose sign can be compared with that at td."""
+        since = np.searchsorted(self.time, self.comparable_since(td))
+        return Profile.of(self, self.time[since:], td)  # a copy for each td would fill the memory
 
     def residual_band(self, stated: Samples, tr: Samples, td: float) -> tuple[Samples, Samples, Samples]:
         """Residual of each tr (n,) as it is stated, which is the least one, and the largest [-]."""
