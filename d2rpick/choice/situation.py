@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.question import Settings
     from d2rpick.flight.position_error import Bodies
+    from d2rpick.flight.vibrating import Beside
     from d2rpick.histories.history import History, Samples
 
     Look = Callable[[float], "Situation"]
@@ -75,6 +76,32 @@ def _faint(history: History, start: float) -> float:
     highest = history.known.once("highest", lambda: largest(history.energy))
     quantum = history.energy_precision.quantum(float(np.abs(after).max(initial=0.0)))
     return max(_SOLVER_ERROR * highest, _QUANTA * quantum, _FAINT * fall)
+
+
+class Together:
+    """What vibrates together in a flight: whether its energy is all of what was chosen, and its kinetic energy."""
+
+    def __init__(self, history: History, flight: Flight) -> None:
+        self._history, self._flight = history, flight
+
+    @cached_property
+    def beside(self) -> Beside:
+        """Parts that vibrate with the chosen ones and were not chosen."""
+        from d2rpick.flight.vibrating import vibrating_beside  # not above: an oscillator does without it
+
+        return vibrating_beside(self._history, self._flight)
+
+    @property
+    def complete(self) -> bool:
+        """Whether all that vibrates together was chosen."""
+        return not self.beside.parts
+
+    @property
+    def kinetic(self) -> tuple[Samples, Samples] | None:
+        """Kinetic energy of what vibrates together, at times in the flight; None if it is not written."""
+        from d2rpick.flight.vibrating import kinetic_energy_of  # not above: an oscillator does without it
+
+        return kinetic_energy_of(self._history, self._flight)
 
 
 class OfTd:
@@ -168,6 +195,11 @@ class Situation:
         return self.settings.margin or 0.0
 
     @cached_property
+    def together(self) -> Together:
+        """What vibrates together in the flight."""
+        return Together(self.history, self.flight)
+
+    @cached_property
     def at_rest(self) -> bool:
         """Whether nothing vibrates in the flight."""
         start = self.earliest_tr
@@ -258,7 +290,7 @@ def examine(
     around = Span(min(td, first if flight.start is None else flight.start), end)
     start = flight.start if flight.settled is None else flight.settled
     within = None if flight.start is None or start is None else Span(start, flight.end or last)
-    models = find_models(history, around, within, lambda: doubtful(situation.whole), fits)
+    models = find_models(history, around, within, lambda: doubtful(situation.whole), fits, situation.together)
     return replace(situation, evidence=evidence._replace(models=models)) if models else situation
 
 

@@ -293,7 +293,10 @@ def _by_modes(situation: Situation, window: tuple[float, float], look: Look) -> 
     squares += shares
     inner = np.flatnonzero((squares[1:-1] <= squares[:-2]) & (squares[1:-1] < squares[2:])) + 1
     best = inner[np.argsort(squares[inner], kind="stable")[:_MOST_PEAKS]]
-    candidates = [*vertices(times, squares, best)[0].tolist(), *vertices(times, squares, inner[-_MOST_PEAKS:])[0].tolist()]
+    candidates = [
+        *vertices(times, squares, best)[0].tolist(),
+        *vertices(times, squares, inner[-_MOST_PEAKS:])[0].tolist(),
+    ]
     pairs = _acceptable(look(td) for td in dict.fromkeys((*candidates, float(times[np.argmin(squares)]))))
     long = [pair for pair in pairs if pair[1].rigid_time >= least_rigid] or pairs
     limit = min((best.error for _, best in long), default=0.0) + like_quality(situation)

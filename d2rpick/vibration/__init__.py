@@ -9,23 +9,35 @@ the kinetic share "is what ..." (``kinetic``), and why a tr has no measures (``u
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Protocol
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import TypeAlias
 
-    from d2rpick.histories.history import History, Memory
+    from d2rpick.histories.history import History, Memory, Samples
     from d2rpick.vibration.modal import ModalVibration
     from d2rpick.vibration.part_signs import SignedParts
     from d2rpick.vibration.span import Span
     from d2rpick.vibration.swings import Swings
 
     SignedModel: TypeAlias = SignedParts | ModalVibration | Swings
-    Finder: TypeAlias = Callable[[History, Span], SignedModel | None]
+    Finder: TypeAlias = Callable[[History, Span, Together], SignedModel | None]
 
 
-def _parts(history: History, within: Span) -> SignedModel | None:
+class Together(Protocol):
+    """What vibrates together in a flight."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether the energy is that of all that vibrates together."""
+
+    @property
+    def kinetic(self) -> tuple[Samples, Samples] | None:
+        """Its kinetic energy at times in the flight, without that of its fall, both (n,); None if not written."""
+
+
+def _parts(history: History, within: Span, _: Together) -> SignedModel | None:
     """Read the signs of single parts, where their energies are written."""
     time, _ = history.between(*within)
     if history.part_energies is None or time.size < 3:
@@ -37,14 +49,17 @@ def _parts(history: History, within: Span) -> SignedModel | None:
     return SignedParts(time, history.part_energies[window(history.time, *within)], history.part_names)
 
 
-def _modal(history: History, within: Span) -> SignedModel | None:
-    """Identify the modes of the structure from the lines of its energy."""
-    from d2rpick.vibration.modal import identify_modal
+def _modal(history: History, within: Span, together: Together) -> SignedModel | None:
+    """Identify the modes of the structure from the lines of its energy, and of its kinetic energy if that is known."""
+    if not together.complete:
+        return None
+    from d2rpick.vibration.modal import confirm, identify_modal
 
-    return identify_modal(*history.between(*within))
+    internal, kinetic = identify_modal(*history.between(*within)), together.kinetic
+    return confirm(internal, identify_modal(*kinetic, kinetic=True) if kinetic else None)
 
 
-def _swings(history: History, within: Span) -> SignedModel | None:
+def _swings(history: History, within: Span, _: Together) -> SignedModel | None:
     """Count the swings of the energy, where they come down to a floor."""
     from d2rpick.vibration.swings import count_swings
 
@@ -62,7 +77,12 @@ MODELS: Final[dict[str, Finder | None]] = {
 
 
 def find_models(
-    history: History, around: Span, flight: Span | None, doubtful: Callable[[], bool], memory: Memory
+    history: History,
+    around: Span,
+    flight: Span | None,
+    doubtful: Callable[[], bool],
+    memory: Memory,
+    together: Together,
 ) -> dict[str, SignedModel]:
     """Look for models, best first, until one tells the sign; those behind the oscillator where that is ``doubtful``.
 
@@ -75,7 +95,7 @@ def find_models(
             if flight is None or not doubtful():
                 break
             within = flight
-        if find and (model := memory.once((basis, *within), partial(find, history, within))):
+        if find and (model := memory.once((basis, *within), partial(find, history, within, together))):
             found[basis] = model
             if model.signed:
                 break

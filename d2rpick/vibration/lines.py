@@ -143,6 +143,10 @@ class Spectrum(NamedTuple):
         """Root mean square of the rest [energy]."""
         return float(np.sqrt(np.mean(self.rest**2)))
 
+    def turned(self) -> Spectrum:
+        """Give the same with lines, and what they leave over, of the opposite sign."""
+        return Spectrum(self.lines._replace(weights=-self.lines.weights), self.mean, -self.rest)
+
     def at(self, t: Samples | float) -> Samples:
         """Energy at each time, of the shape of ``t`` [energy]."""
         return self.lines.at(t) + self.mean.at(t)
@@ -159,6 +163,11 @@ class Prediction(NamedTuple):
     of_first_part: Spectrum
     missed: float
     swing: float
+
+    def turned(self) -> Prediction:
+        """Give the same with lines of the opposite sign."""
+        spectra = (self.spectrum.turned(), self.of_first_part.turned())
+        return Prediction(*spectra, self.missed, self.swing)
 
 
 def predict(grid: Grid) -> Prediction | None:
@@ -227,9 +236,7 @@ def fit_spectrum(grid: Grid, poles: Complex, span: float) -> Spectrum:
     weights[swinging] += 1j * found[every.size :]
     origin, count = float(grid.time[0]), lines.size
     rest = grid.energy - design @ found
-    return Spectrum(
-        Exponentials(lines, weights[:count], origin), Exponentials(mean, weights[count:], origin), rest
-    )
+    return Spectrum(Exponentials(lines, weights[:count], origin), Exponentials(mean, weights[count:], origin), rest)
 
 
 def _block_means(spectrum: Spectrum, time: Samples, grid: Grid) -> Samples:

@@ -21,8 +21,6 @@ from d2rpick.vibration.midpoint import Reading
 from d2rpick.vibration.swings import SOLVER_FLOOR
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from numpy.typing import NDArray
     from scipy.interpolate import CubicSpline
 
@@ -100,7 +98,10 @@ class Doubts(NamedTuple):
             (self.negative > _MOST_NEGATIVE, "the lines hold more energy than there is"),
             (self.drift > _MOST_DRIFT, "the mean energy changes in the flight by as much as vibrates"),
             (self.beyond > _MOST_BEYOND, "the energy halfway is beyond what any deformations allow"),
-            (self.harmonic > _MOST_HARMONIC, "the lines are harmonics of one another, as a nonlinear spring makes them"),
+            (
+                self.harmonic > _MOST_HARMONIC,
+                "the lines are harmonics of one another, as a nonlinear spring makes them",
+            ),
             (self.unstretched > _MOST_UNSTRETCHED, "lines at half the rate of others hold more than the static energy"),
         )
         return next((reason for holds, reason in reasons if holds), None)
@@ -128,6 +129,10 @@ class ModalVibration:
         Share of the scatter that neighbouring states share, and which is believed [-].
     slack : float
         Negative static energy that noise makes, over the mean vibration energy [-].
+    source : str
+        The energy that the lines were found in.
+    second : Reading or None
+        What the lines of the kinetic energy say, beside those of the internal energy.
     """
 
     time: Samples
@@ -138,6 +143,8 @@ class ModalVibration:
     noise: float
     systematic: float
     slack: float
+    source: str = "internal energy"
+    second: Reading | None = None
     kinetic: ClassVar = ""
     undescribed: ClassVar = "outside the part of the flight whose modes were identified"
 
@@ -152,7 +159,7 @@ class ModalVibration:
         rates = np.sort(self.reading.modes.poles.imag / 2)
         count = f"{rates.size} mode{'s' * (rates.size != 1)}"
         span = f"omega {rates[0]:.4g}" if rates.size == 1 else f"omega {rates[0]:.4g} to {rates[-1]:.4g}"
-        return f"modal, {count} identified from the lines of the energy, {span}"
+        return f"modal, {count} identified from the lines of the {self.source}, {span}"
 
     def comparable_since(self, td: float) -> float:
         """Earliest time whose deformation can be compared with that at any td [time]."""
@@ -210,16 +217,16 @@ class ModalVibration:
         squared = reading.residual_squared(tr, td)
         lines = np.abs(reading.coherence(tr, td) - self.of_first_part.coherence(tr, td)) / level
         scatter = self.noise / level * np.sqrt(5 * self.systematic + 0.5)
+        beside = 0.0 if self.second is None else np.abs(self.second.residual_squared(tr, td) - squared)
         return np.asarray(
             (_LEAST_HALF + min(self._wrong, 1.0)) * (1 + np.abs(squared - 1))
             + np.minimum(lines, 1.0)
             + _NOISE_COUNTS * scatter
+            + beside
             + self._of_other_readings(tr, td, squared)
         )
 
-    def residual_band(
-        self, stated: Samples, tr: Samples, td: Samples | float
-    ) -> tuple[Samples, Samples, Samples]:
+    def residual_band(self, stated: Samples, tr: Samples, td: Samples | float) -> tuple[Samples, Samples, Samples]:
         """Residual of each tr (n,), and the lowest and highest that the record allows [-].
 
         No square is below zero: where the band reaches there, the middle of the rest is stated instead of ``stated``.
@@ -258,13 +265,18 @@ class ModalVibration:
         return not self.reading.is_mode.all() and bool(self.others)
 
 
-def identify_modal(time: Samples, energy: Samples) -> ModalVibration | None:
+def identify_modal(time: Samples, energy: Samples, *, kinetic: bool = False) -> ModalVibration | None:
     """Identify the modes of a structure from its energy in free flight; None if it has no lines.
+
+    The kinetic energy has the lines of the internal energy with the opposite sign, and whatever else it holds is slow:
+    elastic and kinetic energy of a mode add up to what falls without a swing.
 
     Parameters
     ----------
     time, energy : array of shape (n,)
         [time], [energy], of the whole structure that vibrates together.
+    kinetic : bool
+        Whether it is the kinetic energy, and not the internal one.
 
     Returns
     -------
@@ -287,11 +299,22 @@ def identify_modal(time: Samples, energy: Samples) -> ModalVibration | None:
     prediction = predict(grid)
     if prediction is None or prediction.swing <= _RESOLVED * float(np.abs(energy).max()):
         return None
-    return _read(grid, prediction) if prediction.spectrum.lines.poles.size else None
+    if not prediction.spectrum.lines.poles.size:
+        return None
+    return _read(grid, prediction.turned(), kinetic=True) if kinetic else _read(grid, prediction)
 
 
-def _read(grid: Grid, prediction: Prediction) -> ModalVibration:
-    """Read the lines in the way that fits, and in others."""
+def confirm(internal: ModalVibration | None, kinetic: ModalVibration | None) -> ModalVibration | None:
+    """Give what the internal energy says, its band widened to what the kinetic energy says; else that alone."""
+    if kinetic is None or not kinetic.signed:
+        return internal
+    if internal is None or not internal.signed:
+        return kinetic
+    return replace(internal, second=kinetic.reading)
+
+
+def _read(grid: Grid, prediction: Prediction, *, kinetic: bool = False) -> ModalVibration:
+    """Read the lines in the way that fits, and in others; of a ``kinetic`` energy the mean says nothing."""
     spectrum, tiny = prediction.spectrum, _TINY * prediction.swing
     noise, rest = spectrum.error, spectrum.rest
     scatter = noise * np.sqrt(2 / grid.time.size)
@@ -308,10 +331,10 @@ def _read(grid: Grid, prediction: Prediction) -> ModalVibration:
     share = float(np.mean(static)) / mean
     half_of_all = plain.level_of_modes(grid.time) / 2
     excess = abs(float(np.mean(spectrum.mean.at(grid.time) - half_of_all)))
-    ambiguous = bool(stretches) and excess < _AMBIGUOUS * float(np.mean(half_of_all))
-    no_static = abs(share) < _NO_STATIC and not stretches
+    ambiguous = bool(stretches) and not kinetic and excess < _AMBIGUOUS * float(np.mean(half_of_all))
+    no_static = abs(share) < _NO_STATIC and not stretches and not kinetic
     reading = plain if no_static else with_static
-    others = (plain,) if ambiguous else () if stretches else (with_static if no_static else plain,)
+    others = (plain,) if ambiguous else () if stretches or kinetic else (with_static if no_static else plain,)
 
     first = prediction.of_first_part
     first_stretches = stretches_of(first.lines, FIRST_PART * grid.span, scatter) if stretches else ()
@@ -328,8 +351,20 @@ def _read(grid: Grid, prediction: Prediction) -> ModalVibration:
         unstretched=max(held - share, 0.0) / (1 + max(share, 0.0)),
         coarse=grid.strong,
     )
+    if kinetic:
+        doubts = doubts._replace(negative=0.0, drift=0.0, unstretched=0.0)
     slack = 0.02 + 2 * is_mode.size * scatter / mean
-    return ModalVibration(_close_times(reading, grid), reading, others, of_first_part, doubts, noise, systematic, slack)
+    return ModalVibration(
+        _close_times(reading, grid),
+        reading,
+        others,
+        of_first_part,
+        doubts,
+        noise,
+        systematic,
+        slack,
+        "kinetic energy" if kinetic else "internal energy",
+    )
 
 
 def _close_times(reading: Reading, grid: Grid) -> Samples:

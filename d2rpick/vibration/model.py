@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration import SignedModel
     from d2rpick.vibration.measures import Band, Columns, Deformation
+    from d2rpick.vibration.modal import ModalVibration
     from d2rpick.vibration.part_signs import PartMatch, SignedParts
     from d2rpick.vibration.span import Span
 
@@ -310,6 +311,12 @@ class Evidence(NamedTuple):
     def signed(self) -> str | None:
         """Name of the model that tells the sign, where one does."""
         return next((name for name, model in self.models.items() if model.signed), None)
+
+    @property
+    def refusal(self) -> str | None:
+        """Why the modes of the structure could not be identified; None if they were, or were not looked for."""
+        modal = cast("ModalVibration | None", self.models.get("modal"))
+        return modal.doubts.refusal if modal else None
 
     @property
     def has_model(self) -> bool:

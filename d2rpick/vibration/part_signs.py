@@ -11,8 +11,8 @@ from d2rpick.histories.history import Memory
 from d2rpick.vibration import measures
 from d2rpick.vibration.amplitudes import SignedAmplitudes
 from d2rpick.vibration.identify import Identification, identify, identify_several
-from d2rpick.vibration.span import SMALLEST, resolved
 from d2rpick.vibration.measures import Profile
+from d2rpick.vibration.span import SMALLEST, resolved
 from d2rpick.vibration.swings import SOLVER_FLOOR
 from d2rpick.vibration.waves import PartMotion, all_zeros, followed
 
