@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final, NamedTuple
@@ -61,19 +61,26 @@ class Pair(NamedTuple):
 class Trial(NamedTuple):
     """What became of a record: the pair, None if none was recommended, or the first words of the error.
 
-    ``td``: the time that was asked for, None if it was free; ``oracle``: the least true residual.
+    ``td_asked``: the time that was asked for, None if it was free; ``oracle``: the least true residual, if known.
     """
 
     pair: Pair | None
-    td: float | None = None
+    td_asked: float | None = None
     oracle: float | None = None
     error: str = ""
     seconds: float = 0.0
 
-    def as_row(self) -> dict[str, object]:
-        """Return a row of a table, with NaN for what is missing."""
-        pair = dict.fromkeys(Pair._fields) if self.pair is None else self.pair._asdict()
-        return self._replace(pair=None)._asdict() | {"td_asked": self.td} | pair
+
+_NUMBERS: Final = ("td_asked", "oracle", "seconds", "tr", "td", "true", "residual", "low", "high")
+
+
+def tabulate(name: str, trials: Sequence[Trial]) -> pd.DataFrame:
+    """Return a row for each trial of a class, with NaN for missing numbers."""
+    rows = []
+    for number, trial in enumerate(trials):
+        pair = trial.pair._asdict() if trial.pair else dict.fromkeys(Pair._fields)
+        rows.append({"class": name, "number": number} | trial._asdict() | pair)
+    return pd.DataFrame(rows).drop(columns="pair").astype(dict.fromkeys(_NUMBERS, float))
 
 
 def write_record(record: Record, folder: Path) -> Path:
@@ -112,7 +119,7 @@ def ask_for_pair(record: Record, folder: Path) -> Pair | None:
 
 def try_record(record: Record, folder: Path) -> Trial:
     """Ask for a pair of a record, and ask the oracle."""
-    td = record.suggest.get("td")
+    td_asked = record.suggest.get("td")
     pair, error = None, ""
     start = time.perf_counter()
     try:
@@ -125,11 +132,12 @@ def try_record(record: Record, folder: Path) -> Trial:
         shortest = _SHARE_OF_FLIGHT * (end_of_flight - start_of_flight) * record.truth.unit
     else:
         shortest = _SHARE_OF_RIGID * (pair.td - pair.tr)
-    return Trial(pair, td, record.truth.find_least_residual(td, shortest), error, seconds)
+    oracle = record.truth.find_least_residual(td_asked, shortest)
+    return Trial(pair, td_asked, oracle, error, seconds)
 
 
 def count_group(rows: pd.DataFrame) -> dict[str, object]:
-    """Count what became of some records, rows of `Trial.as_row`, in the columns of the table."""
+    """Count what became of some records, rows of `tabulate`, in the columns of the table."""
     pairs = rows[rows["true"].notna()]
     stated, unstated = pairs[pairs["residual"].notna()], pairs[pairs["residual"].isna()]
     useful_by_word = stated[stated["residual"] < KEEPS_NOTHING]
@@ -137,8 +145,8 @@ def count_group(rows: pd.DataFrame) -> dict[str, object]:
     possible = rows[rows["oracle"] < DESERVES_GOOD]
     good = pairs[pairs["grade"] == "good"]
     banded = pairs[pairs["high"].notna()]
-    above, below = banded["true"] - banded["high"], banded["low"] - banded["true"]
-    off = above.combine(below, max)
+    above = banded["true"] - banded["high"]
+    off = above.combine(banded["low"] - banded["true"], max)
     return {
         "records": len(rows),
         "pairs": len(pairs),
@@ -208,12 +216,14 @@ def run(classes: Mapping[str, Any], try_records: TryClass, description: str) -> 
         start = time.perf_counter()
         trials = try_records(name, options.records, options.seed)
         taken, asking = time.perf_counter() - start, sum(trial.seconds for trial in trials)
-        print(f"{name}: {taken:.0f} s, of these {asking:.0f} s in d2rpick", file=sys.stderr, flush=True)
-        tables.append(pd.DataFrame([{"class": name, "number": i} | trial.as_row() for i, trial in enumerate(trials)]))
-    rows = pd.concat(tables, ignore_index=True)
-    if options.csv:
-        rows.to_csv(options.csv, index=False)
-    print_tables(rows)
+        print(f"{name}: {taken:.0f} s, of these {asking:.0f} s asking", file=sys.stderr, flush=True)
+        tables.append(tabulate(name, trials))
+        if options.csv:  # after each class, since all take an hour
+            pd.concat(tables, ignore_index=True).to_csv(options.csv, index=False)
+    if tables:
+        print_tables(pd.concat(tables, ignore_index=True))
+    else:
+        parser.error(f"no class has such a name; there are {', '.join(classes)}")
 
 
 if __name__ == "__main__":

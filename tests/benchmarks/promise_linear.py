@@ -101,17 +101,18 @@ def _push(loads: Sequence[Load], time: Samples) -> Samples:
 
 def _draw_loads(random: np.random.Generator, shape: Shapes, period: float, *, fading: bool) -> list[Load]:
     """Draw up to three pushes, and a kick behind them in most records, or a load that fades."""
-    scale = shape.loaded * np.exp(random.uniform(np.log(0.1), 0.0, shape.ratios.size))
+    scale = shape.loaded * np.exp(random.uniform(np.log(0.2), 0.0, shape.ratios.size))
 
     def draw_heights() -> Samples:
         return np.asarray(shape.local @ (scale * random.normal(size=scale.size)))
 
     loads: list[Load] = []
     start = 0.0
-    kicked = random.random() < 2 / 3
+    kicked = random.random() < 3 / 4
     for _ in range(int(random.integers(0 if kicked or fading else 1, 4))):
         start += random.uniform(0, 1.0) * period
-        loads.append(Load(start, draw_log(random, 0.1, 1.5) * period, draw_heights()))
+        height = 0.4 if kicked else 1.0  # slow modes are not to drown what a kick leaves of the fast ones
+        loads.append(Load(start, draw_log(random, 0.1, 1.5) * period, height * draw_heights()))
     behind = max((load.end for load in loads), default=0.0) + random.uniform(0.1, 0.8) * period
     fastest = period / shape.ratios.max()
     if fading:

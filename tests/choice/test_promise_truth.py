@@ -4,12 +4,11 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pytest
 from scipy.integrate import solve_ivp
 
 from d2rpick.histories.history import Samples
-from tests.benchmarks.promise import CLASSES, Pair, Trial, count_group
+from tests.benchmarks.promise import CLASSES, Pair, Trial, count_group, tabulate
 from tests.benchmarks.promise_linear import draw_exchange, draw_hinge, draw_spin, few_modes, make_linear
 from tests.benchmarks.promise_modes import Load, Modes
 from tests.benchmarks.promise_records import INTEGRATED
@@ -159,13 +158,12 @@ def test_a_class_makes_whole_records(name: str) -> None:
 def test_what_became_of_records_is_counted() -> None:
     pair = Pair(0.1, 0.9, 0.15, 0.1, 0.05, 0.2, "good", "modes")
     trials = [
-        Trial(pair, td=0.9, oracle=0.1),
+        Trial(pair, td_asked=0.9, oracle=0.1),
         Trial(pair._replace(true=1.2, grade="fair"), oracle=0.1),
         Trial(pair._replace(true=1.4, residual=None, low=None, high=None, grade="fair", basis="energy"), oracle=0.3),
         Trial(None, oracle=0.1, error="no flight"),
     ]
-    counts = count_group(pd.DataFrame([trial.as_row() for trial in trials]))
-    assert counts == {
+    assert count_group(tabulate("modes", trials)) == {
         "records": 4,
         "pairs": 3,
         "R>1": "2/3",
