@@ -128,15 +128,14 @@ def worth_of_error(situation: Situation, candidate: Candidate) -> Worth | None:
 
 
 def energy_of_next_contact(situation: Situation) -> float | None:
-    """Energy that the next contact puts into the parts [energy]; None if nothing tells it.
+    """Energy that the next contact puts into the parts [energy]; None if no contact is seen.
 
     That is the rise of the internal energy after the flight, as far as the record shows it, or else the kinetic energy
-    of the fall at td.
+    of the fall at the end of the flight.
     """
     history, end = situation.history, situation.flight.end
-    if end is not None and end < history.time[-1]:
-        _, after = history.between(end, np.inf)
-        rise = float(after.max(initial=-np.inf)) - history.energy_at(end)
-        if rise > 0:
-            return rise
-    return energy_of_approach(history, situation.flight)
+    if end is None:
+        return None
+    _, after = history.between(end, np.inf)
+    rise = float(after.max(initial=-np.inf)) - history.energy_at(end)
+    return rise if rise > 0 else energy_of_approach(history, situation.flight)

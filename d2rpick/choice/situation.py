@@ -15,7 +15,7 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import RangeError
 from d2rpick.flight.flight import Flight, Seen, find_flight, landed, seen_flight
-from d2rpick.flight.internal_energy import largest, round_off
+from d2rpick.flight.internal_energy import largest, quiet_time, round_off
 from d2rpick.flight.margin import margin_before_contact
 from d2rpick.histories.digits import sum_as_read
 from d2rpick.vibration import find_models
@@ -277,7 +277,8 @@ def examine(
     at = (seen.flight.start + seen.flight.end) / 2 if seen.refusal and seen.flight else td
     fits = Fits() if fits is None else fits
     fit, span = _oscillator(history, at, settings, seen, fits, quick=quick)
-    flight = find_flight(history, td, settings.after, seen, _settled(history, fit, span))
+    described = _settled(history, fit, span) or _described_by_modes(history, td, settings, seen, fits)
+    flight = find_flight(history, td, settings.after, seen, described)
     flight = landed(_between_supports(history, flight, td), settings.landing)
     given = settings.oscillator is not None
     evidence = Evidence(fit, span, given, prescribed=given or settings.fit_window is not None)
@@ -288,9 +289,11 @@ def examine(
     # without a sign of the next contact nothing is known of what comes after td
     end = flight.end or (last if flying or span else td)
     around = Span(min(td, first if flight.start is None else flight.start), end)
-    start = flight.start if flight.settled is None else flight.settled
-    within = None if flight.start is None or start is None else Span(start, flight.end or last)
-    models = find_models(history, around, within, lambda: doubtful(situation.whole), fits, situation.together)
+    within = settled = None
+    if flight.start is not None:
+        within = Span(flight.start, flight.end or last)
+        settled = within if flight.settled is None else within._replace(start=flight.settled)
+    models = find_models(history, around, within, settled, lambda: doubtful(situation.whole), fits, situation.together)
     return replace(situation, evidence=evidence._replace(models=models)) if models else situation
 
 
@@ -359,6 +362,18 @@ def _oscillator(
     if span and span.end - span.start >= _MOST_OF_RECORD * (bounds.end - bounds.start):
         known.append((fit, span))
     return fit, span
+
+
+def _described_by_modes(history: History, td: float, settings: Settings, seen: Seen, fits: Fits) -> Span | None:
+    """Find a window whose modes go on by themselves, if nothing but the energy can tell a flight."""
+    if seen.flight or seen.refusal or settings.after is not None or not settings.replay:
+        return None
+    from d2rpick.vibration.modal_span import find_described  # not above: most records need none
+
+    quiet, last = quiet_time(history, td), float(history.time[-1])
+    guess = None if quiet is None else Span(quiet.start, last if quiet.end is None else quiet.end)
+    found = find_described(history, td, guess, fits)
+    return found.span if found else None
 
 
 def _resolved(history: History, fit: Identification, fits: Fits) -> Identification:

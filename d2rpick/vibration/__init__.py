@@ -80,13 +80,15 @@ def find_models(
     history: History,
     around: Span,
     flight: Span | None,
+    settled: Span | None,
     doubtful: Callable[[], bool],
     memory: Memory,
     together: Together,
 ) -> dict[str, SignedModel]:
     """Look for models, best first, until one tells the sign; those behind the oscillator where that is ``doubtful``.
 
-    They are looked for ``around`` td, those behind the oscillator in the ``flight``, where one is known.
+    They are looked for ``around`` td, those behind the oscillator in the ``flight``, if one is known, and swings also
+    before it, from when the energy has ``settled``.
     """
     found: dict[str, SignedModel] = {}
     within = around
@@ -95,6 +97,8 @@ def find_models(
             if flight is None or not doubtful():
                 break
             within = flight
+        if basis == "swings" and settled is not None:
+            within = settled
         if find and (model := memory.once((basis, *within), partial(find, history, within, together))):
             found[basis] = model
             if model.signed:

@@ -54,15 +54,18 @@ _AMBIGUOUS: Final = 0.08
 # What refuses a record, each a share of what its name says.
 _MOST_MISSED: Final = 0.5  # prediction error over the swing of the energy
 _MOST_MISFIT: Final = 0.3  # rest over the swing of the energy
-_MOST_NEGATIVE: Final = 0.05  # negative static energy over the mean vibration energy, beyond what noise makes
+_MOST_NEGATIVE: Final = 0.5  # negative static energy over the mean vibration energy, beyond what noise makes
 _MOST_DRIFT: Final = 0.6  # change of the static energy over the mean vibration energy
 _MOST_BEYOND: Final = 0.12  # overlap beyond its bounds over the vibration energy, rms over all pairs
 _MOST_HARMONIC: Final = 0.05  # lines locked to a first one over it
-_MOST_UNSTRETCHED: Final = 0.15  # energy of a stretch that the static energy does not hold
+_MOST_UNSTRETCHED: Final = 0.6  # energy of a stretch that the static energy does not hold
 _FEWEST_PER_PERIOD: Final = 2.4  # states per period of the fastest strong line
 
 # Times in a period of the fastest notable line at which a deformation is looked at.
 _TIMES_PER_PERIOD: Final = 16
+
+# Of the swing of the energy: modes that leave less, and predict the rest within so much, show a flight.
+_LITTLE_LEFT, _LITTLE_MISSED = 0.03, 0.1
 
 # The half-width of R^2, before anything is known to be wrong.
 _LEAST_HALF: Final = 0.01
@@ -152,6 +155,14 @@ class ModalVibration:
     def signed(self) -> bool:
         """Whether nothing refuses the record."""
         return self.doubts.refusal is None
+
+    @property
+    def convinces(self) -> bool:
+        """Whether the modes go on by themselves so exactly that nothing else can act on them."""
+        white = 1 - self.systematic
+        structure = self.doubts.misfit * np.sqrt(self.systematic)
+        missed = self.doubts.missed**2 - 2 * white * self.doubts.misfit**2
+        return self.signed and structure < _LITTLE_LEFT and missed < _LITTLE_MISSED**2
 
     @property
     def told(self) -> str:
@@ -248,7 +259,7 @@ class ModalVibration:
         doubts = self.doubts
         drifts = not self.reading.no_static or doubts.drift > _DRIFT_OF_NOISE
         negative = max(doubts.negative - self.slack, 0.0)
-        return _DRIFT_COUNTS * doubts.drift * drifts + _NEGATIVE_COUNTS * negative + doubts.harmonic
+        return _DRIFT_COUNTS * doubts.drift * drifts + _NEGATIVE_COUNTS * (negative + doubts.unstretched) + doubts.harmonic
 
     def _of_other_readings(self, tr: Samples | float, td: Samples | float, squared: Samples) -> Samples:
         """How far R^2 may be off because the lines can be read in another way [-]."""
