@@ -21,9 +21,6 @@ if TYPE_CHECKING:
     from d2rpick.vibration.span import Span
     from d2rpick.vibration.swings import Swings
 
-    SignedModel: TypeAlias = SignedParts | ModalVibration | Swings
-    Finder: TypeAlias = Callable[[History, Span, Together], SignedModel | None]
-
 
 class Together(Protocol):
     """What vibrates together in a flight."""
@@ -37,13 +34,17 @@ class Together(Protocol):
         """Its kinetic energy at times in the flight, without that of its fall, both (n,); None if not written."""
 
 
+if TYPE_CHECKING:
+    SignedModel: TypeAlias = SignedParts | ModalVibration | Swings
+    Finder: TypeAlias = Callable[[History, Span, Together], SignedModel | None]
+
+
 def _parts(history: History, within: Span, _: Together) -> SignedModel | None:
     """Read the signs of single parts, where their energies are written."""
-    time, _ = history.between(*within)
+    time = history.between(*within)[0]
     if history.part_energies is None or time.size < 3:
         return None
     from d2rpick.histories.samples import window
-    from d2rpick.vibration.modal import ModalVibration
     from d2rpick.vibration.part_signs import SignedParts
 
     return SignedParts(time, history.part_energies[window(history.time, *within)], history.part_names)

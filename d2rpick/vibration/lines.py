@@ -72,7 +72,7 @@ class Grid(NamedTuple):
         return self._replace(time=self.time[:count], energy=self.energy[:count])
 
     def gain(self, poles: Complex) -> Complex:
-        """By what the mean over a block of ``exp(p t)`` exceeds its value in the middle of the block, of their shape."""
+        """Mean of ``exp(p t)`` over a block, over its value in the middle of the block, of the shape of ``poles``."""
         half = poles * self.spacing / 2
         with np.errstate(invalid="ignore", divide="ignore"):
             gain = np.sinh(half * self.size) / (self.size * np.sinh(half))
@@ -101,8 +101,8 @@ def even_grid(time: Samples, energy: Samples) -> Grid:
     wanted = np.clip(_STATES_PER_PERIOD * fastest, _FEWEST_STATES, _MOST_STATES)
     size = max(1, int(time.size // wanted))
     count = time.size // size
-    blocks = (column[: count * size].reshape(count, size).mean(axis=1) for column in (even, values))
-    return Grid(*blocks, spacing=float(even[1] - even[0]), size=size, strong=count / max(strongest, 1))
+    middles, means = (column[: count * size].reshape(count, size).mean(axis=1) for column in (even, values))
+    return Grid(middles, means, spacing=float(even[1] - even[0]), size=size, strong=count / max(strongest, 1))
 
 
 class Exponentials(NamedTuple):
@@ -180,7 +180,8 @@ def predict(grid: Grid) -> Prediction | None:
         return None
     first = grid.first(int(FIRST_PART * grid.time.size))
     behind = slice(first.time.size, None)
-    space, tried = _SignalSpace.of(first), []
+    space = _SignalSpace.of(first)
+    tried: list[tuple[float, int, Spectrum]] = []
     for order in _ORDERS:
         if order > first.time.size // 3 or order + 2 > space.size:
             break
@@ -242,7 +243,8 @@ def fit_spectrum(grid: Grid, poles: Complex, span: float) -> Spectrum:
 def _block_means(spectrum: Spectrum, time: Samples, grid: Grid) -> Samples:
     """Means of a spectrum over blocks with their middles at some times [energy]."""
     both = (spectrum.lines, spectrum.mean)
-    return np.sum([(one.waves(time) @ (one.weights * grid.gain(one.poles))).real for one in both], axis=0)
+    means = [(one.waves(time) @ (one.weights * grid.gain(one.poles))).real for one in both]
+    return np.asarray(means[0] + means[1])
 
 
 def _split(poles: Complex, span: float) -> tuple[Complex, Complex]:

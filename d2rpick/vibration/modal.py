@@ -77,9 +77,9 @@ _HIDDEN_LINES: Final = 12  # as many lines as may hide in what the fit leaves ov
 class Doubts(NamedTuple):
     """What speaks against a record as one of a linear structure in free flight, each zero if nothing does [-].
 
-    ``missed`` and ``misfit`` are over the swing of the energy, ``negative``, ``drift`` and ``unstretched`` over the mean
-    vibration energy, ``beyond`` over the vibration energy; ``harmonic`` is the size of lines that are locked to a first
-    one, over it; ``coarse``: states per period of the fastest strong line.
+    ``missed`` and ``misfit`` are over the swing of the energy, ``negative``, ``drift`` and ``unstretched`` over the
+    mean vibration energy, ``beyond`` over the vibration energy; ``harmonic`` is the size of lines that are locked to a
+    first one, over it; ``coarse``: states per period of the fastest strong line.
     """
 
     missed: float
@@ -103,7 +103,7 @@ class Doubts(NamedTuple):
             (self.beyond > _MOST_BEYOND, "the energy halfway is beyond what any deformations allow"),
             (
                 self.harmonic > _MOST_HARMONIC,
-                "the lines are harmonics of one another, as a nonlinear spring makes them",
+                "the lines are harmonics of one another, as those of a nonlinear spring are",
             ),
             (self.unstretched > _MOST_UNSTRETCHED, "lines at half the rate of others hold more than the static energy"),
         )
@@ -173,8 +173,8 @@ class ModalVibration:
         return f"modal, {count} identified from the lines of the {self.source}, {span}"
 
     def comparable_since(self, td: float) -> float:
-        """Earliest time whose deformation can be compared with that at any td [time]."""
-        return float(self.time[0])
+        """Earliest time whose deformation can be compared with that at ``td`` [time]."""
+        return min(float(self.time[0]), td)
 
     def known_at(self, td: float) -> bool:
         """Whether td lies where the modes were identified, and more than the error of a solver vibrates there."""
@@ -259,7 +259,9 @@ class ModalVibration:
         doubts = self.doubts
         drifts = not self.reading.no_static or doubts.drift > _DRIFT_OF_NOISE
         negative = max(doubts.negative - self.slack, 0.0)
-        return _DRIFT_COUNTS * doubts.drift * drifts + _NEGATIVE_COUNTS * (negative + doubts.unstretched) + doubts.harmonic
+        return (
+            _DRIFT_COUNTS * doubts.drift * drifts + _NEGATIVE_COUNTS * (negative + doubts.unstretched) + doubts.harmonic
+        )
 
     def _of_other_readings(self, tr: Samples | float, td: Samples | float, squared: Samples) -> Samples:
         """How far R^2 may be off because the lines can be read in another way [-]."""
@@ -297,7 +299,8 @@ def identify_modal(time: Samples, energy: Samples, *, kinetic: bool = False) -> 
     Examples
     --------
     >>> t = np.linspace(0.0, 6.0, 601)
-    >>> found = identify_modal(t, np.cos(9.0 * t) ** 2 + 0.5 * np.cos(14.0 * t + 1.0) ** 2 + 0.3 * np.cos(25.0 * t) ** 2)
+    >>> modes = np.cos(9.0 * t), np.cos(14.0 * t + 1.0), np.cos(25.0 * t)
+    >>> found = identify_modal(t, np.dot([1.0, 0.5, 0.3], np.square(modes)))
     >>> [f"{rate:.4f}" for rate in sorted(found.reading.modes.poles.imag / 2)], found.signed
     (['9.0000', '14.0000', '25.0000'], True)
     >>> apart = np.cos(9.0 * 1.0) - np.cos(9.0 * 4.0), np.cos(15.0) - np.cos(57.0), np.cos(25.0) - np.cos(100.0)
@@ -396,7 +399,7 @@ def _beyond_bounds(reading: Reading, grid: Grid) -> float:
 
 
 class Stretch(NamedTuple):
-    """A ``line`` that belongs to the stretch of a mode, which has its own ``of_mode``; ``energy`` of that stretch [energy]."""
+    """A ``line`` of the stretch of a mode whose own line is ``of_mode``; ``energy`` of that stretch [energy]."""
 
     line: int
     of_mode: int
