@@ -217,7 +217,7 @@ def run(classes: Mapping[str, Any], try_records: TryClass, description: str) -> 
         trials = try_records(name, options.records, options.seed)
         taken, asking = time.perf_counter() - start, sum(trial.seconds for trial in trials)
         print(f"{name}: {taken:.0f} s, of these {asking:.0f} s asking", file=sys.stderr, flush=True)
-        tables.append(tabulate(name, trials))
+        tables.append(tabulate(name, trials).assign(seed=options.seed))
         if options.csv:  # after each class, since all take an hour
             pd.concat(tables, ignore_index=True).to_csv(options.csv, index=False)
     if tables:

@@ -86,7 +86,7 @@ def make_linear(
     energies = unit * (elastic + scatter + work[:, np.newaxis] / elastic.shape[1])
     names = ["internal_energy"] if energies.shape[1] == 1 else [*PART_COLUMNS[: energies.shape[1]]]
     columns = {"time": time} | dict(zip(names, energies.T, strict=True))
-    columns |= add_evidence(random, time, partial(_push, modes.loads), unit * kinetic)
+    columns |= add_evidence(random, time, _add_impulses(modes.loads, time), unit * kinetic)
     suggest = ask_for_times(random, begin, end)
     if random.random() < 1 / 4:
         suggest["after"] = begin
@@ -94,9 +94,9 @@ def make_linear(
     return Record(columns, Truth(modes, (begin, end)), read=read, suggest=suggest)
 
 
-def _push(loads: Sequence[Load], time: Samples) -> Samples:
-    """Return the forces at times (n,), shape (n, k)."""
-    return np.asarray(sum(np.outer(load.evaluate(time), load.heights) for load in loads))
+def _add_impulses(loads: Sequence[Load], time: Samples) -> Samples:
+    """Return what the loads have given until the times, shape (n,); a short kick may lie between two of them."""
+    return np.asarray(sum(np.abs(load.heights).max() * load.integrate(time) for load in loads))
 
 
 def _draw_loads(random: np.random.Generator, shape: Shapes, period: float, *, fading: bool) -> list[Load]:
@@ -133,7 +133,7 @@ def _draw_times(
     step = fastest_period / min(density, most)
     if not irregular:
         return np.arange(0.0, end, step)
-    steps = step * random.uniform(0.4, 1.6, int(2 * end / step) + 2)
+    steps = step * random.uniform(0.4, 1.6, int(3 * end / step) + 2)
     if random.random() < 0.5:
         restart = random.integers(0, int(end / step))  # a restart with another interval of output
         steps[restart:] *= random.choice([0.5, 2.0])

@@ -47,6 +47,14 @@ def test_the_closed_form_is_the_integrated_motion() -> None:
     assert np.concatenate([deformation.T, velocity.T]) == pytest.approx(integrate(MODES, time), abs=1e-5)
 
 
+@pytest.mark.parametrize("load", MODES.loads)
+def test_the_impulse_of_a_load_is_its_integral(load: Load) -> None:
+    time = np.linspace(0.0, 2.0, 20001)
+    course = load.evaluate(time)
+    integral = np.append(0.0, np.cumsum((course[1:] + course[:-1]) / 2 * np.diff(time)))
+    assert load.integrate(time) == pytest.approx(integral, abs=1e-6)
+
+
 def test_the_residual_is_given_by_the_energy_halfway() -> None:
     """The identity of the midpoint, which holds for any damping, knows nothing of the modes' signs."""
     truth = Truth(MODES, (MODES.loaded_until, END))
