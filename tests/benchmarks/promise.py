@@ -140,8 +140,8 @@ def count_group(rows: pd.DataFrame) -> dict[str, object]:
     """Count what became of some records, rows of `tabulate`, in the columns of the table."""
     pairs = rows[rows["true"].notna()]
     stated, unstated = pairs[pairs["residual"].notna()], pairs[pairs["residual"].isna()]
-    useful_by_word = stated[stated["residual"] < KEEPS_NOTHING]
-    sure_by_word = stated[stated["residual"] < PROMISES]
+    said_useful = stated[stated["residual"] < KEEPS_NOTHING]
+    said_sure = stated[stated["residual"] < PROMISES]
     possible = rows[rows["oracle"] < DESERVES_GOOD]
     good = pairs[pairs["grade"] == "good"]
     banded = pairs[pairs["high"].notna()]
@@ -151,12 +151,12 @@ def count_group(rows: pd.DataFrame) -> dict[str, object]:
         "records": len(rows),
         "pairs": len(pairs),
         "R>1": _count(pairs["true"] > KEEPS_NOTHING),
-        "R>1, said <1": _count(useful_by_word["true"] > KEEPS_NOTHING),
+        "R>1, said <1": _count(said_useful["true"] > KEEPS_NOTHING),
         "free R (oracle)": _compare(pairs[pairs["td_asked"].isna()]),
         "given R (oracle)": _compare(pairs[pairs["td_asked"].notna()]),
         "unstated: free": _compare(unstated[unstated["td_asked"].isna()]),
         "given": _compare(unstated[unstated["td_asked"].notna()]),
-        "R>0.3, said <0.25": _count(sure_by_word["true"] > BAD),
+        "R>0.3, said <0.25": _count(said_sure["true"] > BAD),
         "good of oracle<0.2": _count(possible["grade"] == "good"),
         "good, R>0.3": _count(good["true"] > BAD),
         "in band": _share(off <= _ROUNDING),
@@ -201,7 +201,7 @@ def try_class(name: str, count: int, seed: int) -> list[Trial]:
         return [try_record(CLASSES[name](np.random.default_rng([seed, number])), Path(folder)) for number in numbers]
 
 
-def run(classes: Mapping[str, Any], try_records: TryClass, description: str) -> None:
+def run_benchmark(classes: Mapping[str, Any], try_records: TryClass, description: str) -> None:
     """Try the classes that the command line names, and print what became of them."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("records", nargs="?", type=int, default=100, help="number of records in a class [default: 100]")
@@ -227,4 +227,4 @@ def run(classes: Mapping[str, Any], try_records: TryClass, description: str) -> 
 
 
 if __name__ == "__main__":
-    run(CLASSES, try_class, "What a recommended pair, its stated residual and its grade are worth.")
+    run_benchmark(CLASSES, try_class, "What a recommended pair, its stated residual and its grade are worth.")

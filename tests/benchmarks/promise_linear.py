@@ -213,8 +213,8 @@ def draw_leak(random: np.random.Generator) -> Shapes:
     springs: list[tuple[int, int, float]] = []
     for place, frequency in enumerate(recorded):
         for _ in range(int(random.integers(2, 6))):
-            springs.append((place, len(places), draw_log(random, 0.002, 0.03) * frequency**2))
-            places.append(frequency * (1 + random.uniform(-0.03, 0.03)))
+            springs.append((place, len(places), draw_log(random, 0.0005, 0.01) * frequency**2))
+            places.append(frequency * (1 + random.uniform(-0.05, 0.05)))
     is_recorded = np.arange(len(places)) < recorded.size
     return _couple(np.array(places), springs, np.zeros(recorded.size, dtype=int), is_recorded)
 
@@ -275,7 +275,7 @@ def draw_hinge(random: np.random.Generator, around: Surroundings) -> Stretch:
         sine, cosine, delta, _ = ellipj(slow * time + shift, depth**2)
         return np.asarray(-12 * depth**2 * slow * sine * cosine * delta)
 
-    heights = draw_log(random, 0.05, 1.0) * around.swings * random.normal(size=around.swings.size)
+    heights = draw_log(random, 0.002, 0.2) * around.swings * random.normal(size=around.swings.size)
     return Stretch(heights, course, rate)
 
 
