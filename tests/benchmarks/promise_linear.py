@@ -275,7 +275,7 @@ def draw_hinge(random: np.random.Generator, around: Surroundings) -> Stretch:
         sine, cosine, delta, _ = ellipj(slow * time + shift, depth**2)
         return np.asarray(-12 * depth**2 * slow * sine * cosine * delta)
 
-    heights = draw_log(random, 0.002, 0.2) * around.swings * random.normal(size=around.swings.size)
+    heights = draw_log(random, 0.003, 0.3) / (1 + 4 * depth**2) * around.swings * random.normal(size=around.swings.size)
     return Stretch(heights, course, rate)
 
 
