@@ -9,7 +9,7 @@ the kinetic share "is what ..." (``kinetic``), and why a tr has no measures (``u
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Final, Protocol, cast
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -103,5 +103,11 @@ def find_models(
         if find and (model := memory.once((basis, *within), partial(find, history, within, together))):
             found[basis] = model
             if model.signed:
-                break
-    return found
+                return found
+    return _with_last_resort(found)
+
+
+def _with_last_resort(found: dict[str, SignedModel]) -> dict[str, SignedModel]:
+    """Rely on doubtful modes, with a wide band, if no model tells the sign."""
+    modal = cast("ModalVibration | None", found.get("modal"))
+    return found | {"modal": modal.as_last_resort()} if modal else found

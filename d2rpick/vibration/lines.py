@@ -32,6 +32,8 @@ FIRST_PART: Final = 0.7
 _MOST_LAGS: Final = 340
 # The even grid has so many states in a period of the fastest line that matters, and at most so many in all.
 _STATES_PER_PERIOD, _FEWEST_STATES, _MOST_STATES = 6.4, 64, 2000
+# Times are even if they are off by less than this share of a step, as single precision and printed digits leave it.
+_EVEN: Final = 1e-3
 # Shares of the power of an energy about its trend: below the rate of the first lies all that matters, below that of the
 # second all that is strong.
 _ALL_POWER, _STRONG_POWER = 0.999, 0.95
@@ -89,7 +91,7 @@ def even_grid(time: Samples, energy: Samples) -> Grid:
     """
     even = np.linspace(time[0], time[-1], time.size)
     values = energy
-    if not np.allclose(time, even, rtol=0.0, atol=1e-9 * (even[1] - even[0])):
+    if np.abs(time - even).max() > _EVEN * (even[1] - even[0]):
         from scipy.interpolate import CubicSpline  # not above: it costs start-up
 
         values = CubicSpline(time, energy)(even)
@@ -255,10 +257,10 @@ def _split(poles: Complex, span: float) -> tuple[Complex, Complex]:
     lasting = decay * span < _MOST_DECAY
     is_line = (turns > _LEAST_TURNS) & (decay < _MOST_DAMPED * rate) & lasting
     is_slow = (rate >= 0) & ~is_line & (turns < _LEAST_TURNS) & lasting
-    decays = np.unique(np.round(np.concatenate([decay[is_line], decay[is_slow]]) * span, 1))
-    decays = decays[np.abs(decays) > _SAME_DECAY]
+    every = np.round(np.concatenate([decay[is_line], decay[is_slow]]) * span, 1)
+    decays = np.array(sorted({one for one in every.tolist() if abs(one) > _SAME_DECAY}))
     if decays.size > _MOST_DECAYS:
-        decays = np.quantile(decays, np.linspace(0.0, 1.0, _MOST_DECAYS))
+        decays = decays[np.linspace(0, decays.size - 1, _MOST_DECAYS).round().astype(int)]
     slow = rate[is_slow & (rate * span > 0.5)]
     mean = np.concatenate([[0.0], -decays / span, 1j * slow])
     return -decay[is_line] + 1j * rate[is_line], mean.astype(np.complex128)
