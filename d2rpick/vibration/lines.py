@@ -150,8 +150,13 @@ class Spectrum(NamedTuple):
         return float(np.sqrt(np.mean(self.rest**2)))
 
     def turned(self) -> Spectrum:
-        """Give the same with lines, and what they leave over, of the opposite sign."""
-        return Spectrum(self.lines._replace(weights=-self.lines.weights), self.mean, -self.rest)
+        """Give the lines of the internal energy from those of the kinetic energy.
+
+        With the damping ratio z and s = sqrt(1 - z^2) the weight of a line of T is -(s + i z)^2 times that of V.
+        """
+        damping = -self.lines.poles.real / np.abs(self.lines.poles)
+        turn = (np.sqrt(1 - damping**2) + 1j * damping) ** 2
+        return Spectrum(self.lines._replace(weights=-self.lines.weights / turn), self.mean, -self.rest)
 
     def at(self, t: Samples | float) -> Samples:
         """Energy at each time, of the shape of ``t`` [energy]."""
@@ -171,7 +176,7 @@ class Prediction(NamedTuple):
     swing: float
 
     def turned(self) -> Prediction:
-        """Give the same with lines of the opposite sign."""
+        """Give what the lines of the kinetic energy say of those of the internal energy."""
         spectra = (self.spectrum.turned(), self.of_first_part.turned())
         return Prediction(*spectra, self.missed, self.swing)
 
