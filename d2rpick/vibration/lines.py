@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.histories.samples import median
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -101,7 +102,7 @@ def even_grid(time: Samples, energy: Samples) -> Grid:
     trend = np.polyval(np.polyfit(reach, values, 2), reach)
     power = np.abs(np.fft.rfft((values - trend) * np.hanning(time.size))) ** 2
     # white noise holds as much at the highest rates as anywhere
-    noise = _ABOVE_NOISE * float(np.median(power[power.size // 2 :]))
+    noise = _ABOVE_NOISE * float(median(power[power.size // 2 :]))
     running = np.cumsum(np.maximum(power - noise, 0.0))
     fastest, strongest = np.searchsorted(running, np.array([_ALL_POWER, _STRONG_POWER]) * running[-1]).tolist()
     wanted = np.clip(_STATES_PER_PERIOD * fastest, _FEWEST_STATES, _MOST_STATES)

