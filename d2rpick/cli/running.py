@@ -136,17 +136,14 @@ def follow(run: str, wait: float | None, once: bool, lasting: float | None, requ
         raise click.UsageError("--once and --for exclude each other")
     seconds = 0.0 if once else lasting
     failed, since = False, None
-    try:
-        for one in events(run, parts=request.part or None, wait=wait, deck=request.deck, lasting=seconds):
-            failed, since = failed or one.event == "failed", one.time
-            if output.output_format == "ndjson":
-                text = json.dumps(one._asdict(), allow_nan=False)
-            else:
-                seen = "-" if one.seen is None else f"{one.seen:.6g}"
-                text = f"{seen:>10}  {one.event:<10}  {one.message}"
-            click.echo(text_bytes(f"{in_words(text, output.output_format, output.columns)}\n"), nl=False)
-    except KeyboardInterrupt:
-        return
+    for one in events(run, parts=request.part or None, wait=wait, deck=request.deck, lasting=seconds):
+        failed, since = failed or one.event == "failed", one.time
+        if output.output_format == "ndjson":
+            text = json.dumps(one._asdict(), allow_nan=False)
+        else:
+            seen = "-" if one.seen is None else f"{one.seen:.6g}"
+            text = f"{seen:>10}  {one.event:<10}  {one.message}"
+        click.echo(text_bytes(f"{in_words(text, output.output_format, output.columns)}\n"), nl=False)
     output.finish(objection=failed or (seconds is not None and since is None))
 
 
