@@ -228,7 +228,7 @@ def from_frame(
 
 def _timed(frame: pd.DataFrame, time: str | int | None) -> pd.DataFrame:
     """Make the index a column where it is the time; ValueError where nothing is."""
-    from d2rpick.histories.names import is_time
+    from d2rpick.histories.meaning import is_time
 
     index = frame.index
     if time in (known := list(map(str, frame.columns))) or isinstance(time, int) or any(map(is_time, known)):

@@ -15,7 +15,8 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.history import Precision, Samples
-from d2rpick.histories.names import Part, quantity_of, resolve, with_namesakes
+from d2rpick.histories.meaning import find_quantities
+from d2rpick.histories.names import Part, resolve, with_namesakes
 from d2rpick.histories.samples import newest_states, window
 
 if TYPE_CHECKING:
@@ -57,6 +58,8 @@ class Database:
         Unit of the times, empty where the file does not name it; no solver writes one.
     digits : int
         Significant decimal digits of all numbers.
+    named_by_people : bool
+        Whether people or other programs than solvers chose the names of the channels, so that they may mean anything.
     no_channels, no_parts : str
         What to say where somebody asks for them and there are none.
     """
@@ -70,6 +73,7 @@ class Database:
     parts: tuple[Part, ...] = ()
     digits = DIGITS[8]
     no_channels = ""
+    named_by_people = False
     no_parts = "this table has no parts; give the matsum, binout or T01 instead, or one of its columns by `energy`"
 
     def branch(self, name: str) -> Database:
@@ -132,7 +136,7 @@ class Legs:
         self._energies: tuple[tuple[int, ...], Samples] | None = None  # of the parts that were asked for last
         self.source = ", ".join(leg.source for leg in self._files)
         first = self._legs[0]
-        self.format, self.version = first.format, first.version
+        self.format, self.version, self.named_by_people = first.format, first.version, first.named_by_people
         self.title, self.time_unit = first.title, first.time_unit
         self.complete = all(leg.complete for leg in self._files) and not cut
 
@@ -153,10 +157,7 @@ class Legs:
 
         Where several have names of one quantity none of them is taken, unless one is named like the quantity itself.
         """
-        found: dict[str, list[str]] = {}
-        for name in self.channels:
-            if quantity := quantity_of(name):
-                found.setdefault(quantity, []).append(name)
+        found = find_quantities(self.channels)
         sure = {quantity: names[0] for quantity, names in found.items() if len(names) == 1}
         own = {quantity: quantity for quantity, names in found.items() if quantity in names}
         told = {}

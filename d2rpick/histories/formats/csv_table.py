@@ -13,7 +13,8 @@ from d2rpick.histories.database import Database
 from d2rpick.histories.formats.curves import Curves, find_curves
 from d2rpick.histories.formats.layout import Layout, as_number, find_layout, is_skipped, split, unique
 from d2rpick.histories.formats.text import UTF16, Text, is_whole, precisions
-from d2rpick.histories.names import internal_energies, is_time, meant, near_miss, quantity_of, refuse_other_quantity
+from d2rpick.histories.meaning import find_internal_energies, is_time, quantity_of, refuse_other_quantity
+from d2rpick.histories.names import meant, near_miss
 from d2rpick.histories.samples import of_one_run
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ def internal_energy(source: str, layout: Layout, times: Sequence[int]) -> int:
         refuse_other_quantity(layout.channel(beside[0]), source)
         return beside[0]
     sure = [column for column in beside if column < layout.trusted]
-    named = [sure[i] for i in internal_energies([layout.name(column) for column in sure])]
+    named = [sure[i] for i in find_internal_energies([layout.name(column) for column in sure])]
     if len(named) == 1:
         return named[0]
     found = f"{len(named)} columns are" if named else "no column is"
@@ -108,6 +109,7 @@ class Table(Database):
     """One table, a `Database` without parts; FormatError when it is none, or a selected column is not there."""
 
     format = "csv"
+    named_by_people = True
 
     def __init__(self, text: Text, selection: Selection) -> None:
         self.source, self._text = text.name, text

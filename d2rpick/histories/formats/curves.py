@@ -19,7 +19,8 @@ from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats.layout import as_number, unique
 from d2rpick.histories.formats.text import is_whole, precisions
-from d2rpick.histories.names import Selection, internal_energies, is_time, refuse_other_quantity, resolve, unit_of
+from d2rpick.histories.meaning import find_internal_energies, is_time, refuse_other_quantity
+from d2rpick.histories.names import Selection, resolve, unit_of
 from d2rpick.histories.samples import of_one_run
 
 if TYPE_CHECKING:
@@ -107,6 +108,7 @@ class Curves(Database):
     """Curves of one text; a `Database` without parts, whose times are those of the curves that are asked for."""
 
     format = "csv"
+    named_by_people = True
 
     def __init__(self, found: _CurveText, selection: Selection) -> None:
         self.source = found.source
@@ -132,7 +134,7 @@ class Curves(Database):
     @property
     def energy_channel(self) -> str:
         """The only curve, or the only one named like an internal energy; else FormatError with all there are."""
-        fitting = range(1) if len(self.channels) == 1 else internal_energies(self.channels)
+        fitting = range(1) if len(self.channels) == 1 else find_internal_energies(self.channels)
         if len(fitting) != 1:
             found = f"{len(fitting)} curves are" if fitting else "no curve is"
             what = f"{self.source}: {found} named like an internal energy"

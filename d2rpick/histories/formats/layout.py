@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.formats.text import HEAD, Text
-from d2rpick.histories.names import is_time, is_unit, unit_of
+from d2rpick.histories.meaning import is_time
+from d2rpick.histories.names import is_unit, unit_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
