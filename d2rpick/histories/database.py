@@ -5,6 +5,7 @@ Databases of different formats that one run wrote are companions: whether they c
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from contextlib import suppress
 from itertools import combinations
@@ -131,7 +132,7 @@ class Legs:
         self._cut = cut  # files whose packed data ends early
         self._named = named  # quantities whose channels have unusual names
         several = len(legs) > 1  # of one leg the times are not looked at: they may not be known yet
-        self._files = sorted(legs, key=_start) if several else [*legs]
+        self._files = sorted(legs, key=_leg_order) if several else [*legs]
         self._legs = [leg for leg in self._files if not several or _start(leg) > -np.inf] or self._files
         self._energies: tuple[tuple[int, ...], Samples] | None = None  # of the parts that were asked for last
         self.source = ", ".join(leg.source for leg in self._files)
@@ -273,6 +274,12 @@ def _times(database: Database | Legs) -> list[Samples]:
 def _start(leg: Database) -> float:
     """First time of a leg; before all others where it has no states."""
     return min((float(time[0]) for time in _times(leg) if time.size), default=-np.inf)
+
+
+def _leg_order(leg: Database) -> tuple[float, list[tuple[str, int]]]:
+    """Sort legs by their start, those that start together by name: the order in which files are named is no matter."""
+    pieces = re.findall(r"(\D*)(\d*)", leg.source)
+    return _start(leg), [(text, int(number or -1)) for text, number in pieces]
 
 
 def _digits(precision: Precision) -> int:

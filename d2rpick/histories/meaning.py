@@ -44,6 +44,7 @@ _NUMBERING: Final = re.compile(r"^\s*\d+[.:)]\s+")  # "2. Kinetic energy"
 _SOURCE: Final = re.compile(r"t\d\d")  # a time history of Radioss, as T01
 # The dataset of a quantity whose name is that of the group around it: H5MD and others.
 _UNNAMED_STEPS: Final = frozenset({"value", "values", "data", "res", "y"})
+_STEPS_BESIDE: Final = frozenset({"step", "steps", "count", "error", "index", "cycle"})  # datasets beside the values
 
 _WORD: Final = re.compile(r"[^\W_]+")
 _CAMEL_CASE: Final = re.compile(r"(?<=[a-zà-ÿ])(?=[A-Z])")
@@ -86,7 +87,7 @@ _MOST_NAMED: Final = 6  # energies in one note
 def find_meaning(name: str) -> Meaning | None:
     """Return the quantity that a name says, with its rank; None if it says none, or several.
 
-    The name may be a path: if the whole path says nothing for sure, its last step decides.
+    The name may be a path: its last step decides, if that says something.
 
     Examples
     --------
@@ -101,12 +102,12 @@ def find_meaning(name: str) -> Meaning | None:
     while len(steps) > 1 and steps[-1].casefold() in _UNNAMED_STEPS:
         steps.pop()
     whole = _match_words(_words_of("/".join(steps)))
-    if len(steps) == 1 or (whole and whole.rank < OF_SOMETHING_ELSE):
+    if len(steps) == 1 or (whole and whole.quantity == "energy_ratio"):  # "total energy / initial energy"
         return whole
+    if steps[-1].casefold() in _STEPS_BESIDE or is_time(steps[-1]):
+        return None
     last = _match_words(_words_of(steps[-1]))
-    if last is None or last.rank == OF_SOMETHING_ELSE:
-        return whole
-    return Meaning(last.quantity, WHOLE_MODEL)
+    return last if last and last.rank < OF_SOMETHING_ELSE else whole
 
 
 def _words_of(name: str) -> list[str]:
@@ -175,16 +176,20 @@ def is_total_internal_energy(name: str) -> bool:
 
 
 def find_internal_energies(names: Sequence[str]) -> list[int]:
-    """Return the places of the names of the best rank that say internal energy."""
-    ranks: dict[int, list[int]] = {}
+    """Return the places of the names that say internal energy without addition or, if there are none, with any.
+
+    A total is not preferred to the energies of parts: which of them is to be locked in, only the user knows.
+    """
+    exact, others = list[int](), list[int]()
     for place, name in enumerate(names):
         meaning = find_meaning(name)
         if meaning is None or meaning.quantity != "internal_energy":
             continue
-        if meaning.rank == OF_SOMETHING_ELSE and re.search(_OTHER_QUANTITY, name):
-            continue  # "dissipated internal energy"
-        ranks.setdefault(meaning.rank, []).append(place)
-    return ranks[min(ranks)] if ranks else []
+        if meaning.rank == EXACT:
+            exact.append(place)
+        elif meaning.rank == WHOLE_MODEL or not re.search(_OTHER_QUANTITY, name):  # not "dissipated internal energy"
+            others.append(place)
+    return exact or others
 
 
 def quantity_of(name: str) -> str | None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.database import Database, Legs
+from d2rpick.histories.foreign import refuse_binary, refuse_text
 from d2rpick.histories.formats import READERS
 from d2rpick.histories.names import Selection
 from d2rpick.histories.run import Run
@@ -28,20 +29,8 @@ __all__ = ["Reader", "Run", "Selection", "Source", "open_run", "open_sources", "
 # Enough of a file for its head and more than one state of the longest blocks.
 _HEAD = 8192
 _DEFAULT = Selection()
-# A keyword of LS-DYNA at the start of a line, or the first line of a Radioss deck; compiled where it is needed.
-_DECK: Final = rb"\*[A-Za-z][A-Za-z_]{2}|#RADIOSS|/BEGIN"
-# What is often given instead of a history: how it begins, what it is, and the way out.
-_OTHERS: Final = (
-    (
-        rb"PK\x03\x04.{0,2000}(xl/|\[Content_Types\])",
-        "an Excel workbook",
-        "save the sheet as csv, with a line of headings",
-    ),
-    (rb"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an Excel workbook", "save the sheet as csv, with a line of headings"),
-    (rb"PK\x03\x04", "a zip archive", "unpack it and name the history in it"),
-    (rb"7z\xbc\xaf|BZh[1-9]1AY|\xfd7zXZ", "a packed file", "unpack it first: only gzip is read as it is"),
-    (rb"PAR1", "a parquet file", "write it as csv: pandas.read_parquet(...).to_csv(...)"),
-)
+# No legend of an ASCII database has more bytes.
+_LONGEST_LEGEND: Final = 1 << 24
 
 
 class Reader(Protocol):
@@ -112,22 +101,13 @@ def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:
         raise FormatError(f"no time {time!r} in {' and '.join(kinds)}, the time is 'time'; leave `time` out")
 
 
-def _is_deck(head: bytes) -> bool:
-    """Whether a deck begins, behind comments only."""
-    lines = head.removeprefix(b"\xef\xbb\xbf").split(b"\n")
-    first = next((line for line in lines if line.strip() and not line.lstrip().startswith(b"$")), b"")
-    return first.startswith((b"*", b"#", b"/")) and re.match(_DECK, first) is not None
-
-
 def _format(source: Source) -> str:
-    head = source.data[:_HEAD]
-    if _is_deck(head):
-        found = f"{source.name}: this is a deck, an energy history was expected"
-        raise FormatError(f"{found}; name the glstat, matsum, binout or T01 of its run")
-    for begins, what, way_out in _OTHERS:
-        if re.match(begins, head, re.DOTALL):
-            raise FormatError(f"{source.name}: this is {what}, an energy history was expected; {way_out}")
+    """Return the format of a file: a signature decides first, a text is a table only if it is nothing else."""
+    head = _head_of(source)
+    refuse_binary(source.name, head)
     for kind, listed in READERS.items():
+        if kind == "csv" and b"\0" not in head:
+            refuse_text(source.name, head)
         if re.search(listed.hint, head, re.DOTALL) and reader(kind).recognises(head):
             return kind
     if re.search(r"(^|[/\\])d3(plot|part|dump|thdt)[^/\\]*$", source.name):
@@ -135,6 +115,16 @@ def _format(source: Source) -> str:
         raise FormatError(f"{source.name}: {what}; name the glstat, matsum or binout of the run")
     found = f"{source.name}: binary data of no known format, one of {', '.join(READERS)} was expected"
     raise FormatError(f"{found}; export the energy history as text")
+
+
+def _head_of(source: Source) -> bytes:
+    """Return the beginning of a file, with some of what comes after the legend of an ASCII database of LS-DYNA."""
+    head = source.data[:_HEAD]
+    if b"{BEGIN LEGEND}" in head and b"{END LEGEND}" not in head:
+        end = source.data[:_LONGEST_LEGEND].find(b"{END LEGEND}")
+        if end >= 0:
+            head = source.data[: end + _HEAD]
+    return head
 
 
 # Energies of two legs at a time that both have are the same within this share of the largest, else the runs differ.

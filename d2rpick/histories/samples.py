@@ -121,10 +121,12 @@ def of_one_run(time: Samples, place: Callable[[int], str]) -> Samples:
     state = _not_a_restart(time)
     if state is None:
         return time
-    raise FormatError(
-        f"{place(state)}: time steps back from {time[state - 1]:g} to {time[state]:g}, increasing times or one restart "
-        "were expected; sort the rows, or put each curve into its own file"
-    )
+    found = f"{place(state)}: time steps back from {time[state - 1]:g} to {time[state]:g}"
+    if time[state] <= time[0]:
+        cure = "another curve or part begins here: put each into its own file"
+    else:
+        cure = "sort the rows, or put each curve into its own file"
+    raise FormatError(f"{found}, increasing times or one restart were expected; {cure}")
 
 
 def _not_a_restart(time: Samples) -> int | None:

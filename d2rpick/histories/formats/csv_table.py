@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import FormatError, listing
+from d2rpick.base.errors import FormatError, if_written, listing
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats.curves import Curves, find_curves
 from d2rpick.histories.formats.layout import Layout, as_number, find_layout, is_skipped, split, unique
 from d2rpick.histories.formats.text import UTF16, Text, is_whole, precisions
+from d2rpick.histories.interleaved import count_rows_per_time, refuse_rows_of_parts
 from d2rpick.histories.meaning import find_internal_energies, is_time, quantity_of, refuse_other_quantity
 from d2rpick.histories.names import meant, near_miss
 from d2rpick.histories.samples import of_one_run
@@ -151,7 +152,19 @@ class Table(Database):
     def time(self) -> Samples:
         """Times as they stand in the file, shape (n,) [time]; FormatError where they are not those of one run."""
         place = partial(line_of, self._text, self._begin, self._layout, self._time)
-        return of_one_run(self._values(self._time), lambda state: f"{self.source}:{place(state)}")
+        times = of_one_run(self._values(self._time), lambda state: f"{self.source}:{place(state)}")
+        if count_rows_per_time(times) > 1:
+            self._refuse_rows_of_parts(times)
+        return times
+
+    def _refuse_rows_of_parts(self, times: Samples) -> None:
+        """Raise FormatError if each time stands in a row for each part."""
+        for column in self._needed[1:]:
+            energy = if_written(partial(self._values, column))
+            if energy is not None and energy.size == times.size:
+                rows = self._sample()[: self._text.some]
+                others = {name: [row[place] for row in rows] for name, place in self._columns.items()}
+                refuse_rows_of_parts(self.source, times, energy, others)
 
     def channel(self, name: str) -> Samples:
         """One column, shape (n,); FormatError with the line of a value that is no number."""

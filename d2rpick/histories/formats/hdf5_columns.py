@@ -57,6 +57,11 @@ class Column(NamedTuple):
             leaf = group.rpartition("/")[2]
         return is_time(leaf)
 
+    @property
+    def is_whole_number(self) -> bool:
+        """Whether its values are whole numbers, such as those of parts."""
+        return self.dtype.startswith(("int", "uint"))
+
     def load(self, file: h5py.File, content: bytes, source: str) -> Samples:
         """Its values, shape (size,), of a file with that ``content``; FormatError unless all are finite."""
         dataset = file[self.dataset]

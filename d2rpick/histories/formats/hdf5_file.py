@@ -22,6 +22,7 @@ from d2rpick.base.files import beyond, unpacked_beyond
 from d2rpick.histories.database import DIGITS, Database
 from d2rpick.histories.formats.hdf5_columns import Column, check_data, columns_of, finite
 from d2rpick.histories.history import Precision, Samples
+from d2rpick.histories.interleaved import count_rows_per_time, refuse_rows_of_parts
 from d2rpick.histories.meaning import find_internal_energies, refuse_other_quantity
 from d2rpick.histories.names import Part, Selection, near_miss
 from d2rpick.histories.samples import of_one_run
@@ -98,7 +99,13 @@ class Columns(Database):
     def time(self) -> Samples:
         """Values of the time column, shape (n,) [time]; FormatError where they are not those of one run."""
         path = self._time_column.path
-        return of_one_run(self._load(self._time_column), lambda state: f"{self.source}: {path}, value {state + 1}")
+        times = of_one_run(self._load(self._time_column), lambda state: f"{self.source}: {path}, value {state + 1}")
+        if count_rows_per_time(times) > 1:
+            energies = self._energies or [_only_energy(self._columns, self._named_time, self.source)]
+            beside = [column for column in self._columns if column.size == times.size and column.is_whole_number]
+            others = {column.path: self._load(column).astype(int).tolist() for column in beside}
+            refuse_rows_of_parts(self.source, times, self._load(energies[0]), others)
+        return times
 
     def channel(self, name: str) -> Samples:
         """Values of one column, shape (n,); FormatError when it is not as long as the time."""
