@@ -107,13 +107,19 @@ _DYNA_HEAD: Final = rb"\n(?:\{BEGIN LEGEND\}| {10,}ls-dyna )"
 _DECK: Final = rb"\*[A-Za-z][A-Za-z_]{2}|#RADIOSS|/BEGIN|/[A-Z]{3,8}(?:/|\s|\Z)"
 
 
-def refuse_binary(source: str, head: bytes) -> None:
-    """Raise FormatError for a binary file of a known format, by its first bytes; ``source`` is its name."""
+def refuse_foreign(source: str, head: bytes) -> None:
+    """Raise FormatError for a file of a known format that is no energy history.
+
+    Parameters
+    ----------
+    source : str
+        Name of the file, which tells the ASCII databases of LS-DYNA apart where their content does not.
+    head : bytes
+        The beginning of the file.
+    """
     _refuse(source, head, _BINARY_FORMATS)
-
-
-def refuse_text(source: str, head: bytes) -> None:
-    """Raise FormatError for a text of a known format that is no table; ``source`` is its name, for LS-DYNA too."""
+    if b"\0" in head:
+        return
     if _is_deck(head):
         found = f"{source}: this is a deck, an energy history was expected"
         raise FormatError(f"{found}; name the glstat, matsum, binout or T01 of its run")
@@ -123,11 +129,6 @@ def refuse_text(source: str, head: bytes) -> None:
         which = f"the {name}" if name else "an ASCII database"
         found = f"{source}: this is {which} of LS-DYNA, which holds no internal energy of the model or its parts"
         raise FormatError(f"{found}; {_NAME_DATABASE}")
-
-
-def is_other_dyna_database(source: str) -> bool:
-    """Return True if a file is named like an ASCII database of LS-DYNA that holds no internal energy."""
-    return _base_name(source) in dict(_DYNA_DATABASES)
 
 
 def _refuse(source: str, head: bytes, formats: tuple[ForeignFormat, ...]) -> None:
@@ -141,11 +142,8 @@ def _name_dyna_database(source: str, head: bytes) -> str:
     for name, words in _DYNA_DATABASES:
         if words and re.search(words, head):
             return name
-    return _base_name(source) if is_other_dyna_database(source) else ""
-
-
-def _base_name(source: str) -> str:
-    return os.path.basename(source).casefold().removesuffix(".gz")  # noqa: PTH119  start-up
+    base_name = os.path.basename(source).casefold().removesuffix(".gz")  # noqa: PTH119  start-up
+    return base_name if base_name in dict(_DYNA_DATABASES) else ""
 
 
 def _is_deck(head: bytes) -> bool:

@@ -11,7 +11,6 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.database import Database, Legs
-from d2rpick.histories.foreign import refuse_binary, refuse_text
 from d2rpick.histories.formats import READERS
 from d2rpick.histories.names import Selection
 from d2rpick.histories.run import Run
@@ -104,10 +103,12 @@ def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:
 def _format(source: Source) -> str:
     """Return the format of a file: a signature decides first, a text is a table only if it is nothing else."""
     head = _head_of(source)
-    refuse_binary(source.name, head)
+    is_binary = b"\0" in head
+    if is_binary:
+        _refuse_foreign(source.name, head)
     for kind, listed in READERS.items():
-        if kind == "csv" and b"\0" not in head:
-            refuse_text(source.name, head)
+        if kind == "csv" and not is_binary:
+            _refuse_foreign(source.name, head)
         if re.search(listed.hint, head, re.DOTALL) and reader(kind).recognises(head):
             return kind
     if re.search(r"(^|[/\\])d3(plot|part|dump|thdt)[^/\\]*$", source.name):
@@ -115,6 +116,12 @@ def _format(source: Source) -> str:
         raise FormatError(f"{source.name}: {what}; name the glstat, matsum or binout of the run")
     found = f"{source.name}: binary data of no known format, one of {', '.join(READERS)} was expected"
     raise FormatError(f"{found}; export the energy history as text")
+
+
+def _refuse_foreign(name: str, head: bytes) -> None:
+    from d2rpick.histories.foreign import refuse_foreign  # not above: the databases of solvers do without
+
+    refuse_foreign(name, head)
 
 
 def _head_of(source: Source) -> bytes:
