@@ -7,34 +7,17 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.errors import FormatError, listing
+from d2rpick.histories.samples import FEWEST_TIMES, count_rows_per_time
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from d2rpick.histories.history import Samples
 
-# At least this share of the states has the time of the state before, if each time stands in two rows or more.
-_REPEATED: Final = 0.49
 # An energy belongs to several parts if it varies so many times as much from row to row as from time to time, for each
 # row of a time: times that are printed coarsely leave it the same variation, noise one for each row.
 _VARIES_MORE: Final = 3.0
 _MOST_PARTS: Final = 1000
-_FEWEST_TIMES: Final = 3
-
-
-def count_rows_per_time(time: Samples) -> int:
-    """Return in how many rows each of the times (n,) stands, in the median; 1 if most times stand alone.
-
-    Examples
-    --------
-    >>> count_rows_per_time(np.array([0.0, 0.0, 0.1, 0.1, 0.2, 0.2])), count_rows_per_time(np.array([0.0, 0.1, 0.1]))
-    (2, 1)
-    """
-    if time.size < 2 * _FEWEST_TIMES or np.count_nonzero(time[1:] == time[:-1]) < _REPEATED * time.size:
-        return 1
-    first_rows = np.flatnonzero(np.append(True, time[1:] != time[:-1]))
-    rows = np.diff(np.append(first_rows, time.size))
-    return int(np.sort(rows)[rows.size // 2])
 
 
 def is_of_several_parts(time: Samples, energy: Samples) -> bool:
@@ -59,7 +42,7 @@ def find_part_column(columns: Mapping[str, Sequence[object]], rows: int) -> str 
     for name, values in columns.items():
         cycle = list(values[:rows])
         times = len(values) // rows
-        if times < _FEWEST_TIMES or len(set(cycle)) < rows:
+        if times < FEWEST_TIMES or len(set(cycle)) < rows:
             continue
         if list(values[: rows * times]) == cycle * times:
             return name

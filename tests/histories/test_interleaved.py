@@ -6,7 +6,7 @@ import pytest
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.formats import csv_table, hdf5_file
 from d2rpick.histories.history import History
-from d2rpick.histories.interleaved import count_rows_per_time
+from d2rpick.histories.samples import count_rows_per_time
 from tests.reading import history_of
 
 TIMES = np.linspace(0.0, 0.3, 31)

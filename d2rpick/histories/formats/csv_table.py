@@ -13,10 +13,9 @@ from d2rpick.histories.database import Database
 from d2rpick.histories.formats.curves import Curves, find_curves
 from d2rpick.histories.formats.layout import Layout, as_number, find_layout, is_skipped, split, unique
 from d2rpick.histories.formats.text import UTF16, Text, is_whole, precisions
-from d2rpick.histories.interleaved import count_rows_per_time, refuse_rows_of_parts
 from d2rpick.histories.meaning import find_internal_energies, is_time, quantity_of, refuse_other_quantity
 from d2rpick.histories.names import meant, near_miss
-from d2rpick.histories.samples import of_one_run
+from d2rpick.histories.samples import count_rows_per_time, of_one_run
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -159,6 +158,8 @@ class Table(Database):
 
     def _refuse_rows_of_parts(self, times: Samples) -> None:
         """Raise FormatError if each time stands in a row for each part."""
+        from d2rpick.histories.interleaved import refuse_rows_of_parts  # not above: hardly a table is one
+
         for column in self._needed[1:]:
             energy = if_written(partial(self._values, column))
             if energy is not None and energy.size == times.size:

@@ -22,10 +22,10 @@ from d2rpick.base.files import beyond, unpacked_beyond
 from d2rpick.histories.database import DIGITS, Database
 from d2rpick.histories.formats.hdf5_columns import Column, check_data, columns_of, finite
 from d2rpick.histories.history import Precision, Samples
-from d2rpick.histories.interleaved import count_rows_per_time, refuse_rows_of_parts
+from d2rpick.histories.interleaved import refuse_rows_of_parts
 from d2rpick.histories.meaning import find_internal_energies, refuse_other_quantity
 from d2rpick.histories.names import Part, Selection, near_miss
-from d2rpick.histories.samples import of_one_run
+from d2rpick.histories.samples import count_rows_per_time, of_one_run
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
