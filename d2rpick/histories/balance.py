@@ -10,7 +10,7 @@ import numpy as np
 from d2rpick.base.errors import FormatError, if_written
 from d2rpick.histories.formats import READERS
 from d2rpick.histories.history import Balance, Momenta, Samples
-from d2rpick.histories.meaning import is_internal_energy, is_total_internal_energy
+from d2rpick.histories.meaning import ROTATION_ENERGY, is_internal_energy, is_total_internal_energy
 from d2rpick.histories.names import Part, normalised
 from d2rpick.histories.samples import median
 
@@ -33,7 +33,7 @@ _QUANTITIES: Final[Mapping[str, str]] = {
 }
 # Without one of these nothing can be said of the health.
 _JUDGED: Final = frozenset(_QUANTITIES.values()) - {"kinetic_energy", "frictional_contact_energy"}
-_ROTATION: Final = "rotationenergy"  # Radioss writes it beside the kinetic energy; a normalised name, as the next ones
+# Normalised names.
 _GLOBAL_VELOCITIES: Final = ("globalxvelocity", "globalyvelocity", "globalzvelocity")
 _MOMENTA: Final = ("x_momentum", "y_momentum", "z_momentum")
 _VELOCITIES: Final = ("x_velocity", "y_velocity", "z_velocity")
@@ -99,7 +99,7 @@ def _terms(whole: Legs, until: float) -> Balance | None:
     if columns is None:
         return None
     found = {term: columns.quantity(quantity) for term, quantity in _QUANTITIES.items()}
-    rotation = columns.called(_ROTATION)
+    rotation = columns.called(ROTATION_ENERGY)
     if rotation is not None and found["kinetic"] is not None:
         found["kinetic"] = found["kinetic"] + rotation
     return Balance(

@@ -175,12 +175,12 @@ class Legs:
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """Notes of the legs, and what was left out between them."""
+        kept = self._kept[1] if self.channels else ()  # first: reading the columns may add notes to the legs
         notes = [f"{name}: the packed data ends early; it was read up to there" for name in self._cut]
         notes += [note for leg in self._files for note in leg.notes]
         if self._passing:
             notes.append(f"{self.source}: only some legs have part {listing(self._passing)}, which was left out")
-        if self.channels:
-            notes += self._kept[1]
+        notes += kept
         if self.parts:
             notes += self._parts_kept[1]
         return tuple(dict.fromkeys(notes))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.names import INTERNAL_ENERGY, QUANTITIES, TIME_NAMES, without_unit
+from d2rpick.histories.names import INTERNAL_ENERGY, QUANTITIES, TIME_NAMES, normalised, without_unit
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -61,6 +61,7 @@ _OTHER_QUANTITY: Final = (
     r"|accel|veloc|displac|moment|force|pressure|stress|strain(?!.?en)|temperature|ratio|mass|time.?step)"
     r"|(?<![A-Z])KE(?![A-Z])"
 )
+ROTATION_ENERGY: Final = "rotationenergy"  # normalised: Radioss writes it beside the kinetic energy
 # What else names an energy: identifiers of Abaqus, and "energy" in other languages without spaces.
 _LIKE_AN_ENERGY: Final = r"all[a-z]{2,3}|ke|ie|hge?|e?kin[a-z]*|.*(?:energ|エネルギー|能量|에너지).*"
 
@@ -272,6 +273,8 @@ whole model, name it with `channel`, as in kinetic_energy=NAME",)
 
 
 def _looks_like_an_energy(name: str) -> bool:
+    if normalised(name) == ROTATION_ENERGY:  # added to the kinetic energy
+        return False
     meaning = find_meaning(name)
     if meaning is not None:
         return meaning.quantity.endswith(("energy", "work"))
