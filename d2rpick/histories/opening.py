@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from importlib import import_module
 from itertools import combinations
 from typing import TYPE_CHECKING, Final, Protocol, cast
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.database import Indices
     from d2rpick.histories.history import Samples
+    from d2rpick.histories.surroundings import Surroundings
 
 
 __all__ = ["Reader", "Run", "Selection", "Source", "open_run", "open_sources", "reader"]
@@ -84,7 +86,12 @@ def open_sources(sources: Sequence[Source], selection: Selection = _DEFAULT, inp
     )
     _refuse_unknown_channels(databases, selection)
     check_companions(databases)
-    return Run(tuple(source.name for source in sources), databases, tuple(sources))
+    names, reopen = tuple(source.name for source in sources), partial(_reopen, tuple(sources), selection, input_format)
+    return Run(names, databases, tuple(sources), reopen=reopen)
+
+
+def _reopen(sources: Sequence[Source], selection: Selection, input_format: str, surroundings: Surroundings) -> Run:
+    return open_sources(sources, selection, input_format).within(surroundings)
 
 
 def _refuse_unknown_channels(databases: Sequence[Legs], selection: Selection) -> None:

@@ -6,7 +6,7 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from itertools import compress
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from d2rpick.histories.samples import median
 from d2rpick.histories.surroundings import UNKNOWN, Surroundings
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from d2rpick.histories.database import Legs
     from d2rpick.histories.source import Source
@@ -36,6 +36,7 @@ class Run:
     """Databases of one run, one per format, those that say most of it first.
 
     ``sources`` name their files; ``files`` are what was read of them.  ``surroundings`` act on the model from outside.
+    ``reopen`` opens the same files again within other surroundings: so it is copied, also to another process.
     """
 
     def __init__(
@@ -44,12 +45,19 @@ class Run:
         databases: tuple[Legs, ...],
         files: tuple[Source, ...] = (),
         surroundings: Surroundings = UNKNOWN,
+        reopen: Callable[[Surroundings], Run] | None = None,
     ) -> None:
         self.sources, self.databases, self.files, self.surroundings = sources, databases, files, surroundings
+        self._reopen = reopen
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self._reopen is None:
+            raise TypeError(f"{self.name}: only a run that was opened from files can be copied")
+        return self._reopen, (self.surroundings,)
 
     def within(self, surroundings: Surroundings) -> Run:
         """Give the same run with what is known of its surroundings."""
-        return Run(self.sources, self.databases, self.files, surroundings)
+        return Run(self.sources, self.databases, self.files, surroundings, self._reopen)
 
     @property
     def name(self) -> str:

@@ -50,7 +50,7 @@ def test_what_a_function_takes_can_be_made_by_public_names() -> None:
 
 def test_other_names_are_not() -> None:
     with pytest.raises(AttributeError, match="has no attribute 'sugest'"):
-        d2.sugest  # noqa: B018  # type: ignore[attr-defined]
+        d2.sugest  # type: ignore[attr-defined]  # noqa: B018
 
 
 def test_types_hold_for_a_stranger() -> None:
