@@ -127,9 +127,14 @@ class Legs:
     """
 
     def __init__(
-        self, legs: Sequence[Database], cut: Sequence[str] = (), named: Sequence[tuple[str, str]] = ()
+        self,
+        legs: Sequence[Database],
+        cut: Sequence[str] = (),
+        named: Sequence[tuple[str, str]] = (),
+        notes: Sequence[str] = (),
     ) -> None:
         self._cut = cut  # files whose packed data ends early
+        self._own_notes = notes  # on other files
         self._named = named  # quantities whose channels have unusual names
         several = len(legs) > 1  # of one leg the times are not looked at: they may not be known yet
         self._files = sorted(legs, key=_leg_order) if several else [*legs]
@@ -176,7 +181,8 @@ class Legs:
     def notes(self) -> tuple[str, ...]:
         """Notes of the legs, and what was left out between them."""
         kept = self._kept[1] if self.channels else ()  # first: reading the columns may add notes to the legs
-        notes = [f"{name}: the packed data ends early; it was read up to there" for name in self._cut]
+        notes = [*self._own_notes]
+        notes += [f"{name}: the packed data ends early; it was read up to there" for name in self._cut]
         notes += [note for leg in self._files for note in leg.notes]
         if self._passing:
             notes.append(f"{self.source}: only some legs have part {listing(self._passing)}, which was left out")

@@ -40,7 +40,9 @@ _ENERGY_WORDS: Final = frozenset(
 _TIME_WORDS: Final = frozenset(
     {"total", "simulation", "simulated", "sim", "analysis", "elapsed", "current", "physical", "solution", "whole"}
 )  # fmt: skip
-_NUMBERING: Final = re.compile(r"^\s*\d+[.:)]\s+")  # "2. Kinetic energy"
+_NUMBERING: Final = re.compile(
+    r"(?i)^\s*(?:(?:curve|plot|line)\s*)?#?\d+\s*[.:)-]\s+"
+)  # "2. Kinetic energy", "Curve 2: KE"
 _SOURCE: Final = re.compile(r"t\d\d")  # a time history of Radioss, as T01
 # The dataset of a quantity whose name is that of the group around it: H5MD and others.
 _UNNAMED_STEPS: Final = frozenset({"value", "values", "data", "res", "y"})

@@ -72,18 +72,22 @@ def open_run(names: Sequence[str], selection: Selection = _DEFAULT, input_format
 
 def open_sources(sources: Sequence[Source], selection: Selection = _DEFAULT, input_format: str = "auto") -> Run:
     """Open the files of one run whose bytes are at hand; arguments and errors as of `open_run`."""
-    kinds: dict[str, list[Source]] = {}
-    for source in sources:
-        kinds.setdefault(input_format if input_format != "auto" else _format(source), []).append(source)
+    kinds, left_out = _sort_by_format(sources) if input_format == "auto" else ({input_format: [*sources]}, [])
     ordered = [kind for kind in READERS if kind in kinds]
     _refuse_time_of_solver(ordered, selection.time)
     opened = {kind: reader(kind).open_legs(kinds[kind], selection) for kind in ordered}
     for legs in opened.values():
         check_legs(legs)
     databases = tuple(
-        Legs(opened[kind], cut=[one.name for one in kinds[kind] if one.cut], named=selection.channels)
+        Legs(
+            opened[kind],
+            cut=[one.name for one in kinds[kind] if one.cut],
+            named=selection.channels,
+            notes=left_out if kind == ordered[0] else (),
+        )
         for kind in ordered
     )
+    sources = [source for source in sources if any(source in used for used in kinds.values())]
     _refuse_unknown_channels(databases, selection)
     check_companions(databases)
     names, reopen = tuple(source.name for source in sources), partial(_reopen, tuple(sources), selection, input_format)
@@ -92,6 +96,44 @@ def open_sources(sources: Sequence[Source], selection: Selection = _DEFAULT, inp
 
 def _reopen(sources: Sequence[Source], selection: Selection, input_format: str, surroundings: Surroundings) -> Run:
     return open_sources(sources, selection, input_format).within(surroundings)
+
+
+def _sort_by_format(sources: Sequence[Source]) -> tuple[dict[str, list[Source]], list[str]]:
+    """Sort the files of a run by their formats, and say which of those that a pattern matched are left out.
+
+    Of a pattern the histories are used, as of a folder: a table only if there is no database of a solver.
+
+    Raises
+    ------
+    FormatError
+        If a file that was named is no history, or none of a pattern is.
+    """
+    kinds: dict[str, list[Source]] = {}
+    foreign: list[tuple[Source, FormatError]] = []
+    for source in sources:
+        try:
+            kinds.setdefault(_format(source), []).append(source)
+        except FormatError as error:
+            if not source.by_pattern:
+                raise
+            foreign.append((source, error))
+    if foreign and not kinds:
+        raise foreign[0][1]
+    notes = [_left_out(source, str(error)) for source, error in foreign]
+    if any(READERS[kind].solver for kind in kinds):
+        tables = [source for source in kinds.get("csv", []) if source.by_pattern]
+        notes += [
+            f"{source.name} was left out: a table beside databases of the solver; name it to use it"
+            for source in tables
+        ]
+        named = [source for source in kinds.pop("csv", []) if source not in tables]
+        kinds |= {"csv": named} if named else {}
+    return kinds, notes
+
+
+def _left_out(source: Source, refusal: str) -> str:
+    reason = refusal.removeprefix(f"{source.name}: ").partition(";")[0].removesuffix(", an energy history was expected")
+    return f"{source.name} was left out: {reason}"
 
 
 def _refuse_unknown_channels(databases: Sequence[Legs], selection: Selection) -> None:

@@ -62,6 +62,8 @@ SPELLINGS = [
     ("Energy: internal [J]", "Energy: kinetic [J]"),
     ("Energy(J): ALLIE", "Energy(J): ALLKE"),
     ("1. Internal Energy", "2. Kinetic Energy"),
+    ("Curve 1: Internal Energy", "Curve 2: Kinetic Energy"),
+    ("1 - Internal Energy", "2 - Kinetic Energy"),
     ("run1: Internal Energy", "run1: Kinetic Energy"),
     ("Element internal energy", "Element kinetic energy"),
     ("Internal Energy All Parts", "Kinetic Energy All Parts"),

@@ -211,3 +211,45 @@ def test_a_matsum_is_told_by_its_parts_behind_any_legend(file: Write) -> None:
 def test_words_about_a_solver_in_a_table_make_no_listing_of_it(file: Write) -> None:
     head = b"# written by OpenRadioss engine, LS-DYNA and Abaqus/Explicit\n"
     assert read_history([file(head + CSV)]).energy.tolist() == [1.0, 2.0, 1.5]
+
+
+STATES = (
+    b" time =   0.0000E+00\n mat.#=    1             inten=   0.0000E+00     kinen=   1.0000E+00\n"
+    b" time =   1.0000E-01\n mat.#=    1             inten=   1.0000E+00     kinen=   0.0000E+00\n"
+)
+
+
+def test_a_pattern_gives_what_the_folder_gives_and_names_what_it_leaves_out(tmp_path: Path) -> None:
+    for name, data in {
+        "matsum": DYNA_HEAD + b"\n" + STATES,
+        "nodout": DYNA_HEAD + b" n o d a l   p r i n t   o u t\n 1 0.0 0.0\n",
+        "a_deck.k": b"*KEYWORD\n*END\n",
+        "energy.csv": CSV,
+        "remarks.txt": b"only words\n",
+    }.items():
+        put(tmp_path / name, data)
+    by_folder, by_pattern = (open_run([str(name)]) for name in (tmp_path, tmp_path / "*"))
+    assert by_pattern.sources == by_folder.sources == (str(tmp_path / "matsum"),)
+    notes = " ".join(by_pattern.notes)
+    assert "nodout was left out: this is the nodout of LS-DYNA, which holds no internal energy" in notes
+    assert "a_deck.k was left out: this is a deck" in notes
+    assert "energy.csv was left out: a table beside databases of the solver; name it to use it" in notes
+    assert "remarks.txt was left out" in notes
+    assert not by_folder.notes
+
+
+def test_what_is_named_beside_a_pattern_is_not_left_out(tmp_path: Path) -> None:
+    put(tmp_path / "nodout", DYNA_HEAD + b" n o d a l   p r i n t   o u t\n 1 0.0 0.0\n")
+    with pytest.raises(FormatError, match="this is the nodout"):
+        open_run([str(put(tmp_path / "matsum", DYNA_HEAD + b"\n" + STATES)), str(tmp_path / "nodout")])
+    with pytest.raises(FormatError, match="this is the nodout"):
+        open_run([str(tmp_path / "nod*")])
+
+
+@pytest.mark.parametrize("order", [("runT01", "runT02"), ("runT02", "runT01")])
+def test_legs_that_start_together_are_ordered_by_name(order: tuple[str, str], tmp_path: Path) -> None:
+    rows = "".join(f"{i / 10},{i}\n" for i in range(5))
+    for name in order:
+        put(tmp_path / name, f"time,internal_energy\n{rows}")
+    run = open_run([str(tmp_path / name) for name in order])
+    assert run.databases[0].source == f"{tmp_path / 'runT01'}, {tmp_path / 'runT02'}"
