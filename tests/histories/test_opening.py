@@ -152,7 +152,7 @@ LEGEND = b"{BEGIN LEGEND}\n Entity #        Title\n        1     contact one\n{E
         (
             DYNA_HEAD + LEGEND + b" slave         1 time 0.0E+00  x 0.0 y 0.0 z 0.0\n",
             "a",
-            "this is the rcforc of LS-DYNA",
+            "rcforc.* of LS-DYNA, which holds",
         ),
         (
             DYNA_HEAD + LEGEND + b"\n\n contact interface energy output at time 0.0\n 1 0.0 0.0\n",
