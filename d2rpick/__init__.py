@@ -6,16 +6,13 @@
     >>> d2.verify(run, tr=answer.recommended.tr, td=answer.recommended.td).verified
     True
 
-What is named here is imported when it is first used: the package itself imports nothing, not even typing.
+What is named here is imported when it is first used: the package itself imports nothing, not even typing.  The stub
+beside this file gives the names to type checkers and editors.
 """
 
 from __future__ import annotations
 
 from d2rpick.api import __dir__ as __dir__, __getattr__ as __getattr__, names
 from d2rpick.base import __version__ as __version__
-
-TYPE_CHECKING = False  # type checkers take it for theirs; importing typing is left to those who need it
-if TYPE_CHECKING:
-    from d2rpick.api import *  # noqa: F403  each name is given on there
 
 __all__ = [*names]  # noqa: PLE0604  names of strings all

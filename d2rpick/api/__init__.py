@@ -1,44 +1,14 @@
 """The questions that can be asked, and their answers: what ``import d2rpick`` offers and the command line calls.
 
-What is named here is imported when it is first used.
+What is named here is imported when it is first used.  Type checkers and editors find the names in the stub
+``d2rpick/__init__.pyi``.
 """
 
 from __future__ import annotations
 
-TYPE_CHECKING = False  # type checkers take it for theirs; importing typing is left to those who need it
+TYPE_CHECKING = False  # importing typing is left to those who need it
 if TYPE_CHECKING:
     from typing import Any
-
-    from d2rpick.api.cards import JudgedCard as JudgedCard, card as card
-    from d2rpick.api.checking import Findings as Findings, check as check
-    from d2rpick.api.costs import (
-        Calibration as Calibration,
-        PartTable as PartTable,
-        calibrate as calibrate,
-        parts as parts,
-    )
-    from d2rpick.api.plans import Exploration as Exploration, Plan as Plan, explore as explore, plan as plan
-    from d2rpick.api.running import FirstRun as FirstRun, first as first, follow as follow
-    from d2rpick.api.runs import Run as Run, from_frame as from_frame, read as read
-    from d2rpick.api.studies import Study as Study, study as study
-    from d2rpick.api.suggestions import (
-        Suggestion as Suggestion,
-        Verdict as Verdict,
-        suggest as suggest,
-        verify as verify,
-    )
-    from d2rpick.base.errors import (
-        ChangedError as ChangedError,
-        ConfigurationError as ConfigurationError,
-        D2RPickError as D2RPickError,
-        DeckError as DeckError,
-        FormatError as FormatError,
-        HistoryError as HistoryError,
-        RangeError as RangeError,
-    )
-    from d2rpick.choice.cost import Weights as Weights
-    from d2rpick.running.watch import Event as Event
-    from d2rpick.vibration.oscillator import Oscillator as Oscillator
 
 _NAMES = {
     "base.errors": "ChangedError ConfigurationError D2RPickError DeckError FormatError HistoryError RangeError",

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 class Answer:
     """What all answers have in common; nothing of one changes.
 
+    Two answers are equal if they say the same, such as an answer and its copy in another process.
+
     ``warnings`` are (``code``, ``message``); ``command`` is the command line that gives the same answer, with
     ``<weights in memory>`` for the file where these were no file.
     """
@@ -50,6 +52,14 @@ class Answer:
         known = {one.name: getattr(found, one.name) for one in fields(found)}
         known["cautions"] = (*known["cautions"], *more.pop("cautions", ()))
         return cls(**known, **more)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Answer) or type(other) is not type(self):
+            return NotImplemented
+        return self.to_json() == other.to_json()
+
+    def __hash__(self) -> int:
+        return hash((self.kind, *self.command))
 
     def __repr__(self) -> str:
         shown = ", ".join(f"{name}={getattr(self, name)!r}" for name in (*self.said, "warnings"))

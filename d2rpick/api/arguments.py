@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, NoReturn, TypedDict
+from collections.abc import Iterable, Mapping, Set
+from typing import TYPE_CHECKING, Any, Final, NoReturn, TypedDict
 
 from d2rpick.api.request import OPTIONS, TIME, Number
 from d2rpick.base.errors import DeckError
@@ -19,9 +19,13 @@ if TYPE_CHECKING:
     Path = str | os.PathLike[str]
     Parts = str | int | Iterable[str | int]
 
+_LONGEST_SHOWN: Final = 60  # of a wrong value in a message
+
 
 class Choosing(TypedDict, total=False):
     """How to choose and judge, as the options of ``d2rpick suggest``; times in the unit of the history.
+
+    None stands for the default.
 
     ``after``: the load ends here, ``landing``: the next contact comes here (default: found from the record).
     ``margin``: kept clear after the load and before the next contact (0; where td is chosen or the landing is given,
@@ -38,15 +42,15 @@ class Choosing(TypedDict, total=False):
     after: float | None
     landing: float | None
     margin: float | None
-    tolerance: float
+    tolerance: float | None
     max_kinetic_share: float | None
     max_residual: float | None
     oscillator: Oscillator | None
     v0: float | None
     fit_window: tuple[float, float] | None
-    replay: bool
-    strict: bool
-    keep_vibration: bool
+    replay: bool | None
+    strict: bool | None
+    keep_vibration: bool | None
     cost_share: float | None
     step_ratio: float
 
@@ -62,13 +66,69 @@ def number(name: str, value: object, limits: Number = TIME) -> float:
     Traceback (most recent call last):
     ValueError: margin is -1, a number of at least 0 was expected
     """
-    if isinstance(value, bool | str | bytes) or not hasattr(value, "__float__"):
-        raise TypeError(f"{name} is {value!r}, a number was expected{without_unit(value)}")
-    found = float(value)
+    if not is_number(value):
+        raise TypeError(f"{name} is {_shown(value)}, a number was expected{without_unit(value)}")
+    found = float(value)  # type: ignore[arg-type]
     if not math.isfinite(found):
         raise ValueError(f"{name} is {found}, a finite number was expected")
     if limit := limits.missed(found):
         raise ValueError(f"{name} is {found:g}, a number {limit} was expected")
+    return found
+
+
+def is_number(value: object) -> bool:
+    """Return True for a number of Python or numpy, also in an array without axes; not for True, text or complex."""
+    kind = getattr(getattr(value, "dtype", None), "kind", "")
+    if isinstance(value, bool | str | bytes) or (kind and kind not in "iuf") or getattr(value, "ndim", 0):
+        return False
+    return hasattr(value, "__float__")
+
+
+def is_whole_number(value: object) -> bool:
+    """Return True for a whole number of Python or numpy; not for True, text or a float."""
+    return (
+        is_number(value) and hasattr(value, "__index__") and getattr(getattr(value, "dtype", None), "kind", "i") in "iu"
+    )
+
+
+def _shown(value: object) -> str:
+    """Write a wrong value in one line, cut where it is long."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}... of type {type(value).__name__}"
+
+
+def flag(name: str, value: object, default: bool) -> bool:
+    """Return True or False, the default for None; TypeError for anything else.
+
+    Examples
+    --------
+    >>> flag("replay", None, True), flag("replay", False, True)
+    (True, False)
+    """
+    if value is None:
+        return default
+    kind = getattr(getattr(value, "dtype", None), "kind", "")
+    if not isinstance(value, bool) and (kind != "b" or getattr(value, "ndim", 0)):
+        raise TypeError(f"{name} is {_shown(value)}, True or False was expected")
+    return bool(value)
+
+
+def pairs(name: str, value: object) -> list[tuple[float, float]]:
+    """Return windows of time, none for None.
+
+    Examples
+    --------
+    >>> pairs("done", [(0.1, 0.2), [0.3, 0.4]]), pairs("done", None)
+    ([(0.1, 0.2), (0.3, 0.4)], [])
+    """
+    if value is None:
+        return []
+    found = []
+    for number_of_pair, pair in enumerate(_each(name, value, "pairs of times")):
+        times = window(f"{name}[{number_of_pair}]", pair)
+        if times is None:
+            raise TypeError(f"{name}[{number_of_pair}] is None, a pair of times was expected")
+        found.append(times)
     return found
 
 
@@ -95,9 +155,11 @@ def window(name: str, value: object) -> tuple[float, float] | None:
     """
     if value is None:
         return None
-    if isinstance(value, str) or not isinstance(value, Sequence) or len(value) != 2:
-        raise TypeError(f"{name} is {value!r}, a pair of times was expected")
-    found = number(f"{name}[0]", value[0]), number(f"{name}[1]", value[1])
+    is_pair = hasattr(value, "__len__") and hasattr(value, "__iter__") and getattr(value, "ndim", 1) == 1
+    if not is_pair or isinstance(value, str | bytes | Mapping | Set) or len(value) != 2:  # type: ignore[arg-type]
+        raise TypeError(f"{name} is {_shown(value)}, a pair of times was expected")
+    first, last = list(value)  # type: ignore[call-overload]
+    found = number(f"{name}[0]", first), number(f"{name}[1]", last)
     if not found[0] < found[1]:
         raise ValueError(f"{name} is {found[0]:g} to {found[1]:g}, which is empty; the lower time comes first")
     return found
@@ -115,17 +177,17 @@ def part_names(name: str, value: Parts | None) -> tuple[str, ...]:
         return ()
     from d2rpick.histories.names import Part
 
-    single = isinstance(value, str | int | Part)  # a Part holds its number and its title
+    single = isinstance(value, str | int | Part) or is_whole_number(value)  # a Part holds its number and its title
     listed = [value] if single else list(_each(name, value, "a number, a title or several"))
     for one in listed:
-        if isinstance(one, bool) or not (isinstance(one, str) or hasattr(one, "__index__")):
-            raise TypeError(f"{name} holds {one!r}; numbers and titles of parts were expected")
+        if not (isinstance(one, str) or is_whole_number(one)):
+            raise TypeError(f"{name} holds {_shown(one)}; numbers and titles of parts were expected")
     if not listed:
         raise ValueError(f"{name} is empty; give a part, or leave {name} out")
     return tuple(str(one) for one in listed)
 
 
-def rule_ids(name: str, value: str | Iterable[str]) -> tuple[str, ...]:
+def rule_ids(name: str, value: str | Iterable[str] | None) -> tuple[str, ...]:
     """Give ids of rules or their beginnings; a string is one of them.
 
     Examples
@@ -133,6 +195,8 @@ def rule_ids(name: str, value: str | Iterable[str]) -> tuple[str, ...]:
     >>> rule_ids("select", "D2R1"), rule_ids("ignore", ["D2R104", "D2R2"])
     (('D2R1',), ('D2R104', 'D2R2'))
     """
+    if value is None:
+        return ()
     listed = [value] if isinstance(value, str) else list(_each(name, value, "ids of rules"))
     for one in listed:
         if not isinstance(one, str):
@@ -149,8 +213,8 @@ def whole(name: str, value: object, low: int) -> int:
     Traceback (most recent call last):
     TypeError: steps is 2.5, a whole number was expected
     """
-    if isinstance(value, bool) or not hasattr(value, "__index__"):
-        raise TypeError(f"{name} is {value!r}, a whole number was expected")
+    if not is_whole_number(value):
+        raise TypeError(f"{name} is {_shown(value)}, a whole number was expected")
     return int(number(name, value, Number(low)))
 
 
@@ -165,7 +229,7 @@ def paths(name: str, value: Path | Iterable[Path]) -> tuple[str, ...]:
     listed = [value] if isinstance(value, str | os.PathLike) else list(_each(name, value, "a path or several"))
     for one in listed:
         if not isinstance(one, str | os.PathLike):
-            raise TypeError(f"{name} holds {one!r}; paths were expected")
+            raise TypeError(f"{name} holds {_shown(one)}; paths were expected")
     if not listed:
         raise ValueError(f"{name} is empty; give a file or folder")
     found = tuple(os.fsdecode(one) for one in listed)
@@ -177,9 +241,11 @@ def paths(name: str, value: Path | Iterable[Path]) -> tuple[str, ...]:
 
 def check_run(name: str, run: object) -> None:
     """Raise TypeError for what is not a run that was read."""
-    if not hasattr(run, "files"):
+    from d2rpick.api.tables import is_table
+
+    if not (hasattr(run, "files") and hasattr(run, "overview")):  # its class imports this module
         found = repr(run) if isinstance(run, str | os.PathLike) else f"of type {type(run).__name__}"
-        made = "from_frame(...)" if hasattr(run, "to_frame") or hasattr(run, "columns") else "read(...)"
+        made = "from_frame(...)" if is_table(run) else "read(...)"
         raise TypeError(f"{name} is {found}; give what d2rpick.{made} makes of it")
 
 
@@ -198,24 +264,49 @@ def chosen(choosing: Choosing) -> dict[str, Any]:
     if unknown := [name for name in choosing if name not in known]:
         refuse_unknown(unknown[0], known, ("parts", "flying", "deck", "weights", "td_window"))
     given: dict[str, Any] = dict(choosing)
-    oscillator = given.pop("oscillator", None)
+    oscillator = _check_oscillator(given.pop("oscillator", None))
     if (oscillator is None) != (given.get("v0") is None):
         raise ValueError("oscillator and v0 go together: the one vibrates because of the other")
+    if given.get("tolerance", 0.0) is None:
+        del given["tolerance"]
     for name in given.keys() - {"replay", "strict", "keep_vibration", "fit_window"}:
         limits: Any = OPTIONS[name].kind
-        if given[name] is not None or name == "tolerance":
+        if given[name] is not None:
             given[name] = number(name, given[name], limits)
     given["fit_window"] = window("fit_window", given.get("fit_window"))
-    given["no_verify"] = not given.pop("replay", True)
-    given["strict"] = bool(given.get("strict"))
-    given["keep_vibration"] = bool(given.get("keep_vibration"))
+    given["no_verify"] = not flag("replay", given.pop("replay", None), True)
+    given["strict"] = flag("strict", given.get("strict"), False)
+    given["keep_vibration"] = flag("keep_vibration", given.get("keep_vibration"), False)
     of_oscillator = ("stiffness", "mass", "frame_mass", "alpha")
     return given | {name: float(getattr(oscillator, name)) for name in of_oscillator if oscillator is not None}
 
 
+def _check_oscillator(value: object) -> Oscillator | None:
+    if value is None:
+        return None
+    from d2rpick.vibration.oscillator import Oscillator  # not above: mostly none is given
+
+    if not isinstance(value, Oscillator):
+        raise TypeError(f"oscillator is {_shown(value)}, a d2rpick.Oscillator was expected")
+    return value
+
+
+def file_or_weights(value: object) -> Any:
+    """Return weights, or the name of the file that holds them; None where none are given."""
+    if value is None:
+        return None
+    if isinstance(value, str | os.PathLike):
+        return one_path("weights", value)
+    from d2rpick.choice.cost import Weights  # not above: mostly none are given
+
+    if not isinstance(value, Weights):
+        raise TypeError(f"weights is {_shown(value)}, d2rpick.Weights or the name of a file was expected")
+    return value
+
+
 def _each(name: str, value: Any, expected: str) -> Iterable[Any]:
-    if not hasattr(value, "__iter__"):
-        raise TypeError(f"{name} is {value!r}; {expected} were expected")
+    if not hasattr(value, "__iter__") or isinstance(value, bytes | Mapping) or getattr(value, "ndim", 1) == 0:
+        raise TypeError(f"{name} is {_shown(value)}; {expected} were expected")
     found: Iterable[Any] = value
     return found
 

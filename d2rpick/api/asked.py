@@ -5,7 +5,6 @@ The commands of one run and Python go this way; `d2rpick.choice.answers` leads o
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -64,7 +63,7 @@ def request_of(
     chosen = run.chosen if run else Selection()
     return Request(
         deck=None if deck is None else arguments.one_path("deck", deck),
-        weights=arguments.one_path("weights", weights) if isinstance(weights, str | os.PathLike) else weights,
+        weights=arguments.file_or_weights(weights),
         history=run.sources if run else (),
         input_format=run.input_format if run else "auto",
         time=chosen.time,

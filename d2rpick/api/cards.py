@@ -52,7 +52,7 @@ class Judging(CardOptions, total=False):
     after: float | None
     landing: float | None
     margin: float | None
-    tolerance: float
+    tolerance: float | None
 
 
 def _checked(name: str, value: Any, option: Option) -> Any:
@@ -63,7 +63,8 @@ def _checked(name: str, value: Any, option: Option) -> Any:
     if option.many:
         return arguments.part_names(name, value)
     if option.pair:
-        if not isinstance(value, tuple | list) or len(value) != 2:
+        is_pair = hasattr(value, "__len__") and hasattr(value, "__iter__") and getattr(value, "ndim", 1) == 1
+        if not is_pair or isinstance(value, str | bytes) or len(value) != 2:
             raise TypeError(f"{name} is {value!r}, a pair of numbers was expected")
         return tuple(arguments.whole(name, one, _IDS.start) for one in value)
     if isinstance(kind, range):
@@ -295,7 +296,7 @@ def card(
     from d2rpick.api import arguments
     from d2rpick.api.asked import request_of
 
-    times = [arguments.window(f"windows[{at}]", one) or (0.0, 0.0) for at, one in enumerate(windows)]
+    times = arguments.pairs("windows", windows)
     given: dict[str, Any] = dict(options)
     judging: Any = {name: given.pop(name) for name in ("after", "landing", "margin", "tolerance") if name in given}
     return card_of(times, run, request_of(run, parts, None, None, None, judging), Cards.of(given))  # type: ignore[arg-type]

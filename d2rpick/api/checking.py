@@ -84,8 +84,8 @@ def check(
     decks: arguments.Path | Iterable[arguments.Path],
     *,
     history: Run | None = None,
-    select: str | Iterable[str] = (),
-    ignore: str | Iterable[str] = (),
+    select: str | Iterable[str] | None = (),
+    ignore: str | Iterable[str] | None = (),
     **choosing: Unpack[Choosing],
 ) -> Findings:
     """Find the switching cards of decks and check them, as ``d2rpick check`` does.

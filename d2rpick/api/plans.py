@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Unpack
+from typing import TYPE_CHECKING, Final, Unpack
 
 from d2rpick.api import arguments
 from d2rpick.api.answer import RunAnswer, frame_of
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from d2rpick.api.runs import Run
     from d2rpick.choice.cost import Weights
     from d2rpick.choice.switched_run import Times
+
+_STEPS: Final = 200  # td that are explored
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -72,7 +74,7 @@ def explore(
     td: float | None = None,
     *,
     td_window: tuple[float, float] | None = None,
-    steps: int = 200,
+    steps: int | None = _STEPS,
     parts: Parts | None = None,
     flying: Parts | None = None,
     deck: arguments.Path | None = None,
@@ -114,7 +116,7 @@ def explore(
     0.0048
     """
     wanted, window = arguments.optional("td", td), arguments.window("td_window", td_window)
-    count = arguments.whole("steps", steps, 1)
+    count = arguments.whole("steps", _STEPS if steps is None else steps, 1)
     asked = ask(run, request_of(run, parts, flying, deck, weights, choosing))
     return explored(asked, wanted, window, count)
 
@@ -153,9 +155,9 @@ class Plan(RunAnswer, planning.Plan):
 
         return frame_of(self.to_dict()["windows"], WINDOW.keys, source=list(self.history.source))
 
-    def card(self, *, every: bool = False, **options: Unpack[CardOptions]) -> JudgedCard | None:
+    def card(self, *, every: bool | None = False, **options: Unpack[CardOptions]) -> JudgedCard | None:
         """Print the card of the next run, judged as printed, with ``every`` new window or those that are supported."""
-        return self.printed(Cards.of(options), every=every)
+        return self.printed(Cards.of(options), every=arguments.flag("every", every, False))
 
     def printed(self, cards: Cards, *, every: bool = False) -> JudgedCard | None:
         """Print the card of the next run, its new windows judged; None where none is new."""
@@ -181,7 +183,7 @@ def plan(
     deck: arguments.Path | None = None,
     weights: Weights | arguments.Path | None = None,
     min_rigid: float | None = None,
-    done: Iterable[tuple[float, float]] = (),
+    done: Iterable[tuple[float, float]] | None = (),
     before: Run | None = None,
     **choosing: Unpack[Choosing],
 ) -> Plan:
@@ -220,7 +222,9 @@ def plan(
     [(0.097, 0.37)]
     """
     shortest = arguments.optional("min_rigid", min_rigid, NOT_NEGATIVE)
-    windows = [arguments.window(f"done[{number}]", list(pair)) or (0.0, 0.0) for number, pair in enumerate(done)]
+    windows = arguments.pairs("done", done)
+    if before is not None:
+        arguments.check_run("before", before)
     asked = ask(run, request_of(run, parts, flying, deck, weights, choosing))
     return planned(asked, shortest, windows, before)
 

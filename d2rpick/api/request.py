@@ -286,13 +286,6 @@ def time_or_window(td: float | None, window: tuple[float, float] | None) -> floa
     return window if td is None else td
 
 
-def needed_time(asked: float | tuple[float, float] | None) -> float | tuple[float, float]:
-    """Give a td or a window for it; ArgumentError for none."""
-    if asked is None:
-        raise ArgumentError("name the time to switch back with `td`, or a window for it with `td_window`")
-    return asked
-
-
 def dashed(name: str) -> str:
     """Give the name of an option as it is typed."""
     return name.replace("_", "-")

@@ -35,7 +35,7 @@ def first(
     parts: Parts | None = None,
     wait: float | None = None,
     after: float | None = None,
-    overwrite: bool = False,
+    overwrite: bool | None = False,
 ) -> FirstRun:
     """Write a copy of a deck whose first run switches itself, as ``d2rpick first`` does.
 
@@ -83,7 +83,7 @@ def first(
     times = arguments.optional("wait", wait, NOT_NEGATIVE), arguments.optional("after", after, NOT_NEGATIVE)
     main, folder = arguments.one_path("deck", deck), arguments.one_path("output_dir", output_dir)
     found = first_card(main, numbers("parts", names), *times)
-    files = write_deck(main, found.card, folder, overwrite=overwrite)
+    files = write_deck(main, found.card, folder, overwrite=arguments.flag("overwrite", overwrite, False))
     return FirstRun(tuple(files), found.wait.time, found.wait.reason, found.notes)
 
 

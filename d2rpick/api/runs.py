@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import IO, TYPE_CHECKING, Any
 
 from d2rpick.api import arguments
+from d2rpick.api.tables import is_table
 from d2rpick.base.errors import if_written
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable
 
     import pandas as pd
 
@@ -25,6 +27,9 @@ if TYPE_CHECKING:
 class Run:
     """One run: its files, opened, and which columns of a table were named; nothing of it changes.
 
+    It can be pickled: a copy, also in another process, holds the same bytes, or opens the same big files again.  Two
+    runs are equal if the same bytes were read under the same names, in the same way.
+
     ``files`` is what was opened, ``chosen`` the columns, ``input_format`` what the files were read as, ``"auto"`` where
     their content decided.  Energies are read when they are asked for.
     """
@@ -32,6 +37,19 @@ class Run:
     files: histories.Run
     chosen: Selection
     input_format: str = "auto"
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Run):
+            return NotImplemented
+        return self._identity == other._identity
+
+    def __hash__(self) -> int:
+        return hash(self.sources)
+
+    @property
+    def _identity(self) -> tuple[Any, ...]:
+        digests = tuple(source.sha256() for source in self.files.files)
+        return self.sources, digests, self.chosen, self.input_format
 
     def __repr__(self) -> str:
         from d2rpick.report.pages import of_run
@@ -91,9 +109,10 @@ class Run:
         Returns
         -------
         pandas.DataFrame
-            Index ``time``, shape (states, parts) with the part's number as the name of its column, or (states, 1) with
-            ``internal_energy`` [energy].  ``attrs``: ``source``, ``format``, ``channel``, ``time_unit`` (empty where no
-            file names it), ``titles`` of the parts by number, and ``notes``.
+            Index ``time``, shape (states, parts) with the part's title as the name of its column (``part 3`` without a
+            title, ``door (7)`` where several have it), or (states, 1) with ``internal_energy`` [energy].  ``attrs``:
+            ``source``, ``format``, ``channel``, ``time_unit`` (empty where no file names it), ``titles`` of the parts
+            by number, ``ids`` by the name of the column, and ``notes``.
 
         Raises
         ------
@@ -104,16 +123,19 @@ class Run:
         --------
         >>> read("sample_data/energy.csv").to_frame().shape
         (1501, 1)
+        >>> read("sample_data/rollover_box.matsum").to_frame(parts="all").columns.tolist()
+        ['box', 'step']
         """
         import pandas as pd
 
-        names = ("0-4294967295",) if parts == "all" else arguments.part_names("parts", parts)
+        every = isinstance(parts, str) and parts == "all"
+        names = ("0-4294967295",) if every else arguments.part_names("parts", parts)
         history = self.files.history(self.chosen._replace(energy=(), parts=names) if names else self.chosen)
         if history.parts is None:
             columns: dict[Any, Any] = {"internal_energy": history.energy}
         else:
             energies = self.files.part_energies(history.parts)
-            columns = {part.id: energies[:, at] for at, part in enumerate(history.parts)}
+            columns = {part.name: energies[:, at] for at, part in enumerate(history.parts)}
             # parts and the energy of their sum stand at the same times
         frame = pd.DataFrame(columns, index=pd.Index(history.time, name="time"))
         frame.attrs = {
@@ -122,6 +144,7 @@ class Run:
             "channel": history.channel,
             "time_unit": history.time_unit,
             "titles": {part.id: part.title for part in history.parts or ()},
+            "ids": {part.name: part.id for part in history.parts or ()},
             "notes": list(history.notes),
         }
         return frame
@@ -133,7 +156,7 @@ def read(
     time: str | int | None = None,
     energy: str | int | Iterable[str | int] | None = None,
     channels: Mapping[str, str | int] | None = None,
-    input_format: str = "auto",
+    input_format: str | None = "auto",
 ) -> Run:
     """Read the files of one run, as ``d2rpick suggest`` reads its HISTORY.
 
@@ -164,32 +187,35 @@ def read(
     >>> read("sample_data/energy.csv").channels
     ('z', 'y', 'vz', 'vy', 'internal_energy', 'kinetic_energy')
     """
+    if is_table(source):
+        raise TypeError(f"source is a table of type {type(source).__name__}; give it to d2rpick.from_frame(...)")
     if hasattr(source, "read"):
         return _opened([_in_memory(source)], selection_of(time, energy, channels), input_format)
     names = arguments.paths("source", source)
     from d2rpick.histories.opening import open_run
 
-    chosen = selection_of(time, energy, channels)
-    return Run(open_run(names, chosen, known_format(input_format)), chosen, input_format)
+    chosen, kind = selection_of(time, energy, channels), known_format(input_format)
+    return Run(open_run(names, chosen, kind), chosen, kind)
 
 
 def from_frame(
-    frame: pd.DataFrame | pd.Series[float],
+    frame: object,
     *,
     time: str | int | None = None,
     energy: str | int | Iterable[str | int] | None = None,
     channels: Mapping[str, str | int] | None = None,
-    name: str = "frame",
+    name: str | None = "frame",
 ) -> Run:
-    """Take the energies of a run from a table: of lasso-python (``as_df``), a database, a spreadsheet.
+    """Take the energies of a run from a table of pandas, polars, pyarrow, xarray or numpy.
 
     It is checked as the csv file is that ``frame.to_csv()`` writes: its times must rise, its values be finite numbers.
 
     Parameters
     ----------
-    frame : pandas.DataFrame or Series
-        A row per state.  The times are a column or the index, by a name such as ``time`` or that of ``time``, never the
-        numbers of the rows; timedeltas are seconds.  A Series is the internal energy.
+    frame : DataFrame or Series of pandas, table of polars, pyarrow or xarray, array of numpy, or mapping of columns
+        A row per state.  The times are a column, coordinate or index, by a name such as ``time`` or that of ``time``,
+        never the numbers of the rows; timedeltas are seconds.  A Series is the internal energy.  Columns of an array
+        have no names: the first is the time, others are named by number, as ``energy=3``.
     time, energy, channels : optional
         Columns as for ``read``.
     name : str
@@ -204,7 +230,7 @@ def from_frame(
     D2RPickError
         If it is not the history of a run.
     TypeError, ValueError
-        If ``frame`` is neither a pandas.DataFrame nor a Series, or nothing of it is named as the time.
+        If ``frame`` is no table, or nothing of it is named as the time.
 
     Examples
     --------
@@ -213,25 +239,26 @@ def from_frame(
     >>> from_frame(table).to_frame()["internal_energy"].tolist()
     [0.0, 4.0, 1.0]
     """
-    import pandas as pd
-
+    from d2rpick.api.tables import frame_of_table, is_plain_array
     from d2rpick.histories.source import Source
 
-    if isinstance(frame, pd.Series):
-        frame = frame.to_frame("internal_energy")
-    if not isinstance(frame, pd.DataFrame):
-        raise TypeError(f"frame is of type {type(frame).__name__}, a pandas.DataFrame or Series was expected")
-    chosen = selection_of(time, energy, channels)
-    text = _timed(frame, time).apply(_seconds).to_csv(index=False)
-    return _opened([Source(name, text.encode())], chosen, "csv")
+    if name is not None and not isinstance(name, str):
+        raise TypeError(f"name is {name!r}, a text was expected")
+    table, chosen = frame_of_table(frame), selection_of(time, energy, channels)
+    is_named = not is_plain_array(frame)
+    if is_named:
+        table = _timed(table, chosen.time)
+    text = table.apply(_seconds).to_csv(index=False, header=is_named)
+    return _opened([Source(name or "frame", text.encode())], chosen, "csv")
 
 
-def _timed(frame: pd.DataFrame, time: str | int | None) -> pd.DataFrame:
+def _timed(frame: pd.DataFrame, time: str | None) -> pd.DataFrame:
     """Make the index a column where it is the time; ValueError where nothing is."""
-    from d2rpick.histories.names import is_time
+    from d2rpick.histories.meaning import is_time
 
     index = frame.index
-    if time in (known := list(map(str, frame.columns))) or isinstance(time, int) or any(map(is_time, known)):
+    known = list(map(str, frame.columns))
+    if time in known or (time is not None and time.isdecimal()) or any(map(is_time, known)):
         return frame
     if index.inferred_type.startswith("timedelta") or time == index.name is not None or is_time(str(index.name)):
         return frame.reset_index(names=time or "time")
@@ -256,16 +283,21 @@ def _in_memory(file: Any) -> Source:
     return Source(str(getattr(file, "name", "file")), data)
 
 
-def _opened(sources: list[Source], chosen: Selection, input_format: str) -> Run:
+def _opened(sources: list[Source], chosen: Selection, input_format: str | None) -> Run:
     from d2rpick.histories.opening import open_sources
 
-    return Run(open_sources(sources, chosen, known_format(input_format)), chosen, input_format)
+    kind = known_format(input_format)
+    return Run(open_sources(sources, chosen, kind), chosen, kind)
 
 
-def known_format(input_format: str) -> str:
+def known_format(input_format: str | None) -> str:
     """Give the name of a format, or ``"auto"``; ValueError for any other."""
     from d2rpick.histories.formats import READERS
 
+    if input_format is None:
+        return "auto"
+    if not isinstance(input_format, str):
+        raise TypeError(f"input_format is {input_format!r}, a text was expected")
     if input_format not in ("auto", *READERS):
         raise ValueError(f"input_format is {input_format!r}, one of auto, {', '.join(READERS)} was expected")
     return input_format
@@ -279,10 +311,13 @@ def selection_of(
     """Give the columns that are meant; TypeError for what is no name or number, ValueError for an unknown quantity."""
     from d2rpick.histories.names import QUANTITIES, Selection
 
-    listed = [] if energy is None else [energy] if isinstance(energy, str | int) else list(energy)
+    single = energy is None or isinstance(energy, str) or not hasattr(energy, "__iter__") or arguments.is_number(energy)
+    listed: list[Any] = ([] if energy is None else [energy]) if single else list(energy)  # type: ignore[arg-type]
+    if channels is not None and not isinstance(channels, Mapping):
+        raise TypeError(f"channels is {channels!r}, a mapping of quantities to columns was expected")
     named = dict(channels or {})
     for name, value in [("time", time), *(("energy", one) for one in listed), *named.items()]:
-        if value is not None and (isinstance(value, bool) or not isinstance(value, str | int)):
+        if value is not None and not isinstance(value, str) and not arguments.is_whole_number(value):
             raise TypeError(f"{name} is {value!r}, the name or number of a column was expected")
     if unknown := [name for name in named if name not in QUANTITIES]:
         raise ValueError(f"channels names {unknown[0]!r}, one of {', '.join(QUANTITIES)} was expected")

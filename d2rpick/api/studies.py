@@ -17,7 +17,7 @@ import numpy as np
 from d2rpick.api import arguments
 from d2rpick.api.answer import Paged, frame_of
 from d2rpick.api.asked import request_of
-from d2rpick.api.request import Request, needed_time, time_or_window
+from d2rpick.api.request import Request, time_or_window
 from d2rpick.base.errors import INTERNAL_ERROR, FormatError
 from d2rpick.base.files import append_whole, record_of, signed
 from d2rpick.base.workers import Farm, on_cores
@@ -68,8 +68,8 @@ def study(
     time: str | int | None = None,
     energy: str | int | Iterable[str | int] | None = None,
     channels: Mapping[str, str | int] | None = None,
-    input_format: str = "auto",
-    jobs: int = 1,
+    input_format: str | None = "auto",
+    jobs: int | None = 1,
     **choosing: Unpack[Choosing],
 ) -> Study:
     """Ask the same question of many runs, as ``d2rpick study`` does.
@@ -78,10 +78,10 @@ def study(
     ----------
     runs : several paths
         Each a file, or a folder with the files of one run; patterns are replaced by what they match, each a run.
-    td : float
+    td : float, optional
         When the parts are switched back [time].
-    td_window : (float, float)
-        Instead of ``td``: where each run chooses its own [time].
+    td_window : (float, float), optional
+        Instead of ``td``: where each run chooses its own [time]; without both, in its longest flight.
     parts, flying, **choosing
         As for `suggest`.
     time, energy, channels, input_format
@@ -108,8 +108,8 @@ def study(
     """
     from d2rpick.api.runs import known_format, selection_of
 
-    asked = needed_time(time_or_window(arguments.optional("td", td), arguments.window("td_window", td_window)))
-    processes = arguments.whole("jobs", jobs, 1)
+    asked = time_or_window(arguments.optional("td", td), arguments.window("td_window", td_window))
+    processes = arguments.whole("jobs", 1 if jobs is None else jobs, 1)
     names = find_runs(arguments.paths("runs", [runs] if isinstance(runs, str) else runs))
     request = request_of(None, parts, flying, None, None, choosing)
     chosen = selection_of(time, energy, channels)
@@ -139,7 +139,7 @@ def _once(names: Iterable[str]) -> list[str]:
     return sorted({os.path.realpath(name): name for name in shortest_first}.values())
 
 
-def question_of(request: Request, td: float | tuple[float, float], *, curve: bool) -> Question:
+def question_of(request: Request, td: float | tuple[float, float] | None, *, curve: bool) -> Question:
     """Say what every run is asked; with its ``curve`` where the energies of all are drawn."""
     return Question(td, request.settings, request.selection(), request.input_format, curve=curve)
 
@@ -147,7 +147,9 @@ def question_of(request: Request, td: float | tuple[float, float], *, curve: boo
 def summary(request: Request, question: Question, names: Sequence[str], rows: Sequence[StudyRow]) -> Study:
     """Hold the rows of all runs against each other."""
     td = question.td
-    times = ("--td-window", *map(repr, td)) if isinstance(td, tuple) else ("--td", repr(td))
+    times: tuple[str, ...] = () if td is None else ("--td", repr(td))
+    if isinstance(td, tuple):
+        times = ("--td-window", *map(repr, td))
     # of the run time neither the study nor its command says anything
     options = replace(request, cost_share=None, step_ratio=None).asking()
     return Study.of(core.summarise(td, rows), command=("study", *times, *options, *positional(names)))

@@ -200,7 +200,7 @@ def verify(
     td: float | None = None,
     *,
     switched: Run | None = None,
-    min_mean_energy: float = MIN_MEAN_ENERGY,
+    min_mean_energy: float | None = MIN_MEAN_ENERGY,
     parts: Parts | None = None,
     flying: Parts | None = None,
     deck: arguments.Path | None = None,
@@ -241,7 +241,11 @@ def verify(
     True
     """
     pair = arguments.optional("tr", tr), arguments.optional("td", td)
-    least = arguments.number("min_mean_energy", min_mean_energy, FRACTION)
+    least = arguments.number(
+        "min_mean_energy", MIN_MEAN_ENERGY if min_mean_energy is None else min_mean_energy, FRACTION
+    )
+    if switched is not None:
+        arguments.check_run("switched", switched)
     asked = ask(run, request_of(run, parts, flying, deck, weights, choosing))
     return judged(asked, *pair, switched, least)
 

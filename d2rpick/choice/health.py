@@ -103,7 +103,7 @@ def assess(
         )
         return Health(**_ratio(balance), window=window, reason=reason, until=until)
     return Health(
-        hourglass_share=_share(balance.hourglass, peak),
+        hourglass_share=_share(balance.against_hourglassing, peak),
         **_worst_part(balance),
         **_ratio(balance),
         sliding_share=_share(_without_friction(balance), peak),

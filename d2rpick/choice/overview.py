@@ -94,6 +94,7 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
     first = run.databases[0]
     notes = [note for database in run.databases for note in _notes(database)]
     notes += doubts(run.databases)
+    notes += run.unused_energies(selection)
     states, time = None, np.empty(0)
     try:
         if first.span is not None:

@@ -57,9 +57,12 @@ _DEFAULT = Selection()
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked of every run: ``td``, or the window for it; ``curve`` whether its energy will be drawn."""
+    """What is asked of every run: ``td``, the window for it, or None for the longest flight.
 
-    td: float | tuple[float, float]
+    ``curve`` is whether its energy will be drawn.
+    """
+
+    td: float | tuple[float, float] | None
     settings: Settings
     selection: Selection = _DEFAULT
     input_format: str = "auto"
@@ -139,7 +142,7 @@ class Spread(NamedTuple):
 class Study:
     """Answer of ``study``; ``agree`` whether the intervals of tr intersect, None without a tr.
 
-    ``td`` is None where each run has its own, chosen in ``td_window``.
+    ``td`` is None where each run has its own, chosen in ``td_window``, or in its longest flight where that is None too.
     """
 
     td: float | None
@@ -225,7 +228,7 @@ def stamps(source: str) -> tuple[Stamp, ...]:
     return tuple(Stamp(path, state.st_size, state.st_mtime_ns) for path, state in found)
 
 
-def summarise(td: float | tuple[float, float], rows: Sequence[StudyRow]) -> Study:
+def summarise(td: float | tuple[float, float] | None, rows: Sequence[StudyRow]) -> Study:
     """Hold the rows of a study against each other; ``td`` as it was asked for."""
     times, low, high = _known(rows)
     spread = Spread(min(times), median(times), max(times)) if times else None

@@ -5,6 +5,7 @@ Warnings have stable codes for scripts, and sentences for people.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -304,7 +305,10 @@ def shortfall(energy: Samples, mean: float) -> Samples:
 
 
 class Objection(NamedTuple):
-    """What speaks against the candidates that it ``holds`` for, of shape (n,); ``told`` says it of one by its place."""
+    """What speaks against the candidates that it ``holds`` for, of shape (n,); ``told`` says it of one by its place.
+
+    Answers are pickled with it: ``told`` is a function of this module with some of its arguments.
+    """
 
     holds: NDArray[np.bool_]
     told: Callable[[int], Iterable[str]]
@@ -327,29 +331,62 @@ def objections(
         By their names: the measures, ``energy`` and ``level_error``.
     """
     begun = np.array([np.nan if one.earliest_tr is None else first_as_read(one.earliest_tr) for one in situations])
-    yield Objection(~(tr >= begun[place]), lambda i: [_in_load(situations[place[i]])])
+    yield Objection(~(tr >= begun[place]), partial(_tell_in_load, situations, place))
     refused = np.array([any(True for _ in against_td(one)) for one in situations])
-    yield Objection(refused[place], lambda i: against_td(situations[place[i]]))
+    yield Objection(refused[place], partial(_tell_against_td, situations, place))
     moves = np.array([not one.at_rest for one in situations])[place]
     compared = measures.compared(columns)
     described = compared | np.array([bool(one.vibration.unknown) for one in situations])[place]
     modal = np.array([one.basis == "modal" for one in situations])[place]
     same_sign = (columns["sign_match"] != 0) | modal
-    yield Objection(moves & ~described, lambda i: [situations[place[i]].vibration.undescribed])
-    yield Objection(moves & ~same_sign, lambda _: ["opposite sign of the deformation"])
+    yield Objection(moves & ~described, partial(_tell_undescribed, situations, place))
+    yield Objection(moves & ~same_sign, partial(_tell_always, "opposite sign of the deformation"))
     error, judged = np.where(compared, columns["lock_in_error"], columns["level_error"]), moves & described & same_sign
     nothing = "the energy is not positive here, so there is nothing to compare"
-    yield Objection(judged & np.isnan(error), lambda _: [nothing])
+    yield Objection(judged & np.isnan(error), partial(_tell_always, nothing))
     most = np.array([one.most_error for one in situations])[place]
     too_much = judged & (error > most)
-    yield Objection(too_much & ~modal, lambda i: [f"error {above(error[i], most[i])} above the tolerance {most[i]:g}"])
-    yield Objection(too_much & modal, lambda i: [_keeps_nothing(situations[place[i]], columns["residual"][i])])
+    yield Objection(too_much & ~modal, partial(_tell_error, error, most))
+    yield Objection(too_much & modal, partial(_tell_keeps_nothing, situations, place, columns["residual"]))
     # beyond its end the flight tells nothing of what comes after td
     means = [means_of(one) if one.td <= one.latest_td else None for one in situations]
     if any(means):
         energy = columns["energy"]
         more = energy > np.array([one.most if one else np.inf for one in means])[place]
-        yield Objection(more, lambda i: _above_the_reference(means[place[i]], energy[i]))
+        yield Objection(more, partial(_tell_above_the_reference, means, place, energy))
+
+
+def _tell_in_load(situations: Sequence[Situation], place: NDArray[np.int32], candidate: int) -> list[str]:
+    return [_in_load(situations[place[candidate]])]
+
+
+def _tell_against_td(situations: Sequence[Situation], place: NDArray[np.int32], candidate: int) -> Iterator[str]:
+    return against_td(situations[place[candidate]])
+
+
+def _tell_undescribed(situations: Sequence[Situation], place: NDArray[np.int32], candidate: int) -> list[str]:
+    return [situations[place[candidate]].vibration.undescribed]
+
+
+def _tell_always(reason: str, _: int) -> list[str]:
+    return [reason]
+
+
+def _tell_error(error: Samples, most: Samples, candidate: int) -> list[str]:
+    limit = most[candidate]
+    return [f"error {above(error[candidate], limit)} above the tolerance {limit:g}"]
+
+
+def _tell_keeps_nothing(
+    situations: Sequence[Situation], place: NDArray[np.int32], residual: Samples, candidate: int
+) -> list[str]:
+    return [_keeps_nothing(situations[place[candidate]], residual[candidate])]
+
+
+def _tell_above_the_reference(
+    means: Sequence[Means | None], place: NDArray[np.int32], energy: Samples, candidate: int
+) -> Iterator[str]:
+    return _above_the_reference(means[place[candidate]], energy[candidate])
 
 
 def _in_load(situation: Situation) -> str:

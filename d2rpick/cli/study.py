@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from d2rpick.api.request import LIMITS, READING, UNLIMITED, Option, Request, needed_time, time_or_window
+from d2rpick.api.request import LIMITS, READING, UNLIMITED, Option, Request, time_or_window
 from d2rpick.base.errors import INTERNAL_ERROR, D2RPickError, FormatError
 from d2rpick.cli import options
 from d2rpick.cli.options import RESULT, WINDOW
@@ -63,7 +63,8 @@ def study(
 ) -> None:
     """Choose tr for many runs: how far they agree, and one tr for all of them.
 
-    Each RUN is a file, a folder with the files of one run, or a pattern whose matches are runs.  One that cannot be
+    Without --td and --td-window each run chooses both times in its longest flight.  Each RUN is a file, a folder with
+    the files of one run, or a pattern whose matches are runs.  One that cannot be
     read is listed in its row and does not stop the others.
 
     Examples
@@ -77,7 +78,7 @@ def study(
 
     if scheduler and jobs:
         raise click.UsageError("--scheduler and --jobs exclude each other: the cluster has its own processes")
-    asked = needed_time(time_or_window(td, td_window))
+    asked = time_or_window(td, td_window)
     sources = _sources(run, listed)
     output = output.beside(*sources)
     written = {"output-file": output.file, "plot": output.plot, "report": output.report}

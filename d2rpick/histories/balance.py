@@ -10,7 +10,8 @@ import numpy as np
 from d2rpick.base.errors import FormatError, if_written
 from d2rpick.histories.formats import READERS
 from d2rpick.histories.history import Balance, Momenta, Samples
-from d2rpick.histories.names import Part, is_internal_energy, normalised
+from d2rpick.histories.meaning import ROTATION_ENERGY, is_internal_energy, is_total_internal_energy
+from d2rpick.histories.names import Part, normalised
 from d2rpick.histories.samples import median
 
 if TYPE_CHECKING:
@@ -18,31 +19,24 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.database import Legs
 
-# Normalised names, see `d2rpick.histories.names`: glstat and binout, Radioss, Abaqus (ALLAE is its hourglass energy),
-# tables.  Names are taken whole: "eroded hourglass energy" is another quantity.
-_NAMES: Final[Mapping[str, tuple[str, ...]]] = {
-    "kinetic": ("kineticenergy", "allke", "ketotal", "ke"),
-    "rotation": ("rotationenergy",),  # Radioss keeps it apart from the kinetic energy
-    "hourglass": ("hourglassenergy", "hourglasse", "hourglass", "hgeng", "allae"),
-    "sliding": ("slidinginterfaceenergy", "slidingenergy", "contactenergy", "contacte"),
-    "friction": ("frictionalcontactenergy",),  # Radioss tells it apart
-    "external_work": ("externalwork", "extwork", "allwk"),
-    "total": ("totalenergy", "etotal"),
-    "ratio": ("totalenergyinitialenergy", "energyratio"),
-    "eroded": ("erodedinternalenergy",),
+# Terms of the balance, and the quantities that hold them.
+_QUANTITIES: Final[Mapping[str, str]] = {
+    "kinetic": "kinetic_energy",
+    "hourglass": "hourglass_energy",
+    "artificial": "artificial_energy",
+    "sliding": "contact_energy",
+    "friction": "frictional_contact_energy",
+    "external_work": "external_work",
+    "total": "total_energy",
+    "ratio": "energy_ratio",
+    "eroded": "eroded_internal_energy",
 }
 # Without one of these nothing can be said of the health.
-_JUDGED: Final = frozenset(
-    name for term in ("hourglass", "sliding", "external_work", "total", "ratio", "eroded") for name in _NAMES[term]
-)
-_TOTAL_INTERNAL: Final = ("ietotal", "totalinternalenergy")
-# Of the centre of mass of the model; a planar one has two of the three.  The last are any names of these quantities.
-_MOMENTA: Final = ("xmomentum", "ymomentum", "zmomentum")
-_VELOCITIES: Final = (
-    ("globalxvelocity", "globalyvelocity", "globalzvelocity"),
-    _MOMENTA,
-    ("xvelocity", "yvelocity", "zvelocity"),
-)
+_JUDGED: Final = frozenset(_QUANTITIES.values()) - {"kinetic_energy", "frictional_contact_energy"}
+# Normalised names.
+_GLOBAL_VELOCITIES: Final = ("globalxvelocity", "globalyvelocity", "globalzvelocity")
+_MOMENTA: Final = ("x_momentum", "y_momentum", "z_momentum")
+_VELOCITIES: Final = ("x_velocity", "y_velocity", "z_velocity")
 
 
 def balance_of(
@@ -55,7 +49,7 @@ def balance_of(
     """
     whole = _whole(databases)
     of_parts = _hourglass_of(databases, parts, until) if parts else ()
-    judged = whole is not None and not _JUDGED.isdisjoint(map(normalised, (*whole.channels, *whole.quantities)))
+    judged = whole is not None and not _JUDGED.isdisjoint(whole.quantities)
     if not (judged or of_parts):
         return None
     if whole is None:
@@ -70,14 +64,14 @@ def terms_of(databases: Sequence[Legs]) -> Balance | None:
     None where the files have no energy beside the internal one, or leave open which columns are meant.
     """
     whole = _whole(databases)
-    known = {name for names in _NAMES.values() for name in names}
-    return None if whole is None or known.isdisjoint(map(normalised, whole.channels)) else _terms(whole, np.inf)
+    if whole is None or {*_QUANTITIES.values()}.isdisjoint(whole.quantities):
+        return None
+    return _terms(whole, np.inf)
 
 
 def momentum_of(database: Legs) -> Momenta | None:
     """Read the momentum of the whole model, or its velocity, which is the same but for the mass; None without."""
-    known = {normalised(name) for name in (*database.channels, *database.quantities)}
-    if not any(known & {*axes} for axes in _VELOCITIES):
+    if {*_MOMENTA, *_VELOCITIES}.isdisjoint(database.quantities) and not _global_velocities(database):
         return None
     columns = if_written(lambda: _Columns(database, database.time.size))
     values = columns.velocity() if columns else None
@@ -104,8 +98,8 @@ def _terms(whole: Legs, until: float) -> Balance | None:
     columns = if_written(lambda: _Columns(whole, int(np.searchsorted(whole.time, until, side="right"))))
     if columns is None:
         return None
-    found = {name: columns.first(*names) for name, names in _NAMES.items()}
-    rotation = found.pop("rotation")
+    found = {term: columns.quantity(quantity) for term, quantity in _QUANTITIES.items()}
+    rotation = columns.called(ROTATION_ENERGY)
     if rotation is not None and found["kinetic"] is not None:
         found["kinetic"] = found["kinetic"] + rotation
     return Balance(
@@ -118,6 +112,12 @@ def _terms(whole: Legs, until: float) -> Balance | None:
     )
 
 
+def _global_velocities(database: Legs) -> dict[str, str]:
+    """Return the channels called velocities of the whole model, by their normalised names."""
+    names = {normalised(name): name for name in reversed(database.channels)}
+    return {name: names[name] for name in _GLOBAL_VELOCITIES if name in names}
+
+
 class _Columns:
     """Columns of a database by what they mean, the first ``states`` of them.
 
@@ -127,43 +127,50 @@ class _Columns:
     def __init__(self, database: Legs, states: int) -> None:
         self._database = database
         self.states = states
-        self._names = {normalised(name): name for name in reversed(database.channels)}
-        self._names |= {normalised(quantity): name for quantity, name in database.quantities.items()}
         self.used: list[str] = []
         self.momentum = False  # whether the velocity that was read is a momentum
 
     def mass(self, momenta: Samples) -> float:
         """Give the mass of the model: as written, or the least that has these momenta, (n, 1, 3)."""
-        written, kinetic = self.first("mass", "totalmass"), self.first(*_NAMES["kinetic"])
+        written, kinetic = self.quantity("mass"), self.quantity("kinetic_energy")
         if written is not None and written.size:
             return float(median(written))
         if kinetic is None or not (kinetic > 0).any():
             return float("nan")
         return float(least_masses(momenta, kinetic[:, np.newaxis])[0])
 
-    def first(self, *names: str) -> Samples | None:
-        """Give the first of these columns that is there."""
-        name = next((self._names[name] for name in names if name in self._names), None)
+    def quantity(self, quantity: str) -> Samples | None:
+        """Return the column of a quantity of `d2rpick.histories.names.QUANTITIES`."""
+        name = self._database.quantities.get(quantity)
+        return None if name is None else self._values(name)
+
+    def called(self, wanted: str) -> Samples | None:
+        """Return the column with this normalised name."""
+        name = next((name for name in self._database.channels if normalised(name) == wanted), None)
         return None if name is None else self._values(name)
 
     def velocity(self) -> Samples | None:
-        """Give the velocity of the centre of mass, up to a factor, shape (n, 3)."""
-        for axes in _VELOCITIES:
-            columns = [self.first(axis) for axis in axes]
-            known = [column for column in columns if column is not None]
-            if len(known) > 1:
-                self.momentum = axes == _MOMENTA
-                still = np.zeros_like(known[0])
-                return np.stack([still if column is None else column for column in columns], axis=1)
-        return None
+        """Give the velocity of the centre of mass, up to a factor, shape (n, 3).
+
+        A velocity that is called global is preferred, then a momentum, then any other velocity.  A planar one has two
+        of the three components.
+        """
+        velocities = [self.called(name) for name in _GLOBAL_VELOCITIES]
+        stacked = _stack_components(velocities)
+        if stacked is None:
+            stacked = _stack_components([self.quantity(axis) for axis in _MOMENTA])
+            self.momentum = stacked is not None
+        if stacked is None:
+            stacked = _stack_components([self.quantity(axis) for axis in _VELOCITIES])
+        return stacked
 
     def internal(self) -> Samples | None:
         """Give the internal energy of the whole model; beside its total, a plain one may be that of some parts."""
-        total = self.first(*_TOTAL_INTERNAL)
-        if total is not None:
-            return total
-        plain = [name for name in self._names.values() if is_internal_energy(name)]
-        return self._values(plain[0]) if plain else None
+        for says_so in (is_total_internal_energy, is_internal_energy):
+            names = [name for name in self._database.channels if says_so(name)]
+            if names:
+                return self._values(names[0])
+        return None
 
     def _values(self, name: str) -> Samples | None:
         values = if_written(lambda: self._database.channel(name)[: self.states])
@@ -171,6 +178,15 @@ class _Columns:
             return None
         self.used.append(name)
         return values
+
+
+def _stack_components(components: Sequence[Samples | None]) -> Samples | None:
+    """Stack components (n,) to vectors (n, 3), 0 where one is missing; None if fewer than two are there."""
+    known = [component for component in components if component is not None]
+    if len(known) < 2:
+        return None
+    still = np.zeros_like(known[0])
+    return np.stack([still if component is None else component for component in components], axis=1)
 
 
 def _hourglass_of(

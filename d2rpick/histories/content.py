@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 from io import FileIO
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -97,6 +97,9 @@ class OnDisk(Content):
 
     def __del__(self) -> None:
         os.close(self._number)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _reopen, (self._name, self._state, self._ends)
 
     def __len__(self) -> int:
         return self._size
@@ -222,6 +225,11 @@ class OnDisk(Content):
             found = f"{self._name}: the file was rewritten while it was read"
             raise ChangedError(f"{found}; read it again when it is complete")
 
+    def check_ends(self, ends: tuple[bytes, bytes]) -> None:
+        """Make sure that the file is still the one that had these ends; ChangedError where it is not."""
+        self._ends = ends
+        self.check()
+
     def _read_ends(self) -> tuple[bytes, bytes]:
         """First and last bytes of what counts."""
         length = min(_END, self._size)
@@ -242,6 +250,26 @@ def stored(name: str) -> bytes | OnDisk:
             return state
         on_disk = OnDisk(name, os.dup(file.fileno()), state)
     return bytes(on_disk) if len(on_disk) <= _HELD else on_disk
+
+
+def _reopen(name: str, state: FileState, ends: tuple[bytes, bytes]) -> OnDisk:
+    """Open a file again in a copy of what was read of it.
+
+    Raises
+    ------
+    FormatError
+        If it is gone.
+    ChangedError
+        If it was written anew since.
+    """
+    try:
+        with open(name, "rb", buffering=0) as file:  # noqa: PTH123
+            on_disk = OnDisk(name, os.dup(file.fileno()), state)
+    except OSError as error:
+        reason = error.strerror or error
+        raise FormatError(f"{name}: the run cannot be copied: its file cannot be read ({reason})") from None
+    on_disk.check_ends(ends)
+    return on_disk
 
 
 def line_at(data: Content, address: int) -> int:

@@ -5,6 +5,7 @@ Databases of different formats that one run wrote are companions: whether they c
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from contextlib import suppress
 from itertools import combinations
@@ -15,7 +16,8 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.history import Precision, Samples
-from d2rpick.histories.names import Part, quantity_of, resolve, with_namesakes
+from d2rpick.histories.meaning import find_quantities
+from d2rpick.histories.names import Part, resolve, with_namesakes
 from d2rpick.histories.samples import newest_states, window
 
 if TYPE_CHECKING:
@@ -57,6 +59,8 @@ class Database:
         Unit of the times, empty where the file does not name it; no solver writes one.
     digits : int
         Significant decimal digits of all numbers.
+    named_by_people : bool
+        Whether people or other programs than solvers chose the names of the channels, so that they may mean anything.
     no_channels, no_parts : str
         What to say where somebody asks for them and there are none.
     """
@@ -70,6 +74,7 @@ class Database:
     parts: tuple[Part, ...] = ()
     digits = DIGITS[8]
     no_channels = ""
+    named_by_people = False
     no_parts = "this table has no parts; give the matsum, binout or T01 instead, or one of its columns by `energy`"
 
     def branch(self, name: str) -> Database:
@@ -122,17 +127,22 @@ class Legs:
     """
 
     def __init__(
-        self, legs: Sequence[Database], cut: Sequence[str] = (), named: Sequence[tuple[str, str]] = ()
+        self,
+        legs: Sequence[Database],
+        cut: Sequence[str] = (),
+        named: Sequence[tuple[str, str]] = (),
+        notes: Sequence[str] = (),
     ) -> None:
         self._cut = cut  # files whose packed data ends early
+        self._own_notes = notes  # on other files
         self._named = named  # quantities whose channels have unusual names
         several = len(legs) > 1  # of one leg the times are not looked at: they may not be known yet
-        self._files = sorted(legs, key=_start) if several else [*legs]
+        self._files = sorted(legs, key=_leg_order) if several else [*legs]
         self._legs = [leg for leg in self._files if not several or _start(leg) > -np.inf] or self._files
         self._energies: tuple[tuple[int, ...], Samples] | None = None  # of the parts that were asked for last
         self.source = ", ".join(leg.source for leg in self._files)
         first = self._legs[0]
-        self.format, self.version = first.format, first.version
+        self.format, self.version, self.named_by_people = first.format, first.version, first.named_by_people
         self.title, self.time_unit = first.title, first.time_unit
         self.complete = all(leg.complete for leg in self._files) and not cut
 
@@ -153,10 +163,7 @@ class Legs:
 
         Where several have names of one quantity none of them is taken, unless one is named like the quantity itself.
         """
-        found: dict[str, list[str]] = {}
-        for name in self.channels:
-            if quantity := quantity_of(name):
-                found.setdefault(quantity, []).append(name)
+        found = find_quantities(self.channels)
         sure = {quantity: names[0] for quantity, names in found.items() if len(names) == 1}
         own = {quantity: quantity for quantity, names in found.items() if quantity in names}
         told = {}
@@ -173,12 +180,13 @@ class Legs:
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """Notes of the legs, and what was left out between them."""
-        notes = [f"{name}: the packed data ends early; it was read up to there" for name in self._cut]
+        kept = self._kept[1] if self.channels else ()  # first: reading the columns may add notes to the legs
+        notes = [*self._own_notes]
+        notes += [f"{name}: the packed data ends early; it was read up to there" for name in self._cut]
         notes += [note for leg in self._files for note in leg.notes]
         if self._passing:
             notes.append(f"{self.source}: only some legs have part {listing(self._passing)}, which was left out")
-        if self.channels:
-            notes += self._kept[1]
+        notes += kept
         if self.parts:
             notes += self._parts_kept[1]
         return tuple(dict.fromkeys(notes))
@@ -272,6 +280,12 @@ def _times(database: Database | Legs) -> list[Samples]:
 def _start(leg: Database) -> float:
     """First time of a leg; before all others where it has no states."""
     return min((float(time[0]) for time in _times(leg) if time.size), default=-np.inf)
+
+
+def _leg_order(leg: Database) -> tuple[float, list[tuple[str, int]]]:
+    """Sort legs by their start, those that start together by name: the order in which files are named is no matter."""
+    pieces = re.findall(r"(\D*)(\d*)", leg.source)
+    return _start(leg), [(text, int(number or -1)) for text, number in pieces]
 
 
 def _digits(precision: Precision) -> int:

@@ -175,7 +175,8 @@ class Balance:
     ``sliding`` is the energy of all contacts, ``friction`` what of it is friction where that is told apart,
     ``external_work`` that of gravity and every other load, ``total`` the sum that the solver keeps and ``ratio`` that
     sum over what it should be: the energy at the start and the external work.  ``eroded`` is the internal energy of
-    elements that were deleted.  ``velocity`` (n, 3) is that of the centre of mass, up to a factor.
+    elements that were deleted.  ``artificial`` is what Abaqus spends against hourglassing, a part of ``internal``;
+    ``hourglass`` is beside it.  ``velocity`` (n, 3) is that of the centre of mass, up to a factor.
     ``hourglass_of_parts`` gives the highest hourglass and the highest internal energy of parts.  ``precision`` tells
     how finely the energies were printed.
     """
@@ -184,6 +185,7 @@ class Balance:
     internal: Samples | None = None
     kinetic: Samples | None = None
     hourglass: Samples | None = None
+    artificial: Samples | None = None
     sliding: Samples | None = None
     friction: Samples | None = None
     external_work: Samples | None = None
@@ -201,6 +203,11 @@ class Balance:
         if self.kinetic is None or self.internal is None:
             return None
         return self.kinetic + self.internal + (0.0 if self.hourglass is None else self.hourglass)
+
+    @property
+    def against_hourglassing(self) -> Samples | None:
+        """Energy (n,) spent against hourglassing, be it a part of the internal energy or beside it; None if unknown."""
+        return self.artificial if self.hourglass is None else self.hourglass
 
     @cached_property
     def worked(self) -> Samples | None:

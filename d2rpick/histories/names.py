@@ -15,73 +15,113 @@ if TYPE_CHECKING:
 
 TIME_UNITS = frozenset({"s", "sec", "second", "seconds", "ms", "msec", "us", "µs", "μs", "ns", "min", "h"})
 _ENERGY_UNITS = frozenset(
-    {"j", "kj", "mj", "gj", "µj", "μj", "uj", "nj", "joule", "nm", "nmm", "n*m", "n*mm", "n.m", "n.mm", "n·m",
-     "n·mm", "n-mm", "n-m", "knm", "knmm", "kn*mm", "kn.mm", "kn·mm", "kn*m", "erg", "lbf*in", "lbf-in",
-     "lbf·in", "in-lbf", "in*lbf", "ft-lbf", "ft*lbf"}
+    {"j", "kj", "mj", "gj", "µj", "μj", "uj", "nj", "joule", "joules", "nm", "nmm", "n*m", "n*mm", "n.m", "n.mm", "n·m",
+     "n·mm", "n-mm", "n-m", "knm", "knmm", "kn*mm", "kn.mm", "kn·mm", "kn*m", "kn-mm", "kn-m", "erg", "lbf*in",
+     "lbf-in", "lbf·in", "in-lbf", "in*lbf", "ft-lbf", "ft*lbf"}
 )  # fmt: skip
 _UNITS = TIME_UNITS | _ENERGY_UNITS
+# A unit in brackets: symbols with prefixes, and what joins them ("kg mm^2/ms^2", "N·mm", "-").
+_PREFIXED: Final = "[pnuµμmckdhgt]?(?:j|n|m|g|s|pa|wh?|ev|cal)"
+_SYMBOL: Final = rf"(?:{_PREFIXED}|m?sec|min|h|joules?|seconds?|kg|tonnes?|tons?|t|lbf?|in|ft|erg|slug)"
+_UNIT: Final = rf"(?i:(?:1/)?{_SYMBOL}(?:[\s*·⋅.\-/^]*(?:{_SYMBOL}|[-+]?\d))*|-|%|)"
 
-# Normalised, see `normalised`.
-_TIME_NAMES = frozenset(
-    {"time", "t", "times", "simtime", "simulationtime", "zeit", "temps", "tempo", "tiempo", "時間", "时间", "시간"}
-)
-_INTERNAL_NAMES = frozenset(
-    {"internalenergy", "internal", "ie", "allie", "inten", "eint", "einternal", "intenergy", "internalen",
-     "innereenergie", "innereenergy", "energieinterne", "énergieinterne", "energiainterna", "energíainterna",
-     "内部エネルギー", "内能", "내부에너지"}
+# Names are `normalised`, and taken whole.
+TIME_NAMES: Final = frozenset(
+    {"time", "t", "times", "timewhole", "zeit", "temps", "tempo", "tiempo", "tijd", "tid", "czas", "时间", "時間",
+     "시간", "время"}
+)  # fmt: skip
+INTERNAL_ENERGY: Final = frozenset(
+    {"internalenergy", "energyinternal", "internal", "ie", "allie", "inten", "eint", "eintern", "einternal",
+     "enint", "inte", "intenergy", "energyint", "internalen", "intenergie", "innereenergie", "innereenergy",
+     "innerenergy", "interneenergie", "internenergie", "internenergi", "inreenergi", "innenenergie",
+     "inwendigeenergie", "energieinterne", "energiainterna", "energiainternal", "energiawewnetrzna",
+     "внутренняяэнергия", "内部エネルギー", "内能", "내부에너지"}
 )  # fmt: skip
 
-# What else a history of the whole model may tell, and what it is called: LS-DYNA's glstat and binout, Radioss and its
-# th_to_csv, Abaqus, frames of lasso-python, d2rpick.  Energies [energy], momentum and velocity of the centre of mass
-# along an axis [momentum], [velocity], and the mass of what moves [mass].  Names are normalised and taken whole.
+# What else a history of the whole model holds, and what it is called: by glstat and binout of LS-DYNA, by Radioss and
+# its th_to_csv, Abaqus, Exodus, frames of lasso-python and d2rpick; in other languages.  Energies [energy], momentum
+# and velocity of the centre of mass along an axis [momentum], [velocity], and the mass of what moves [mass].
+# The artificial energy of Abaqus is a part of its internal energy; the hourglass energy of others is beside it.
 QUANTITIES: Final[Mapping[str, frozenset[str]]] = {
-    "kinetic_energy": frozenset({"kineticenergy", "kinetic", "ke", "allke", "kinen", "ekin", "ketotal"}),
-    "total_energy": frozenset({"totalenergy", "etotal", "etot"}),
-    "external_work": frozenset({"externalwork", "extwork", "allwk", "wext", "externalforcework"}),
+    "kinetic_energy": frozenset(
+        {"kineticenergy", "energykinetic", "kinetic", "ke", "allke", "kinen", "kinenergy", "energykin", "kine", "ekin",
+         "ekinetic", "enkin", "ek", "kinetische", "kinetischeenergie", "kinenergie", "energiekin", "bewegungsenergie",
+         "energiecinetique", "cinetique", "energiacinetica", "cinetica", "kinetiskenergi", "energiakinetyczna",
+         "кинетическаяэнергия", "运动能", "动能", "動能", "運動エネルギー", "운동에너지"}
+    ),
+    "total_energy": frozenset(
+        {"totalenergy", "energytotal", "etotal", "etot", "totenergy", "totalen", "gesamtenergie", "totaleenergie",
+         "energietotale", "energiatotal", "energiatotale", "totaalenergie", "полнаяэнергия", "总能量", "总能",
+         "全エネルギー", "총에너지"}
+    ),
+    "external_work": frozenset(
+        {"externalwork", "workexternal", "extwork", "allwk", "wext", "externalforcework", "workofexternalforces",
+         "externalenergy", "aussererarbeit", "ausserearbeit", "externearbeit", "travailexterne", "lavoroesterno",
+         "trabajoexterno", "外力功", "外力仕事"}
+    ),
     "contact_energy": frozenset(
-        {"contactenergy", "slidinginterfaceenergy", "slidingenergy", "slidinginterface", "sliding", "contacte"}
+        {"contactenergy", "energycontact", "slidinginterfaceenergy", "slidingenergy", "slidinginterface", "sliding",
+         "contacte", "kontaktenergie", "energiedecontact", "energiadicontatto", "energiadecontacto"}
     ),
     "frictional_contact_energy": frozenset({"frictionalcontactenergy"}),
-    "hourglass_energy": frozenset({"hourglassenergy", "hourglasse", "hourglass", "hgeng", "allae"}),
-    "damping_energy": frozenset({"dampingenergy", "systemdampingenergy", "systemdamping"}),
+    "hourglass_energy": frozenset(
+        {"hourglassenergy", "energyhourglass", "hourglasse", "hourglass", "hourglassing", "hourglassingenergy", "hgeng",
+         "hgenergy", "sanduhrenergie"}
+    ),
+    "artificial_energy": frozenset({"allae", "artificialenergy", "artificialstrainenergy", "artificialstrain"}),
+    "damping_energy": frozenset({"dampingenergy", "systemdampingenergy", "systemdamping", "dampfungsenergie"}),
     "eroded_internal_energy": frozenset({"erodedinternalenergy", "erodedinternal"}),
-    "energy_ratio": frozenset({"totalenergyinitialenergy", "energyratio"}),
-    "x_momentum": frozenset({"xmomentum", "momentumx", "xmom", "px"}),
-    "y_momentum": frozenset({"ymomentum", "momentumy", "ymom", "py"}),
-    "z_momentum": frozenset({"zmomentum", "momentumz", "zmom", "pz"}),
+    "energy_ratio": frozenset({"totalenergyinitialenergy", "energyratio", "energieverhaltnis"}),
+    "x_momentum": frozenset({"xmomentum", "momentumx", "xmom", "px", "ximpuls", "impulsx"}),
+    "y_momentum": frozenset({"ymomentum", "momentumy", "ymom", "py", "yimpuls", "impulsy"}),
+    "z_momentum": frozenset({"zmomentum", "momentumz", "zmom", "pz", "zimpuls", "impulsz"}),
     "x_velocity": frozenset({"globalxvelocity", "xvelocity", "xrigidbodyvelocity"}),
     "y_velocity": frozenset({"globalyvelocity", "yvelocity", "yrigidbodyvelocity"}),
     "z_velocity": frozenset({"globalzvelocity", "zvelocity", "zrigidbodyvelocity"}),
-    "mass": frozenset({"mass", "totalmass"}),
-}
+    "mass": frozenset({"mass", "totalmass", "masse", "gesamtmasse"}),
+}  # fmt: skip
 
-_BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]*?)\s*[)\]]\s*$")
+_BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]*?)\s*[)\]]")
 _TAIL = re.compile(r"^(.*[^/_,\s])\s*[/_,\s]\s*([^/_,\s]+)$")
-
-# An internal energy among others: of a part, a total.  This and the next are compiled where they are needed.
-_SOME_INTERNAL = r"(?i:internal|allie|inten)|(?<![A-Z])IE(?![A-Za-z])"
-
-# Words that name another quantity; KE in capitals only, since "make" and "spoke" hold it too.
-_OTHER = (
-    r"(?i:kinetic|kinen|\ball(?:ke|pd|se|ae|wk|fd|vd|cd|dmd|mw)|etotal|total.?energy|hourglass|hgeng|eroded"
-    r"|dissipat|plastic|damping|sliding|contact|friction|external|work|stonewall|rigidwall"
-    r"|accel|veloc|displac|moment|force|pressure|stress|strain(?!.?en)|temperature|ratio|mass|time.?step)"
-    r"|(?<![A-Z])KE(?![A-Z])"
-)
+_TWO_WORD_UNIT = re.compile(r"[/_,\s]\s*(k?N\s+m{1,2})$")
 
 
 def unit_of(name: str) -> str:
-    """Read the unit a column's name ends with, in brackets or behind ``/``, ``_``, ``,`` or a blank.
+    """Return the unit a column's name ends with: in brackets, after ``in``, ``/``, ``_``, ``,`` or a blank.
 
     Examples
     --------
-    >>> [unit_of(name) for name in ("Time (ms)", "t/ms", "time_s", "Internal Energy [J]", "time", "part_3")]
-    ['ms', 'ms', 's', 'J', '', '']
+    >>> [unit_of(name) for name in ("Time (ms)", "t/ms", "time_s", "t in ms", "Internal Energy [J]", "time", "part_3")]
+    ['ms', 'ms', 's', 'ms', 'J', '', '']
     """
-    if brackets := _BRACKETS.search(name):
-        return brackets[1]
+    name = name.strip()
+    brackets = [match for match in _BRACKETS.finditer(name) if match.end() == len(name)]
+    if brackets:
+        return brackets[0][1] if re.fullmatch(_UNIT, brackets[0][1]) else ""
+    two_words = _TWO_WORD_UNIT.search(name)
+    if two_words:
+        return two_words[1]
     tail = _TAIL.match(name)
     return tail[2] if tail and tail[2].casefold() in _UNITS else ""
+
+
+def without_unit(name: str) -> str:
+    """Return a name without its unit and the word before it; a bracket that holds no unit stays.
+
+    Examples
+    --------
+    >>> [without_unit(name) for name in ("t in ms", "Energy(J): ALLKE", "Energy (kinetic) [N mm]", "KE_kJ")]
+    ['t', 'Energy: ALLKE', 'Energy (kinetic)', 'KE']
+    """
+    name = _BRACKETS.sub(_drop_unit, name).strip()
+    unit = unit_of(name)
+    if unit and name.endswith(unit):
+        name = name[: -len(unit)].rstrip(" /_,\t")
+    return name.removesuffix(" in")
+
+
+def _drop_unit(brackets: re.Match[str]) -> str:
+    return "" if re.fullmatch(_UNIT, brackets[1]) else brackets[0]
 
 
 @lru_cache(maxsize=1 << 16)  # the same names are asked for again and again
@@ -93,75 +133,13 @@ def normalised(name: str) -> str:
     >>> [normalised(name) for name in ("Internal_Energy (J)", "t/ms", "IE_J", "E int")]
     ['internalenergy', 't', 'ie', 'eint']
     """
-    name = _BRACKETS.sub("", name).strip()
-    tail = _TAIL.match(name)
-    if tail and tail[2].casefold() in _UNITS:
-        name = tail[1]
-    return "".join(letter for letter in name.casefold() if letter.isalnum())
-
-
-def is_time(name: str) -> bool:
-    """Whether a column of this name is a time."""
-    return normalised(name) in _TIME_NAMES
-
-
-def is_internal_energy(name: str) -> bool:
-    """Whether a column of this name is the internal energy, without addition."""
-    return normalised(name) in _INTERNAL_NAMES
-
-
-def is_some_internal_energy(name: str) -> bool:
-    """Whether a name speaks of an internal energy: ``IE_total_J``, ``box IE``, not ``eroded internal``."""
-    return bool(re.search(_SOME_INTERNAL, name)) and not re.search(_OTHER, name)
-
-
-def internal_energies(names: Sequence[str]) -> list[int]:
-    """Places of the names that say internal energy without addition or, where there are none, that speak of one."""
-    plain = [place for place, name in enumerate(names) if is_internal_energy(name)]
-    return plain or [place for place, name in enumerate(names) if is_some_internal_energy(name)]
-
-
-def quantity_of(name: str) -> str | None:
-    """Which of `QUANTITIES` a channel of this name is; of a path its last step counts.
-
-    Examples
-    --------
-    >>> [quantity_of(name) for name in ("KINETIC ENERGY", "glstat/global_x_velocity", "momentum_z [N s]", "boxKE_J")]
-    ['kinetic_energy', 'x_velocity', 'z_momentum', None]
-    """
-    spellings = {normalised(name), normalised(name.rpartition("/")[2])}
-    return next((quantity for quantity, names in QUANTITIES.items() if not names.isdisjoint(spellings)), None)
+    return "".join(letter for letter in without_unit(name).casefold() if letter.isalnum())
 
 
 def is_unit(cell: str) -> bool:
-    """Whether a cell of a units row may read like this: ``ms``, ``[J]``, ``(-)``, nothing."""
+    """Return True if a cell of a row of units may read like this: ``ms``, ``in mJ``, ``[J]``, ``(-)``, nothing."""
+    cell = cell.removeprefix("in ")
     return cell.casefold() in _UNITS | {"", "-", "1"} or (bool(cell) and cell[0] + cell[-1] in ("()", "[]"))
-
-
-def quantity_note(channel: str) -> tuple[str, ...]:
-    """Say that a channel's name speaks of something else than internal energy, if it does.
-
-    Examples
-    --------
-    >>> quantity_note("boxIE_J")
-    ()
-    >>> quantity_note("ALLKE for Whole Model")
-    ("'ALLKE for Whole Model' is not an internal energy by its name (ALLKE); it was used as it is",)
-    """
-    if channel.replace("_", "").casefold() in _INTERNAL_NAMES:  # as mostly
-        return ()
-    word = re.search(_OTHER, channel)
-    if not word:
-        return ()
-    return (f"{channel!r} is not an internal energy by its name ({word[0]}); it was used as it is",)
-
-
-def refuse_other_quantity(channel: str, where: str) -> None:
-    """FormatError if the only column or curve of a file is called something else than an internal energy."""
-    word = re.search(_OTHER, channel)
-    if word:
-        found = f"{where}: the only values are {channel!r}, by its name not an internal energy ({word[0]})"
-        raise FormatError(f"{found}; choose with `energy` what to take for it")
 
 
 def meant(wanted: str, known: Sequence[str]) -> list[int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from importlib import import_module
 from itertools import combinations
 from typing import TYPE_CHECKING, Final, Protocol, cast
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.database import Indices
     from d2rpick.histories.history import Samples
+    from d2rpick.histories.surroundings import Surroundings
 
 
 __all__ = ["Reader", "Run", "Selection", "Source", "open_run", "open_sources", "reader"]
@@ -28,20 +30,8 @@ __all__ = ["Reader", "Run", "Selection", "Source", "open_run", "open_sources", "
 # Enough of a file for its head and more than one state of the longest blocks.
 _HEAD = 8192
 _DEFAULT = Selection()
-# A keyword of LS-DYNA at the start of a line, or the first line of a Radioss deck; compiled where it is needed.
-_DECK: Final = rb"\*[A-Za-z][A-Za-z_]{2}|#RADIOSS|/BEGIN"
-# What is often given instead of a history: how it begins, what it is, and the way out.
-_OTHERS: Final = (
-    (
-        rb"PK\x03\x04.{0,2000}(xl/|\[Content_Types\])",
-        "an Excel workbook",
-        "save the sheet as csv, with a line of headings",
-    ),
-    (rb"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an Excel workbook", "save the sheet as csv, with a line of headings"),
-    (rb"PK\x03\x04", "a zip archive", "unpack it and name the history in it"),
-    (rb"7z\xbc\xaf|BZh[1-9]1AY|\xfd7zXZ", "a packed file", "unpack it first: only gzip is read as it is"),
-    (rb"PAR1", "a parquet file", "write it as csv: pandas.read_parquet(...).to_csv(...)"),
-)
+# No legend of an ASCII database has more bytes.
+_LONGEST_LEGEND: Final = 1 << 24
 
 
 class Reader(Protocol):
@@ -82,21 +72,68 @@ def open_run(names: Sequence[str], selection: Selection = _DEFAULT, input_format
 
 def open_sources(sources: Sequence[Source], selection: Selection = _DEFAULT, input_format: str = "auto") -> Run:
     """Open the files of one run whose bytes are at hand; arguments and errors as of `open_run`."""
-    kinds: dict[str, list[Source]] = {}
-    for source in sources:
-        kinds.setdefault(input_format if input_format != "auto" else _format(source), []).append(source)
+    kinds, left_out = _sort_by_format(sources) if input_format == "auto" else ({input_format: [*sources]}, [])
     ordered = [kind for kind in READERS if kind in kinds]
     _refuse_time_of_solver(ordered, selection.time)
     opened = {kind: reader(kind).open_legs(kinds[kind], selection) for kind in ordered}
     for legs in opened.values():
         check_legs(legs)
     databases = tuple(
-        Legs(opened[kind], cut=[one.name for one in kinds[kind] if one.cut], named=selection.channels)
+        Legs(
+            opened[kind],
+            cut=[one.name for one in kinds[kind] if one.cut],
+            named=selection.channels,
+            notes=left_out if kind == ordered[0] else (),
+        )
         for kind in ordered
     )
+    sources = [source for source in sources if any(source in used for used in kinds.values())]
     _refuse_unknown_channels(databases, selection)
     check_companions(databases)
-    return Run(tuple(source.name for source in sources), databases, tuple(sources))
+    names, reopen = tuple(source.name for source in sources), partial(_reopen, tuple(sources), selection, input_format)
+    return Run(names, databases, tuple(sources), reopen=reopen)
+
+
+def _reopen(sources: Sequence[Source], selection: Selection, input_format: str, surroundings: Surroundings) -> Run:
+    return open_sources(sources, selection, input_format).within(surroundings)
+
+
+def _sort_by_format(sources: Sequence[Source]) -> tuple[dict[str, list[Source]], list[str]]:
+    """Sort the files of a run by their formats, and say which of those that a pattern matched are left out.
+
+    Of a pattern the histories are used, as of a folder: a table only if there is no database of a solver.
+
+    Raises
+    ------
+    FormatError
+        If a file that was named is no history, or none of a pattern is.
+    """
+    kinds: dict[str, list[Source]] = {}
+    foreign: list[tuple[Source, FormatError]] = []
+    for source in sources:
+        try:
+            kinds.setdefault(_format(source), []).append(source)
+        except FormatError as error:
+            if not source.by_pattern:
+                raise
+            foreign.append((source, error))
+    if foreign and not kinds:
+        raise foreign[0][1]
+    notes = [_left_out(source, str(error)) for source, error in foreign]
+    if any(READERS[kind].solver for kind in kinds):
+        tables = [source for source in kinds.get("csv", []) if source.by_pattern]
+        notes += [
+            f"{source.name} was left out: a table beside databases of the solver; name it to use it"
+            for source in tables
+        ]
+        named = [source for source in kinds.pop("csv", []) if source not in tables]
+        kinds |= {"csv": named} if named else {}
+    return kinds, notes
+
+
+def _left_out(source: Source, refusal: str) -> str:
+    reason = refusal.removeprefix(f"{source.name}: ").partition(";")[0].removesuffix(", an energy history was expected")
+    return f"{source.name} was left out: {reason}"
 
 
 def _refuse_unknown_channels(databases: Sequence[Legs], selection: Selection) -> None:
@@ -112,22 +149,15 @@ def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:
         raise FormatError(f"no time {time!r} in {' and '.join(kinds)}, the time is 'time'; leave `time` out")
 
 
-def _is_deck(head: bytes) -> bool:
-    """Whether a deck begins, behind comments only."""
-    lines = head.removeprefix(b"\xef\xbb\xbf").split(b"\n")
-    first = next((line for line in lines if line.strip() and not line.lstrip().startswith(b"$")), b"")
-    return first.startswith((b"*", b"#", b"/")) and re.match(_DECK, first) is not None
-
-
 def _format(source: Source) -> str:
-    head = source.data[:_HEAD]
-    if _is_deck(head):
-        found = f"{source.name}: this is a deck, an energy history was expected"
-        raise FormatError(f"{found}; name the glstat, matsum, binout or T01 of its run")
-    for begins, what, way_out in _OTHERS:
-        if re.match(begins, head, re.DOTALL):
-            raise FormatError(f"{source.name}: this is {what}, an energy history was expected; {way_out}")
+    """Return the format of a file: a signature decides first, a text is a table only if it is nothing else."""
+    head = _head_of(source)
+    is_binary = b"\0" in head
+    if is_binary:
+        _refuse_foreign(source.name, head)
     for kind, listed in READERS.items():
+        if kind == "csv" and not is_binary:
+            _refuse_foreign(source.name, head)
         if re.search(listed.hint, head, re.DOTALL) and reader(kind).recognises(head):
             return kind
     if re.search(r"(^|[/\\])d3(plot|part|dump|thdt)[^/\\]*$", source.name):
@@ -135,6 +165,22 @@ def _format(source: Source) -> str:
         raise FormatError(f"{source.name}: {what}; name the glstat, matsum or binout of the run")
     found = f"{source.name}: binary data of no known format, one of {', '.join(READERS)} was expected"
     raise FormatError(f"{found}; export the energy history as text")
+
+
+def _refuse_foreign(name: str, head: bytes) -> None:
+    from d2rpick.histories.foreign import refuse_foreign  # not above: the databases of solvers do without
+
+    refuse_foreign(name, head)
+
+
+def _head_of(source: Source) -> bytes:
+    """Return the beginning of a file, with some of what comes after the legend of an ASCII database of LS-DYNA."""
+    head = source.data[:_HEAD]
+    if b"{BEGIN LEGEND}" in head and b"{END LEGEND}" not in head:
+        end = source.data[:_LONGEST_LEGEND].find(b"{END LEGEND}")
+        if end >= 0:
+            head = source.data[: end + _HEAD]
+    return head
 
 
 # Energies of two legs at a time that both have are the same within this share of the largest, else the runs differ.

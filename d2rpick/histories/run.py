@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from itertools import compress
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -13,12 +14,13 @@ from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, if_written, listing
 from d2rpick.histories.database import check_sum, doubts
 from d2rpick.histories.history import Balance, Given, History, Momenta, Samples, Track
-from d2rpick.histories.names import QUANTITIES, Part, Selection, menu, quantity_note, select_parts
+from d2rpick.histories.meaning import is_any_internal_energy, note_other_quantity, note_unused_energies
+from d2rpick.histories.names import QUANTITIES, Part, Selection, menu, select_parts
 from d2rpick.histories.samples import median
 from d2rpick.histories.surroundings import UNKNOWN, Surroundings
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from d2rpick.histories.database import Legs
     from d2rpick.histories.source import Source
@@ -34,6 +36,7 @@ class Run:
     """Databases of one run, one per format, those that say most of it first.
 
     ``sources`` name their files; ``files`` are what was read of them.  ``surroundings`` act on the model from outside.
+    ``reopen`` opens the same files again within other surroundings: so it is copied, also to another process.
     """
 
     def __init__(
@@ -42,12 +45,19 @@ class Run:
         databases: tuple[Legs, ...],
         files: tuple[Source, ...] = (),
         surroundings: Surroundings = UNKNOWN,
+        reopen: Callable[[Surroundings], Run] | None = None,
     ) -> None:
         self.sources, self.databases, self.files, self.surroundings = sources, databases, files, surroundings
+        self._reopen = reopen
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self._reopen is None:
+            raise TypeError(f"{self.name}: only a run that was opened from files can be copied")
+        return self._reopen, (self.surroundings,)
 
     def within(self, surroundings: Surroundings) -> Run:
         """Give the same run with what is known of its surroundings."""
-        return Run(self.sources, self.databases, self.files, surroundings)
+        return Run(self.sources, self.databases, self.files, surroundings, self._reopen)
 
     @property
     def name(self) -> str:
@@ -72,8 +82,21 @@ class Run:
         FormatError when something is not there, with what there is.
         """
         history = self._energy(selection)
+        notes = (*history.notes, *self.unused_energies(selection))
         flying = select_parts(selection.flying, self.parts, self.name) if selection.flying else None
-        return replace(history, evidence=_Written(self, history.parts, flying), surroundings=self.surroundings)
+        evidence = _Written(self, history.parts, flying)
+        return replace(history, evidence=evidence, surroundings=self.surroundings, notes=notes)
+
+    def unused_energies(self, selection: Selection) -> tuple[str, ...]:
+        """Return notes on the channels of tables that look like energies but are neither selected nor understood."""
+        notes: list[str] = []
+        for database in self.databases:
+            if not database.named_by_people or not database.channels:
+                continue
+            chosen = if_written(partial(_selected_channels, database, selection))
+            if chosen is not None:
+                notes += note_unused_energies(database.channels, {*chosen, *database.quantities.values()})
+        return tuple(notes)
 
     def momenta(self, chosen: Sequence[Part] | None, flying: Sequence[Part] | None) -> tuple[Momenta, ...]:
         """Give the momentum of the parts and that of the whole model, as far as they are written.
@@ -265,7 +288,7 @@ class Run:
             raise FormatError(f"{self.name}: an energy is given twice; name each once")
         columns = [database.channel(name) for name in names]
         channel = " + ".join(names)
-        notes = quantity_note(channel)
+        notes = note_other_quantity(channel)
         energy = columns[0] if len(columns) == 1 else np.sum(columns, axis=0)
         history = self._history_of(database, database.time, energy, channel, names, notes, None)
         return history if len(columns) == 1 else _with_terms(history, names, np.stack(columns, axis=1))
@@ -337,6 +360,14 @@ class _Written(Given):
             return super().kinetic_energy(parts)
         values = if_written(lambda: self._run.part_kinetic_energies(parts))
         return None if values is None else Track(self._run.part_time, values.sum(axis=1))
+
+
+def _selected_channels(database: Legs, selection: Selection) -> list[str]:
+    """Return the channels that are taken as energy by default, or selected, and the internal energies passed over."""
+    if selection.energy:
+        passed_over = filter(is_any_internal_energy, database.channels)
+        return [*(database.find(name) for name in selection.energy), *passed_over]
+    return [database.energy_channel] if database.energy_channel else []
 
 
 def _median_of_some(values: Samples) -> Samples:

@@ -112,6 +112,26 @@ def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
     return keep, tuple(notes)
 
 
+# At least this share of the states has the time of the state before, if each time stands in two rows or more.
+_REPEATED: Final = 0.49
+FEWEST_TIMES: Final = 3  # below, rows of one time may be chance
+
+
+def count_rows_per_time(time: Samples) -> int:
+    """Return in how many rows each of the times (n,) stands, in the median; 1 if most times stand alone.
+
+    Examples
+    --------
+    >>> count_rows_per_time(np.array([0.0, 0.0, 0.1, 0.1, 0.2, 0.2])), count_rows_per_time(np.array([0.0, 0.1, 0.1]))
+    (2, 1)
+    """
+    if time.size < 2 * FEWEST_TIMES or np.count_nonzero(time[1:] == time[:-1]) < _REPEATED * time.size:
+        return 1
+    first_rows = np.flatnonzero(np.append(True, time[1:] != time[:-1]))
+    rows = np.diff(np.append(first_rows, time.size))
+    return int(np.sort(rows)[rows.size // 2])
+
+
 # A restarted run goes on with its output interval; another curve or an unsorted table has another one.
 _ALIKE = 2.0
 
@@ -121,10 +141,12 @@ def of_one_run(time: Samples, place: Callable[[int], str]) -> Samples:
     state = _not_a_restart(time)
     if state is None:
         return time
-    raise FormatError(
-        f"{place(state)}: time steps back from {time[state - 1]:g} to {time[state]:g}, increasing times or one restart "
-        "were expected; sort the rows, or put each curve into its own file"
-    )
+    found = f"{place(state)}: time steps back from {time[state - 1]:g} to {time[state]:g}"
+    if time[state] <= time[0]:
+        cure = "another curve or part begins here: put each into its own file"
+    else:
+        cure = "sort the rows, or put each curve into its own file"
+    raise FormatError(f"{found}, increasing times or one restart were expected; {cure}")
 
 
 def _not_a_restart(time: Samples) -> int | None:

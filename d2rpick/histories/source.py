@@ -30,13 +30,15 @@ _NUMBER = r"\d+\.?\d*|\.\d+"  # compiled where it is needed, as the next one
 class Source(NamedTuple):
     """The unpacked bytes of one file, those of a big one still on its disk, under the name the user gave it.
 
-    ``cut`` is True when packed data ends early: ``data`` is what could be unpacked of ``packed``.
+    ``cut`` is True when packed data ends early: ``data`` is what could be unpacked of ``packed``.  ``by_pattern`` is
+    True if a pattern matched the file, and nobody named it.
     """
 
     name: str
     data: bytes | OnDisk
     cut: bool = False
     packed: bytes | OnDisk | None = None
+    by_pattern: bool = False
 
     def sha256(self) -> str:
         """SHA-256 of the bytes that were read, as they lay on the disk or came in by standard input.
@@ -74,7 +76,8 @@ def open_files(names: Sequence[str]) -> list[Source]:
     """
     files = expand(names)
     before = {name: _state(name) for name in files}
-    sources = [open_source(name) for name in files]
+    given = {*names, *(file for name in names if not _is_pattern(name) for file in _files(name))}
+    sources = [open_source(name)._replace(by_pattern=name not in given) for name in files]
     for name, state in before.items():
         now = _state(name)
         if len(files) > 1 and not (now.continues(state) if now and state else now is state):
@@ -120,12 +123,16 @@ def _files(name: str) -> Sequence[str]:
         return [name]
     if is_folder:
         return _databases(path)
-    if any(sign in name for sign in "*?["):
+    if _is_pattern(name):
         found = sorted(str(file) for file in Path(path.anchor).glob(name.removeprefix(path.anchor)) if file.is_file())
         if not found:
             raise FormatError(f"{name}: no file matches; check the name and the folder")
         return found
     return [name]
+
+
+def _is_pattern(name: str) -> bool:
+    return any(sign in name for sign in "*?[")
 
 
 def _databases(folder: Path) -> list[str]:

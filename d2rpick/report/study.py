@@ -165,6 +165,8 @@ def td_of(answer: Study) -> str:
     """The td of all runs, or the window in which each has its own."""
     if answer.td_window:
         return "of each run in {:.6g} to {:.6g}".format(*answer.td_window)
+    if answer.td is None:
+        return "of each run in its longest flight"
     return f"{answer.td:.6g}"
 
 

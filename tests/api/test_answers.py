@@ -164,11 +164,12 @@ def test_tables_lose_nothing_that_the_json_has(tmp_path: Path) -> None:
 def test_a_table_of_a_run_holds_its_energies() -> None:
     run = d2.read(BOX)
     every, box = run.to_frame(parts="all"), run.to_frame(parts="box")
-    assert [*every] == [part.id for part in run.parts]
+    assert [*every] == [part.title for part in run.parts]
     assert every.index.name == "time"
-    assert every.attrs["titles"][1] == "box"
-    pd.testing.assert_series_equal(every[1], box[1])
-    assert d2.suggest(run, 0.37, parts="box", replay=False).situation.history.energy == pytest.approx(box[1].to_numpy())
+    assert (every.attrs["titles"][1], every.attrs["ids"]["box"]) == ("box", 1)
+    pd.testing.assert_series_equal(every["box"], box["box"])
+    history = d2.suggest(run, 0.37, parts="box", replay=False).situation.history
+    assert history.energy == pytest.approx(box["box"].to_numpy())
 
 
 def test_a_frame_is_the_file_it_would_be() -> None:
@@ -296,7 +297,7 @@ def test_a_check_names_the_command_that_repeats_it(asked: dict[str, Any]) -> Non
 def test_a_run_is_shown_by_what_its_files_hold(tmp_path: Path) -> None:
     assert repr(d2.read(ENERGY)) == f"Run({ENERGY!r}: csv, 1501 states, 0 to 0.15)"
     assert repr(d2.read(MATSUM)) == f"Run({MATSUM!r}: matsum, 421 states, 0 to 0.42, 2 parts)"
-    damaged = put(tmp_path / "run.csv", "time,energy\n0,0\nx,1\n")
+    damaged = put(tmp_path / "run.csv", "time,energy\n0,0\nx,1\n2,2\n")
     assert repr(d2.read(damaged)) == f"Run({str(damaged)!r}: csv)"
     assert loose.read(damaged)._repr_html_() is None  # the notebook shows that instead
 
@@ -399,7 +400,38 @@ def test_a_figure_shows_itself() -> None:
         (lambda: loose.plan(d2.read(BOX), colour=1), TypeError, "no argument 'colour'; expected one of after, "),
         (lambda: loose.suggest(pd.DataFrame({"t": [1.0]}), 0.06), TypeError, r"DataFrame; give .* d2rpick.from_frame"),
         (lambda: loose.suggest(d2.read(ENERGY), 0.06, margin=-1), ValueError, "margin is -1, a number of at least 0"),
-        (lambda: loose.suggest(d2.read(ENERGY), 0.06, tolerance=None), TypeError, "tolerance is None"),
+        (lambda: loose.suggest(d2.read(ENERGY), 0.06, tolerance="a"), TypeError, "tolerance is 'a'"),
+        (lambda: loose.suggest(d2.read(ENERGY), np.array([1, 2])), TypeError, r"td is array\(\[1, 2\]\), a number"),
+        (lambda: loose.suggest(d2.read(ENERGY), np.True_), TypeError, "td is .*True_?, a number was expected"),
+        (lambda: loose.suggest(d2.read(ENERGY), 0.06, replay="no"), TypeError, "replay is 'no', True or False"),
+        (lambda: loose.suggest(d2.read(ENERGY), 0.06, strict=1), TypeError, "strict is 1, True or False"),
+        (lambda: loose.suggest(d2.read(ENERGY), 0.06, oscillator=5, v0=1.0), TypeError, "oscillator is 5, a d2rpick"),
+        (lambda: loose.suggest(d2.read(ENERGY), td_window={1, 2}), TypeError, "td_window is .*, a pair of times"),
+        (lambda: loose.suggest(d2.read(ENERGY), td_window=np.eye(2)), TypeError, "td_window is .*, a pair of times"),
+        (
+            lambda: loose.suggest(d2.read(BOX), 0.3, parts={1: "a"}),
+            TypeError,
+            r"parts is \{1: 'a'\}; a number, a title",
+        ),
+        (lambda: loose.suggest(d2.read(BOX), 0.3, parts=np.array([1.5])), TypeError, "parts holds"),
+        (lambda: loose.suggest(d2.read(BOX), 0.3, deck=DECK, weights=3), TypeError, "weights is 3, d2rpick.Weights or"),
+        (lambda: loose.verify(d2.read(ENERGY), switched=ENERGY), TypeError, "switched is .*; give what d2rpick.read"),
+        (lambda: loose.plan(d2.read(ENERGY), done=0.1), TypeError, "done is 0.1; pairs of times were expected"),
+        (lambda: loose.plan(d2.read(ENERGY), done=[0.1]), TypeError, r"done\[0\] is 0.1, a pair of times"),
+        (lambda: loose.plan(d2.read(ENERGY), before="a", done=[(0.1, 0.2)]), TypeError, "before is 'a'; give what"),
+        (lambda: loose.read(ENERGY, energy=1.5), TypeError, "energy is 1.5, the name or number of a column"),
+        (lambda: loose.read(ENERGY, channels=["a"]), TypeError, r"channels is \['a'\], a mapping"),
+        (lambda: loose.read(ENERGY, input_format=3), TypeError, "input_format is 3, a text was expected"),
+        (
+            lambda: loose.read(pd.DataFrame({"t": [1.0]})),
+            TypeError,
+            r"a table of type DataFrame; give it to d2rpick.from_",
+        ),
+        (lambda: loose.read(np.zeros((3, 2))), TypeError, r"a table of type ndarray; give it to d2rpick.from_frame"),
+        (lambda: loose.from_frame(np.zeros(3)), TypeError, r"frame is an array of shape \(3,\), a table was expected"),
+        (lambda: loose.from_frame({"t": [1.0]}, name=3), TypeError, "name is 3, a text was expected"),
+        (lambda: loose.card(5, parts=1), TypeError, "windows is 5; pairs of times were expected"),
+        (lambda: d2.read(ENERGY).overview(deck=loose.Run), TypeError, "deck is "),
         (lambda: loose.suggest(d2.read(ENERGY), 0.06, v0=6.0), ValueError, "oscillator and v0 go together"),
         (lambda: loose.suggest(d2.read(BOX), 0.3, parts=[]), ValueError, "parts is empty"),
         (lambda: loose.suggest(d2.read(BOX), 0.3, parts=[1.5]), TypeError, "parts holds 1.5"),

@@ -1,6 +1,8 @@
 """``import d2rpick`` is light, offers every public name, and its types hold for whoever uses it."""
 
+import ast
 import re
+from importlib import import_module
 from inspect import isfunction, signature
 from typing import assert_type
 
@@ -9,7 +11,7 @@ import pytest
 
 import d2rpick as d2
 from d2rpick.api.arguments import Choosing
-from tests.command import ENERGY
+from tests.command import ENERGY, ROOT
 from tests.examples import PAGES, text_of
 
 
@@ -48,9 +50,20 @@ def test_what_a_function_takes_can_be_made_by_public_names() -> None:
     assert {"Weights", "Oscillator", "Run"} <= words
 
 
+def test_the_stub_gives_editors_every_public_name_and_no_other() -> None:
+    """Static tools follow no names that are imported when they are first used."""
+    tree = ast.parse((ROOT / "d2rpick/__init__.pyi").read_text("utf-8"))
+    imported = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
+    assert {one.asname for node in imported for one in node.names} == {*d2.__all__}
+    for node in imported:
+        module = import_module(node.module or "")
+        for one in node.names:
+            assert getattr(module, one.name) is getattr(d2, one.name)
+
+
 def test_other_names_are_not() -> None:
     with pytest.raises(AttributeError, match="has no attribute 'sugest'"):
-        d2.sugest  # noqa: B018  # type: ignore[attr-defined]
+        d2.sugest  # type: ignore[attr-defined]  # noqa: B018
 
 
 def test_types_hold_for_a_stranger() -> None:

@@ -134,7 +134,6 @@ def test_no_runs_are_a_question_of_usage(args: tuple[str, ...]) -> None:
     result = run(*args, stdin=b"# none\n\n")
     assert (result.exit_code, result.stdout) == (2, "")
     assert "give their names, or a list with --from" in result.stderr
-    assert "name the time to switch back with --td" in refused("study", ENERGY)
 
 
 # Lists, folders, patterns.

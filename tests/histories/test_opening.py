@@ -13,7 +13,7 @@ import pytest
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.formats import READERS
-from d2rpick.histories.opening import Selection
+from d2rpick.histories.opening import Selection, open_run
 from tests.command import put
 from tests.reading import read_history
 
@@ -140,3 +140,116 @@ def test_missing_files_and_folders_are_named(tmp_path: Path) -> None:
 def test_the_selection_reaches_the_reader(file: Write) -> None:
     assert read_history([file(CSV)], Selection(time="2", energy=("1",))).time.tolist() == [1.0, 1.5]
     np.testing.assert_array_equal(read_history([file(GLSTAT)], Selection(energy=("Internal Energy",))).energy, [2e-20])
+
+
+DYNA_HEAD = b" one shell\n                         ls-dyna smp.123456 s           date 02/02/2020\n\n"
+LEGEND = b"{BEGIN LEGEND}\n Entity #        Title\n        1     contact one\n{END LEGEND}\n\n"
+
+
+@pytest.mark.parametrize(
+    ("data", "name", "reason"),
+    [
+        (
+            DYNA_HEAD + LEGEND + b" slave         1 time 0.0E+00  x 0.0 y 0.0 z 0.0\n",
+            "a",
+            "rcforc.* of LS-DYNA, which holds",
+        ),
+        (
+            DYNA_HEAD + LEGEND + b"\n\n contact interface energy output at time 0.0\n 1 0.0 0.0\n",
+            "a",
+            "this is the sleout",
+        ),
+        (DYNA_HEAD + LEGEND + b" n o d a l   p r i n t   o u t   f o r\n 1 0.0 0.0\n", "a", "this is the nodout"),
+        (DYNA_HEAD + LEGEND + b" something new\n 1 0.0 0.0\n", "run/NCFORC", "this is the ncforc of LS-DYNA"),
+        (
+            DYNA_HEAD + b"\n something new\n 1 0.0 0.0\n",
+            "a",
+            "this is an ASCII database of LS-DYNA, .*; name the glstat",
+        ),
+        (b"    -1\n    58\nNONE\n  1 2 3\n  4 5 6\n", "h.unv", r"this is a universal file \(UNV\)"),
+        (b"Test object number          :1\nName of the channel :internal energy\n0.0\n", "a.001", "ISO-MME"),
+        (
+            b"  Abaqus/Explicit 2024\n STEP 1\n INCREMENT TIME\n 0 0.0 1.0\n 1 0.1 1.0\n",
+            "a.sta",
+            "status file of Abaqus",
+        ),
+        (b' {"time": [0.0, 0.1], "ie": [1, 2]}', "a.json", "a JSON document"),
+        (b"[[0.0, 1.0],\n [0.1, 2.0]]", "a.json", "a JSON document"),
+        (b"<?xml version='1.0'?><a/>", "a.xml", "an XML or HTML document"),
+        (zipped("energy.npy"), "a.npz", r"an archive of numpy arrays \(npz\), .*from_frame"),
+        (b"\x93NUMPY\x01\0v\0", "a.npy", "a numpy array"),
+        (b"HKSRD0  " + bytes(99), "a.odb", r"\(odb\), .*XY report"),
+        (b"ARROW1\0\0" + bytes(99), "a.arrow", "an arrow file, .*from_frame"),
+        (b"SQLite format 3\0" + bytes(99), "a.db", "an SQLite database"),
+        (b"/RUN/BOX/2\n0.02\n/TFILE/4\n0.001 0.1\n", "BOX_0002.rad", "this is a deck"),
+        (b" " + b"*" * 72 + b"\n **  OpenRadioss Engine\n 0.0 1.0\n 0.1 2.0\n", "BOX_0001.out", "a listing of Radioss"),
+        (
+            b"\n  CYCLE    TIME      TIME-STEP  I-ENERGY\n 0 0.0 1E-6 0.0\n 1 0.1 1E-6 1.0\n",
+            "BOX_0001.out",
+            "a listing",
+        ),
+        (b" Date: 1\n | LS-DYNA, A Program for Nonlinear Dynamic |\n 0 1\n 1 2\n", "d3hsp", "a listing of LS-DYNA"),
+    ],
+)
+def test_a_file_beside_the_histories_is_named_for_what_it_is(file: Write, data: bytes, name: str, reason: str) -> None:
+    with pytest.raises(FormatError, match=reason) as error:
+        read_history([file(data, Path(name).name)])
+    assert "\n" not in str(error.value)
+    assert "; " in str(error.value)  # the way out
+
+
+def test_a_matsum_is_told_by_its_parts_behind_any_legend(file: Write) -> None:
+    states = b" time =   0.0000E+00\n mat.#=    1             inten=   0.0000E+00     kinen=   0.0000E+00\n"
+    entries = b"".join(b"%9d     a part\n" % number for number in range(1, 2000))
+    long_legend = b"{BEGIN LEGEND}\n Entity #        Title\n" + entries + b"{END LEGEND}\n\n"
+    for text in (DYNA_HEAD + LEGEND, DYNA_HEAD + LEGEND + states, DYNA_HEAD + long_legend + states):
+        assert open_run([file(text)]).databases[0].format == "matsum"
+    with pytest.raises(FormatError, match="this is the rcforc"):
+        open_run([file(DYNA_HEAD + long_legend + b" slave         1 time 0.0E+00  x 0.0 y 0.0 z 0.0\n")])
+
+
+def test_words_about_a_solver_in_a_table_make_no_listing_of_it(file: Write) -> None:
+    head = b"# written by OpenRadioss engine, LS-DYNA and Abaqus/Explicit\n"
+    assert read_history([file(head + CSV)]).energy.tolist() == [1.0, 2.0, 1.5]
+
+
+STATES = (
+    b" time =   0.0000E+00\n mat.#=    1             inten=   0.0000E+00     kinen=   1.0000E+00\n"
+    b" time =   1.0000E-01\n mat.#=    1             inten=   1.0000E+00     kinen=   0.0000E+00\n"
+)
+
+
+def test_a_pattern_gives_what_the_folder_gives_and_names_what_it_leaves_out(tmp_path: Path) -> None:
+    for name, data in {
+        "matsum": DYNA_HEAD + b"\n" + STATES,
+        "nodout": DYNA_HEAD + b" n o d a l   p r i n t   o u t\n 1 0.0 0.0\n",
+        "a_deck.k": b"*KEYWORD\n*END\n",
+        "energy.csv": CSV,
+        "remarks.txt": b"only words\n",
+    }.items():
+        put(tmp_path / name, data)
+    by_folder, by_pattern = (open_run([str(name)]) for name in (tmp_path, tmp_path / "*"))
+    assert by_pattern.sources == by_folder.sources == (str(tmp_path / "matsum"),)
+    notes = " ".join(by_pattern.notes)
+    assert "nodout was left out: this is the nodout of LS-DYNA, which holds no internal energy" in notes
+    assert "a_deck.k was left out: this is a deck" in notes
+    assert "energy.csv was left out: a table beside databases of the solver; name it to use it" in notes
+    assert "remarks.txt was left out" in notes
+    assert not by_folder.notes
+
+
+def test_what_is_named_beside_a_pattern_is_not_left_out(tmp_path: Path) -> None:
+    put(tmp_path / "nodout", DYNA_HEAD + b" n o d a l   p r i n t   o u t\n 1 0.0 0.0\n")
+    with pytest.raises(FormatError, match="this is the nodout"):
+        open_run([str(put(tmp_path / "matsum", DYNA_HEAD + b"\n" + STATES)), str(tmp_path / "nodout")])
+    with pytest.raises(FormatError, match="this is the nodout"):
+        open_run([str(tmp_path / "nod*")])
+
+
+@pytest.mark.parametrize("order", [("runT01", "runT02"), ("runT02", "runT01")])
+def test_legs_that_start_together_are_ordered_by_name(order: tuple[str, str], tmp_path: Path) -> None:
+    rows = "".join(f"{i / 10},{i}\n" for i in range(5))
+    for name in order:
+        put(tmp_path / name, f"time,internal_energy\n{rows}")
+    run = open_run([str(tmp_path / name) for name in order])
+    assert run.databases[0].source == f"{tmp_path / 'runT01'}, {tmp_path / 'runT02'}"

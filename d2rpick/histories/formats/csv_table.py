@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.base.caching import cached_property
-from d2rpick.base.errors import FormatError, listing
+from d2rpick.base.errors import FormatError, if_written, listing
 from d2rpick.histories.database import Database
+from d2rpick.histories.formats.cells import as_number, is_skipped, split
 from d2rpick.histories.formats.curves import Curves, find_curves
-from d2rpick.histories.formats.layout import Layout, as_number, find_layout, is_skipped, split, unique
-from d2rpick.histories.formats.plain_rows import plain_rows
+from d2rpick.histories.formats.layout import Layout, find_layout, unique, with_thousands
+from d2rpick.histories.formats.rows import find_line, read_columns
 from d2rpick.histories.formats.text import UTF16, Text, is_whole, precisions
-from d2rpick.histories.names import internal_energies, is_time, meant, near_miss, quantity_of, refuse_other_quantity
-from d2rpick.histories.samples import of_one_run
+from d2rpick.histories.meaning import find_internal_energies, find_meaning, is_time, quantity_of, refuse_other_quantity
+from d2rpick.histories.names import meant, near_miss
+from d2rpick.histories.samples import count_rows_per_time, of_one_run
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from d2rpick.histories.history import Precision, Samples
     from d2rpick.histories.names import Selection
@@ -38,32 +40,67 @@ def own_times(layout: Layout) -> tuple[int, ...]:
     return times if len(times) > 1 and 2 * len(times) == layout.columns and not others else ()
 
 
-def time_column(source: str, layout: Layout, wanted: str | None, energies: Sequence[str]) -> tuple[int, list[str]]:
-    """Column of the time, and what had to be assumed; of curves side by side the one beside the first energy."""
+def numeric_columns(layout: Layout, sample: Sequence[Sequence[str]]) -> frozenset[int]:
+    """Return the columns that hold a number in one of the sampled rows; all of them without a row."""
+    columns = range(layout.columns)
+    if not sample:
+        return frozenset(columns)
+    return frozenset(column for column in columns if any(as_number(row[column], ".") is not None for row in sample))
+
+
+def _sampled_rows(text: Text, begin: int, layout: Layout) -> list[list[str]]:
+    """Cells of rows at the start, at the end and evenly between."""
+    lines = [line for line in text.sample(begin) if not is_skipped(line)]
+    return [row for line in lines if len(row := split(line, layout.separator)) >= layout.columns]
+
+
+def time_column(
+    source: str, layout: Layout, wanted: str | None, energies: Sequence[str], numeric: frozenset[int]
+) -> tuple[int, list[str]]:
+    """Column of the time, and what had to be assumed; of curves side by side the one beside the first energy.
+
+    Without a column that is called a time, it is the first ``numeric`` one that is no quantity, and not called like the
+    numbers of the rows.
+    """
     if wanted is not None:
         return named_column(source, layout, wanted), []
     times = [i for i, column in enumerate(layout.names[: layout.trusted]) if is_time(column)]
     if own_times(layout):
         if energies:
             return named_column(source, layout, energies[0]) // 2 * 2, []
-        return internal_energy(source, layout, times) // 2 * 2, []
+        return internal_energy(source, layout, times, numeric) // 2 * 2, []
     if len(times) > 1:
         found = f"{source}: {len(times)} columns are named like a time"
         raise FormatError(f"{found}; choose with `time`: {_menu(layout, times)}")
-    if layout.names and not times:
-        return 0, [f"no column has the name of a time; {layout.name(0)!r}, the first, was taken as the time"]
-    return (times[0] if times else 0), []
+    if times:
+        return times[0], []
+    if not layout.names:
+        return min(numeric, default=0), []
+    candidates = sorted(column for column in numeric if find_meaning(layout.name(column)) is None)
+    if len(candidates) > 1 and layout.name(candidates[0]).casefold() in _ROW_NUMBERS:
+        del candidates[0]
+    if not candidates:
+        what = f"{source}: no column has the name of a time"
+        raise FormatError(f"{what}; choose with `time`: {_menu(layout, range(layout.columns))}")
+    first = candidates[0]
+    return first, [f"no column has the name of a time; {layout.name(first)!r}, the first, was taken as the time"]
 
 
-def internal_energy(source: str, layout: Layout, times: Sequence[int]) -> int:
-    """Pick the only column beside the times, or else the one named like an internal energy."""
+# What spreadsheets, pandas and others call the numbers of the rows; in front they have no name at all.
+_ROW_NUMBERS: Final = frozenset(
+    {"column 1", "unnamed: 0", "index", "nr", "nr.", "no", "no.", "row", "id", "#", "state", "increment", "inc", "step"}
+)
+
+
+def internal_energy(source: str, layout: Layout, times: Sequence[int], numeric: frozenset[int]) -> int:
+    """Pick the only numeric column beside the times, or else the one named like an internal energy."""
     apart = {*times}
-    beside = [column for column in range(layout.columns) if column not in apart]
+    beside = [column for column in range(layout.columns) if column not in apart and column in numeric]
     if len(beside) == 1:
         refuse_other_quantity(layout.channel(beside[0]), source)
         return beside[0]
     sure = [column for column in beside if column < layout.trusted]
-    named = [sure[i] for i in internal_energies([layout.name(column) for column in sure])]
+    named = [sure[i] for i in find_internal_energies([layout.name(column) for column in sure])]
     if len(named) == 1:
         return named[0]
     found = f"{len(named)} columns are" if named else "no column is"
@@ -86,9 +123,14 @@ def named_column(source: str, layout: Layout, wanted: str) -> int:
         raise FormatError(
             f"{source}: the header has {len(layout.names)} names for {layout.columns} values (th_to_csv writes "
             f"such files), so the name of column {found[0] + 1} is not sure; "
-            f"only these may be used: {_menu(layout, range(2))}"
+            f"only these may be used: {_menu(layout, range(layout.trusted))}"
         )
     return found[0]
+
+
+def _unsure_columns(layout: Layout) -> str:
+    found = f"the header has {len(layout.names)} names for {layout.columns} values (th_to_csv writes such files)"
+    return f"{found}: only the first {layout.trusted} columns are sure to have their own name and are used"
 
 
 def _menu(layout: Layout, columns: Sequence[int]) -> str:
@@ -109,15 +151,21 @@ class Table(Database):
     """One table, a `Database` without parts; FormatError when it is none, or a selected column is not there."""
 
     format = "csv"
+    named_by_people = True
 
     def __init__(self, text: Text, selection: Selection) -> None:
         self.source, self._text = text.name, text
-        self._layout = layout = find_layout(text)
-        self._own_times = own_times(layout)
-        self._time, notes = time_column(text.name, layout, selection.time, selection.energy)
-        self._columns = labelled(layout, self._time)
-        self.channels, self.time_unit = tuple(self._columns), layout.unit(self._time)
+        layout = find_layout(text)
         self._begin = text.place(layout.start)
+        self._layout = layout = with_thousands(layout, _sampled_rows(text, self._begin, layout))
+        self._numeric = numeric_columns(layout, self._sample())
+        self._own_times = own_times(layout)
+        self._time, notes = time_column(text.name, layout, selection.time, selection.energy, self._numeric)
+        self._columns = labelled(layout, self._time)
+        self.channels, left_out = self._split_channels()
+        self.time_unit = layout.unit(self._time)
+        self._failed: dict[int, FormatError] = {}
+        self._notes: list[str] = []
         self._needed = self._asked(selection)
         self._read: dict[int, Samples] = {}
         self._together = True  # until a line shows otherwise
@@ -127,12 +175,32 @@ class Table(Database):
                 text.take_rest()
             else:
                 notes.append("the last line has no line end and may be cut; it was left out")
-        self.notes = tuple(notes)
+        if layout.sure not in (None, layout.columns) and layout.columns > 2:
+            notes.append(_unsure_columns(layout))
+        self._notes += [*notes, *left_out]
+
+    @property
+    def notes(self) -> tuple[str, ...]:  # type: ignore[override]
+        """What was assumed and left out, known once the columns that matter were read."""
+        if_written(lambda: self.time)
+        return tuple(self._notes)
+
+    def _split_channels(self) -> tuple[tuple[str, ...], list[str]]:
+        """Return the columns that hold numbers, and a note on each named one that holds none."""
+        channels, notes = list[str](), list[str]()
+        for name, column in self._columns.items():
+            if column in self._numeric:
+                channels.append(name)
+                continue
+            words = [row[column] for row in self._sample() if row[column]]
+            if words:
+                notes.append(f"column {column + 1} {name!r} holds no numbers ({words[0]!r}) and was left out")
+        return tuple(channels), notes
 
     @property
     def energy_channel(self) -> str:
         """The column named like an internal energy, or the only one beside the time; else FormatError."""
-        column = internal_energy(self.source, self._layout, [self._time, *self._own_times])
+        column = internal_energy(self.source, self._layout, [self._time, *self._own_times], self._numeric)
         return next(label for label, own in self._columns.items() if own == column)
 
     def find(self, wanted: str) -> str:
@@ -149,8 +217,22 @@ class Table(Database):
     @cached_property
     def time(self) -> Samples:
         """Times as they stand in the file, shape (n,) [time]; FormatError where they are not those of one run."""
-        place = partial(line_of, self._text, self._begin, self._layout, self._time)
-        return of_one_run(self._values(self._time), lambda state: f"{self.source}:{place(state)}")
+        place = partial(find_line, self._text, self._begin, self._layout, self._time)
+        times = of_one_run(self._values(self._time), lambda state: f"{self.source}:{place(state)}")
+        if count_rows_per_time(times) > 1:
+            self._refuse_rows_of_parts(times)
+        return times
+
+    def _refuse_rows_of_parts(self, times: Samples) -> None:
+        """Raise FormatError if each time stands in a row for each part."""
+        from d2rpick.histories.interleaved import refuse_rows_of_parts  # not above: hardly a table is one
+
+        for column in self._needed[1:]:
+            energy = if_written(partial(self._values, column))
+            if energy is not None and energy.size == times.size:
+                rows = self._sample()[: self._text.some]
+                others = {name: [row[place] for row in rows] for name, place in self._columns.items()}
+                refuse_rows_of_parts(self.source, times, energy, others)
 
     def channel(self, name: str) -> Samples:
         """One column, shape (n,); FormatError with the line of a value that is no number."""
@@ -160,7 +242,7 @@ class Table(Database):
         own = column - 1 if column - 1 in self._own_times else self._time
         if own == self._time:
             return self._values(column)
-        times, values = columns_of(self._text, self._begin, self._layout, (own, column))
+        times, values = read_columns(self._text, self._begin, self._layout, (own, column)).columns
         if not np.array_equal(times, self.time):
             raise FormatError(f"{self.source}: {name!r} has other times than the first curve that is asked for")
         return values
@@ -174,7 +256,8 @@ class Table(Database):
     @cached_property
     def _printed(self) -> list[list[str]]:
         """Sampled rows that show how numbers were printed."""
-        return [row for row in self._sample() if row[self._time]]  # not behind a curve's end
+        # not behind a curve's end, and no words below a table
+        return [row for row in self._sample() if as_number(row[self._time], ".") is not None]
 
     def _asked(self, selection: Selection) -> list[int]:
         """Columns that must be whole in a last line without end: those asked for, or what is taken by default."""
@@ -188,11 +271,12 @@ class Table(Database):
 
     def _sample(self) -> list[list[str]]:
         """Cells, with decimal points, of rows at the start, at the end and evenly between."""
-        layout = self._layout
-        lines = (line.replace(layout.decimal, ".") for line in self._text.sample(self._begin) if not is_skipped(line))
-        return [row for line in lines if len(row := split(line, layout.separator)) >= layout.columns]
+        rows = _sampled_rows(self._text, self._begin, self._layout)
+        return [[self._layout.plain(cell) for cell in row] for row in rows]
 
     def _values(self, column: int) -> Samples:
+        if column in self._failed:
+            raise self._failed[column]
         if column not in self._read and self._together:
             # first what was asked for, and what tells of the flight; who wants more mostly wants all the others
             telling = [own for name, own in self._columns.items() if quantity_of(name)]
@@ -203,12 +287,26 @@ class Table(Database):
                 self._keep([self._time, *(others - {self._time})])
             except FormatError:  # which may be of a column that nobody needs
                 self._together = False
+                self._read_one_by_one([other for other in telling if other != column])
         if column not in self._read:
             self._keep([self._time, column])
         return self._read[column]
 
+    def _read_one_by_one(self, columns: Sequence[int]) -> None:
+        """Read columns of quantities; one that has no number in each row is left out with a note."""
+        for column in columns:
+            try:
+                self._keep([self._time, column])
+            except FormatError as error:
+                self._failed[column] = error
+                if column not in self._needed:
+                    reason = str(error).removeprefix(f"{self.source}:").removesuffix("; repair or delete the line")
+                    self._notes.append(f"{self._layout.name(column)!r} was left out: line {reason}")
+
     def _keep(self, columns: Sequence[int]) -> None:
-        for column, values in zip(columns, columns_of(self._text, self._begin, self._layout, columns), strict=True):
+        read = read_columns(self._text, self._begin, self._layout, columns)
+        self._notes += [note for note in read.notes if note not in self._notes]
+        for column, values in zip(columns, read.columns, strict=True):
             values.flags.writeable = False  # so that nobody needs a copy of his own
             self._read[column] = values
 
@@ -219,100 +317,7 @@ def _is_whole(line: str, sample: Sequence[Sequence[str]], layout: Layout, used: 
     last = len(cells) - 1
     if len(cells) < layout.columns or last not in used:
         return len(cells) >= layout.columns
-    return is_whole(cells[last].replace(layout.decimal, "."), [row[last] for row in sample])
-
-
-# Numbers in the rows: all at once where they are alike, line by line where they are not.
-
-
-def columns_of(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> list[Samples]:
-    """Columns ``used`` of the rows from byte ``begin`` on, that of the times first, each of shape (rows,).
-
-    Between the rows may be comments and blank lines.  Where all cells are empty the curve has ended: another one beside
-    it goes on.  FormatError with the line that is wrong.
-    """
-    tables = [table for _, table in _tables(text, begin, layout, used)] or [np.empty((0, len(used)))]
-    return [np.concatenate([table[:, place] for table in tables]) for place in range(len(used))]
-
-
-def line_of(text: Text, begin: int, layout: Layout, time: int, state: int) -> int:
-    """Give the number of the line in which a state stands, counted from 0."""
-    for numbers, _ in _tables(text, begin, layout, [time]):
-        if state < len(numbers):
-            return numbers[state]
-        state -= len(numbers)
-    raise AssertionError("there is such a state")
-
-
-def _tables(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> Iterator[tuple[Sequence[int], Samples]]:
-    """Numbers of lines and their values piece by piece: line by line only where they are not all alike."""
-    curve = _Curve(text.name, layout, used)
-    number = layout.start + 1
-    for piece in text.pieces(begin, large=text.is_large):
-        table = plain_rows(piece, layout, used, is_large=text.is_large)
-        if table is not None and np.isfinite(table).all() and not curve.stops_before(float(table[0, 0])):
-            rows = len(table)
-            yield range(number, number + rows), table
-            curve.before, curve.gap = float(table[-1, 0]), False
-        else:
-            rows = piece.count(b"\n")
-            states = list(curve.states(text.rows(piece), number))
-            if states:
-                yield [line for line, _ in states], np.array([state for _, state in states])
-        number += rows
-
-
-class _Curve:
-    """What of a table was seen so far, where it is taken line by line."""
-
-    def __init__(self, name: str, layout: Layout, used: Sequence[int]) -> None:
-        self._name, self._layout, self._used = name, layout, used
-        self.before: float | None = None  # time of the last state
-        self.gap = self._ended = False
-
-    def stops_before(self, time: float) -> bool:
-        """Whether a state of this time is one of another curve."""
-        return self._ended or (self.gap and self.before is not None and time <= self.before)
-
-    def states(self, rows: Sequence[str], first: int) -> Iterator[tuple[int, list[float]]]:
-        """Give line and values of each state in rows of which ``first`` is the number of the first."""
-        layout, used = self._layout, self._used
-        for number, row in enumerate(rows, first):
-            if is_skipped(row):
-                self.gap = True
-                continue
-            where = f"{self._name}:{number}"
-            cells = _cells(where, row, layout)
-            if not any(cells[column] for column in used) and self.before is not None:
-                self._ended = True
-                continue
-            state = [_value(where, layout, column, cells[column]) for column in used]
-            if self.stops_before(state[0]):
-                found = "a curve continues after empty cells" if self._ended else "the time starts again after a gap"
-                what = f"{where}: {found}, one curve was expected"
-                raise FormatError(f"{what}; repair it or put each curve into its own file")
-            self.gap, self.before = False, state[0]
-            yield number, state
-
-
-def _cells(where: str, row: str, layout: Layout) -> list[str]:
-    cells = split(row, layout.separator)
-    if len(cells) == layout.columns + 1 and not cells[-1]:
-        cells.pop()
-    if layout.names and is_time(cells[0]) and is_time(layout.names[0]):
-        raise FormatError(f"{where}: a second header, another curve begins here; put each curve into its own file")
-    if len(cells) != layout.columns:
-        found = "1 value" if len(cells) == 1 else f"{len(cells)} values"
-        raise FormatError(f"{where}: {found}, {layout.columns} were expected as in the other rows; repair the line")
-    return cells
-
-
-def _value(where: str, layout: Layout, column: int, cell: str) -> float:
-    value = as_number(cell, layout.decimal)
-    if value is None or not np.isfinite(value):
-        found = f"{where}: {layout.name(column)!r} is {cell[:60]!r}, a number was expected"
-        raise FormatError(f"{found}; repair or delete the line")
-    return value
+    return is_whole(layout.plain(cells[last]), [row[last] for row in sample])
 
 
 def write(columns: Mapping[str, Samples]) -> bytes:

@@ -2,14 +2,14 @@
 
 LS-PrePost's Curveplot: a head of word, title, x label, y label; for each curve ``name #pts=number``, lines with a star,
 pairs of numbers and ``endcurve``.  LS-PrePost's XY pairs: a line with the number of pairs, then these.  T/HIS ``.cur``:
-title, x label, y label, name and pairs, ``CONTINUE`` between curves, comments with a dollar.  DYNAFORM: the number of
-curves; for each ``number 'name'`` and pairs.
+title, x label, y label, name and pairs, ``CONTINUE`` between curves, comments with a dollar; the Oasys programs write
+type and factor behind a label.  DYNAFORM: the number of curves; for each ``number 'name'`` and pairs.
 """
 
 from __future__ import annotations
 
 import re
-from itertools import chain, islice
+from itertools import chain, islice, takewhile
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -17,9 +17,11 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.database import Database
-from d2rpick.histories.formats.layout import as_number, unique
+from d2rpick.histories.formats.cells import as_number
+from d2rpick.histories.formats.layout import unique
 from d2rpick.histories.formats.text import is_whole, precisions
-from d2rpick.histories.names import Selection, internal_energies, is_time, refuse_other_quantity, resolve, unit_of
+from d2rpick.histories.meaning import find_internal_energies, is_time, refuse_other_quantity
+from d2rpick.histories.names import Selection, resolve, unit_of
 from d2rpick.histories.samples import of_one_run
 
 if TYPE_CHECKING:
@@ -30,6 +32,10 @@ if TYPE_CHECKING:
 
 _POINTS: Final = "#pts="
 _DYNAFORM: Final = r"\s*\d+\s+'([^']*)'\s*"  # compiled where it is needed
+# Type and factor that the Oasys programs write behind a label: "Time <TIME/0.001>;".  Compiled where it is needed.
+_TYPE: Final = r"\s*<([^<>/]*)(?:/([^<>]*))?>\s*;?\s*$"
+_UNITS_OF_TIME: Final = {1.0: "s", 1e-3: "ms", 1e-6: "us"}
+_FEWEST_LABELS: Final = 3  # of x, y and the curve; the title may be blank
 _MOST_DIGITS: Final = 12  # no file has more pairs than such a number says
 
 
@@ -59,7 +65,7 @@ class _CurveText:
         self.source, self._text = text.name, text
         self.unended = bool(text.unended.strip())
         self.curves: list[_Curve] = []
-        self.x_label = ""
+        self.x_label = self.time_unit = ""
         self.stops = ""
         self.last = 0  # number of the last line
 
@@ -107,10 +113,11 @@ class Curves(Database):
     """Curves of one text; a `Database` without parts, whose times are those of the curves that are asked for."""
 
     format = "csv"
+    named_by_people = True
 
     def __init__(self, found: _CurveText, selection: Selection) -> None:
         self.source = found.source
-        self.time_unit = unit_of(found.x_label)
+        self.time_unit = unit_of(found.x_label) or found.time_unit
         self._curves = dict(zip(unique([one.name for one in found.curves], "curve"), found.curves, strict=True))
         self.channels = tuple(self._curves)
         notes = [f"the file ends within {found.stops}"] if found.stops else []
@@ -132,7 +139,7 @@ class Curves(Database):
     @property
     def energy_channel(self) -> str:
         """The only curve, or the only one named like an internal energy; else FormatError with all there are."""
-        fitting = range(1) if len(self.channels) == 1 else internal_energies(self.channels)
+        fitting = range(1) if len(self.channels) == 1 else find_internal_energies(self.channels)
         if len(fitting) != 1:
             found = f"{len(fitting)} curves are" if fitting else "no curve is"
             what = f"{self.source}: {found} named like an internal energy"
@@ -205,23 +212,44 @@ def _curveplot(found: _CurveText) -> bool:
 
 
 def _t_his(found: _CurveText) -> bool:
-    top = found.top(5)
-    if len(top) < 5 or any(map(_is_pair, top[:4])) or not is_time(top[1].strip()) or not _is_pair(top[4]):
+    top = [_without_type(line) for line in found.top(5)]
+    labels = list(takewhile(lambda line: not _is_pair(line), top))  # the title may be blank
+    x_label = next((place for place in (0, 1) if place < len(labels) and is_time(labels[place])), None)
+    if x_label is None or not _FEWEST_LABELS <= len(labels) < len(top):
         return False
-    found.x_label = top[1].strip()
-    labels: list[str] = []
+    found.x_label = labels[x_label]
+    found.time_unit = _unit_of_type(found.top(5)[x_label])
+    labels = []
     in_head = True
     for number, line in found.lines():
-        if line.strip() == "CONTINUE":
+        if line.strip().upper() == "CONTINUE":
             in_head, labels = True, []
         elif in_head and not _is_pair(line):
-            labels.append(line.strip())
+            labels.append(_without_type(line))
         else:
             if in_head:
                 found.curves.append(_Curve(": ".join(reversed(labels[-2:])) or f"curve {len(found.curves) + 1}"))
                 in_head = False
             found.add(number, line)
     return True
+
+
+def _without_type(line: str) -> str:
+    """Return a label without its type and factor.
+
+    Examples
+    --------
+    >>> _without_type(" Time <TIME/0.001>;"), _unit_of_type("Time <TIME/1.0E-3>;"), _unit_of_type("Time <TIME>;")
+    ('Time', 'ms', '')
+    """
+    return re.sub(_TYPE, "", line).strip()
+
+
+def _unit_of_type(line: str) -> str:
+    """Return the unit of time that the factor of a label says, empty if there is none."""
+    found = re.search(_TYPE, line)
+    factor = as_number(found[2].strip(), ".") if found and found[2] else None
+    return "" if factor is None else _UNITS_OF_TIME.get(factor, "")
 
 
 def _dynaform(found: _CurveText) -> bool:

@@ -15,6 +15,7 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError
 from d2rpick.base.files import unpacked_beyond
+from d2rpick.histories.meaning import is_time
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 _PICKLED_NAME: Final = re.compile(rb"^a?V([^\n]*)$", re.MULTILINE)
 _PICKLED_INDEX_NAME: Final = re.compile(rb"^s?a?Vindex_name\n(?:p\d+\n)?V([^\n]*)$", re.MULTILINE)
 _BOOKKEEPING: Final = ("_i_", "#")  # PyTables' index trees, MATLAB's references
+_ERF_BLOCK: Final = "/erfblock"
 _WIDEST: Final = 64  # a matrix with more columns and no names for them is no table of histories
 
 
@@ -48,13 +50,17 @@ class Column(NamedTuple):
         return self.path.rpartition("/")[0]
 
     @property
-    def name(self) -> str:
-        """Its own name in lower case, without unit; of ``internal_energy/value`` the first."""
+    def is_time(self) -> bool:
+        """Whether it is called a time; of ``time/value`` the first step counts."""
         group, _, leaf = self.path.rpartition("/")
         if leaf in ("value", "values") and group:
             leaf = group.rpartition("/")[2]
-        bare = re.sub(r"\s*[\[(][^\d\])]+[\])]$", "", leaf)
-        return re.sub(r"[\s\-]+", "_", bare.strip().lower())
+        return is_time(leaf)
+
+    @property
+    def is_whole_number(self) -> bool:
+        """Whether its values are whole numbers, such as those of parts."""
+        return self.dtype.startswith(("int", "uint"))
 
     def load(self, file: h5py.File, content: bytes, source: str) -> Samples:
         """Its values, shape (size,), of a file with that ``content``; FormatError unless all are finite."""
@@ -159,7 +165,7 @@ def columns_of(file: h5py.File) -> tuple[Column, ...]:
         if isinstance(item, h5py.Dataset):
             found.extend(_dataset_columns(name, item))
             return
-        reader = _PANDAS.get(_text(item.attrs.get("pandas_type")))
+        reader = _erf_block if name.endswith(_ERF_BLOCK) else _PANDAS.get(_text(item.attrs.get("pandas_type")))
         if reader is not None:
             found.extend(reader(name, item))
             done.append(name + "/")
@@ -183,7 +189,7 @@ def _dataset_columns(name: str, dataset: h5py.Dataset) -> Iterator[Column]:
     if max(shape) == size:
         yield Column(name, size, str(dtype), name)
     elif len(shape) == 2:
-        titles = _titles(dataset.attrs.get("columns", dataset.attrs.get("names")))
+        titles = _exodus_titles(dataset) or _titles(dataset.attrs.get("columns", dataset.attrs.get("names")))
         yield from _matrix_columns(name, dataset, titles)
 
 
@@ -202,6 +208,39 @@ def _matrix_columns(name: str, dataset: h5py.Dataset, titles: list[str]) -> Iter
             return
     for index, path in enumerate(paths):
         yield Column(path, dataset.shape[1 - axis], str(dataset.dtype), name, place=(axis, index))
+
+
+def _erf_block(name: str, block: h5py.Group) -> Iterator[Column]:
+    """Return the columns of a time history of ERF-HDF5 (VPS), such as ``.../MODEL/INTERNAL_ENERGY/ZONE1/erfblock``.
+
+    ``res`` has shape (states, entities, components), ``indexval`` the times and ``entid`` the numbers of the entities.
+    Only quantities of one component are columns.  Those of entities beside the model have the number in their path.
+    """
+    results, times, entities = (block.get(key) for key in ("res", "indexval", "entid"))
+    if results is None or times is None or results.dtype.kind not in "iuf" or times.dtype.kind not in "iuf":
+        return
+    states = math.prod(times.shape)
+    if results.ndim != 3 or states != results.shape[0] or results.shape[2] != 1:
+        return
+    variable = name.removesuffix(_ERF_BLOCK).rpartition("/")[0]  # without the zone
+    yield Column(f"{variable}/time", states, str(times.dtype), times.name[1:])
+    of_model = "/MODEL/" in variable or "/GLOBAL/" in variable
+    numbers = [] if entities is None else np.ravel(entities[()]).tolist()
+    for place in range(results.shape[1]):
+        number = "" if of_model or place >= len(numbers) else f"/{numbers[place]}"
+        where = None if results.shape[1] == 1 else (1, place)
+        yield Column(f"{variable}{number}/value", states, str(results.dtype), results.name[1:], place=where)
+
+
+def _exodus_titles(dataset: h5py.Dataset) -> list[str]:
+    """Return the names that Exodus keeps beside a matrix of values: ``name_glo_var`` beside ``vals_glo_var``."""
+    import h5py
+
+    place = (dataset.name or "").rpartition("/")[2]
+    beside = dataset.parent.get(f"name_{place.removeprefix('vals_')}") if place.startswith("vals_") else None
+    if not isinstance(beside, h5py.Dataset) or beside.dtype.kind != "S" or beside.ndim != 2:
+        return []
+    return [b"".join(letters).decode("utf-8", "replace").strip("\0 ") for letters in beside[()].tolist()]
 
 
 def _compound_columns(name: str, dataset: h5py.Dataset, index_name: str) -> Iterator[Column]:

@@ -22,8 +22,10 @@ from d2rpick.base.files import beyond, unpacked_beyond
 from d2rpick.histories.database import DIGITS, Database
 from d2rpick.histories.formats.hdf5_columns import Column, check_data, columns_of, finite
 from d2rpick.histories.history import Precision, Samples
-from d2rpick.histories.names import Part, Selection, near_miss, refuse_other_quantity
-from d2rpick.histories.samples import of_one_run
+from d2rpick.histories.interleaved import refuse_rows_of_parts
+from d2rpick.histories.meaning import find_internal_energies, refuse_other_quantity
+from d2rpick.histories.names import Part, Selection, near_miss
+from d2rpick.histories.samples import count_rows_per_time, of_one_run
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -33,8 +35,6 @@ if TYPE_CHECKING:
     from d2rpick.histories.source import Source
 
 SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
-_ENERGY_NAMES: Final = ("internal_energy", "ie", "inten", "allie", "e_int")
-_TIME_NAMES: Final = ("time", "t")
 _MANY: Final = 12  # candidates named in a message
 _BRANCHES: Final = ("glstat", "matsum")
 # What h5py makes of a damaged file.
@@ -76,6 +76,7 @@ class Columns(Database):
     """The columns of an HDF5 file of any layout, by their paths; a `Database` without parts."""
 
     format = "hdf5"
+    named_by_people = True
 
     def __init__(self, file: io.BytesIO, source: str, selection: Selection) -> None:
         self._file, self.source = file, source
@@ -98,7 +99,13 @@ class Columns(Database):
     def time(self) -> Samples:
         """Values of the time column, shape (n,) [time]; FormatError where they are not those of one run."""
         path = self._time_column.path
-        return of_one_run(self._load(self._time_column), lambda state: f"{self.source}: {path}, value {state + 1}")
+        times = of_one_run(self._load(self._time_column), lambda state: f"{self.source}: {path}, value {state + 1}")
+        if count_rows_per_time(times) > 1:
+            energies = self._energies or [_only_energy(self._columns, self._named_time, self.source)]
+            beside = [column for column in self._columns if column.size == times.size and column.is_whole_number]
+            others = {column.path: self._load(column).astype(int).tolist() for column in beside}
+            refuse_rows_of_parts(self.source, times, self._load(energies[0]), others)
+        return times
 
     def channel(self, name: str) -> Samples:
         """Values of one column, shape (n,); FormatError when it is not as long as the time."""
@@ -108,7 +115,17 @@ class Columns(Database):
                 f"{self.source}: {column.path} has {column.size} values, {self._time_column.path} has "
                 f"{self._time_column.size}; choose columns of one length"
             )
+        self._check_own_times(column)
         return self._load(column)
+
+    def _check_own_times(self, column: Column) -> None:
+        """Raise FormatError if a column has times beside it that are not those of the energy."""
+        beside = [time for time in self._columns if time.is_time and time.group == column.group]
+        if len(beside) != 1 or beside[0] in (self._time_column, column):
+            return
+        if not np.array_equal(self._load(beside[0]), self.time):
+            found = f"{self.source}: {column.path} has other times ({beside[0].path}) than the energy"
+            raise FormatError(f"{found} ({self._time_column.path}); choose columns of the same times")
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
         """Digits that the stored types hold."""
@@ -228,9 +245,9 @@ def _named(path: str, columns: Sequence[Column], source: str) -> Column:
 
 def _only_energy(columns: Sequence[Column], time: Column | None, source: str) -> Column:
     """Find the only column called an internal energy, or the only one beside the time."""
-    fitting = [column for column in columns if column.name in _ENERGY_NAMES]
+    fitting = [columns[place] for place in find_internal_energies([column.path for column in columns])]
     if not fitting:
-        times = [time] if time else [column for column in columns if column.name in _TIME_NAMES]
+        times = [time] if time else [column for column in columns if column.is_time]
         fitting = [
             column
             for column in columns
@@ -245,7 +262,7 @@ def _only_time(columns: Sequence[Column], energy: Column, source: str) -> Column
     """Find the time in the group of the energy, else in the nearest group around it."""
     group = energy.group
     while True:
-        fitting = [column for column in columns if column.name in _TIME_NAMES and column.group == group]
+        fitting = [column for column in columns if column.is_time and column.group == group]
         if fitting or not group:
             return _only(fitting, columns, f"the time of {energy.path}", source)
         group = group.rpartition("/")[0]

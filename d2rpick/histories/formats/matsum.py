@@ -62,8 +62,11 @@ _OVERFLOW: Final = re.compile(rb"\*+ +inten=")
 
 
 def recognises(data: bytes) -> bool:
-    """Whether ``data``, the beginning of a file, looks like a matsum."""
-    return b"\n{BEGIN LEGEND}" in data or (b"\n" + _START in data and b"\n mat.#=" in data)
+    """Return True if ``data``, the beginning of a file, looks like a matsum: with parts, or nothing after a legend."""
+    if b"\n mat.#=" in data:
+        return b"\n" + _START in data
+    _, legend, states = data.partition(b"\n{END LEGEND}")
+    return bool(legend) and not states.strip()
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[Matsum]:

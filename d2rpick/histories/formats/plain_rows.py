@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.formats.layout import Layout
     from d2rpick.histories.history import Samples
 
+_UNIT_SEPARATOR: Final = "\x1f"  # no table has this control character
 # How far a reader that rounds may be off, of the number: the fast one of pandas takes 17 digits, with leading zeros.
 _ROUNDED: Final = 1e-9
 
@@ -22,12 +23,17 @@ def plain_rows(piece: bytes, layout: Layout, used: Sequence[int], *, is_large: b
     ``is_large`` is whether they are part of a large text, for which the import of a fast reader pays.  None unless all
     rows have all cells and no other line is between them.
     """
+    if layout.thousands:
+        return None
+    if b'"' in piece:
+        unquoted = _without_quotes(piece, layout)
+        if unquoted is None:
+            return None
+        piece, layout = unquoted, layout._replace(separator=_UNIT_SEPARATOR)
     if layout.decimal == ",":
         if b"." in piece:
             return None
         piece = piece.replace(b",", b".")
-    if b'"' in piece:
-        return None  # a separator in quotes is none
     taken, chosen = [*range(layout.columns)], None
     closed = piece[: piece.index(b"\n")].endswith((layout.separator or "\n").encode("latin-1"))
     if layout.separator and (closed or sorted(used) != taken):
@@ -44,6 +50,17 @@ def plain_rows(piece: bytes, layout: Layout, used: Sequence[int], *, is_large: b
     if table.shape != (lines, len(taken)):
         return None  # blank lines were passed over
     return table if taken == [*used] else table[:, np.searchsorted(taken, used)]
+
+
+def _without_quotes(piece: bytes, layout: Layout) -> bytes | None:
+    """Put a sign that no text has between the cells of rows that are all in quotes; None if there are others."""
+    if layout.separator is None:
+        return None
+    between = f'"{layout.separator}"'.encode("latin-1")
+    if not piece.startswith(b'"') or not piece.endswith(b'"\n'):
+        return None
+    piece = piece[1:-2].replace(between, _UNIT_SEPARATOR.encode()).replace(b'"\n"', b"\n") + b"\n"
+    return None if b'"' in piece else piece
 
 
 def _by_numpy(piece: bytes, layout: Layout, columns: Sequence[int] | None) -> Samples:

@@ -69,8 +69,17 @@ def recognises(head: bytes) -> bool:
 
 
 def open_legs(sources: Sequence[Source], _: Selection) -> list[TimeHistory]:
-    """Open each file as a leg of the run."""
-    return [TimeHistory(source.data, source.name) for source in sources]
+    """Open each file as a leg of the run.
+
+    A time history of its own output interval (T01a, by /ATFILE) has no global values: beside others it is no leg.
+    """
+    histories = [TimeHistory(source.data, source.name) for source in sources]
+    legs = [history for history in histories if history.channels] or histories
+    for history in histories:
+        if history not in legs:
+            note = f"{history.source} was left out: without global values it is no leg of the run but an additional"
+            legs[0].notes += (f"{note} time history (/ATFILE); name it alone to use its parts",)
+    return legs
 
 
 class TimeHistory(Database):

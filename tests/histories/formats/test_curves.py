@@ -173,3 +173,37 @@ def test_pairs_below_their_count_are_a_curve() -> None:
 def test_refused(text: str, energy: list[str], reason: str) -> None:
     with pytest.raises(FormatError, match=reason):
         read(text, *energy)
+
+
+OASYS = """\
+$ written by a postprocessor
+Drop of a case
+Time <TIME/0.001>;
+Internal energy <ENERGY>;
+Whole model
+0.0, 1.0
+1.0, -3.25
+2.5, 4.0
+continue
+Drop of a case
+Time <TIME/0.001>;
+Kinetic energy <ENERGY/1.0>;
+Whole model
+0.0 5.0
+1.0 6.0
+2.5 7.0
+"""
+
+
+@pytest.mark.parametrize("title", ["Drop of a case\n", "\n"])
+def test_labels_of_the_oasys_programs_have_types_and_factors(title: str) -> None:
+    history = read(OASYS.replace("Drop of a case\n", title))
+    assert (history.channel, history.time_unit) == ("Whole model: Internal energy", "ms")
+    assert states_of(history) == FIRST
+    assert history.balance is not None
+    assert history.balance.kinetic is not None
+    assert history.balance.kinetic.tolist() == [5.0, 6.0, 7.0]
+
+
+def test_a_type_without_factor_says_no_unit() -> None:
+    assert read(OASYS.replace("/0.001", "")).time_unit == ""

@@ -299,7 +299,7 @@ def test_damaged_files_that_were_found_are_refused(name: str) -> None:
 
 def test_a_line_end_in_a_name_does_not_break_the_message() -> None:
     with pytest.raises(FormatError, match=r"internal_energ\\n \(21\)"):
-        read(io.BytesIO(unpacked(stored("faults/hdf5_newline_in_error.h5.gz"))))
+        read(io.BytesIO(unpacked(stored("faults/hdf5_newline_in_error.h5.gz"))), "energy")
 
 
 def test_the_only_column_of_another_quantity_has_to_be_asked_for() -> None:

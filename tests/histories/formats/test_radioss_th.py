@@ -9,6 +9,7 @@ from d2rpick.base.errors import D2RPickError, FormatError
 from d2rpick.histories.formats import csv_table, radioss_th
 from d2rpick.histories.formats.radioss_th import TimeHistory, recognises
 from d2rpick.histories.opening import Selection
+from d2rpick.histories.source import Source
 from tests.command import BOX, ROLLOVER
 from tests.computed import stored, unpacked
 from tests.damaged_files import FILES, printed
@@ -201,3 +202,13 @@ def test_a_number_that_is_none_is_refused() -> None:
     made.state(0.25, [float("nan")] * 22, [0.0] * 16)
     with pytest.raises(D2RPickError, match="energy of state 3 is nan, a finite number"):
         run_of(radioss_th, bytes(made.data)).history(Selection())
+
+
+def test_an_additional_history_without_global_values_is_no_leg() -> None:
+    whole, additional = (bytes(t01(5, [MadePart(3, "box")], globals_=count).data) for count in (12, 0))
+    for order in (("RUNT01", "RUNT01a"), ("RUNT01a", "RUNT01")):
+        contents = {"RUNT01": whole, "RUNT01a": additional}
+        legs = radioss_th.open_legs([Source(name, contents[name]) for name in order], Selection())
+        assert [leg.source for leg in legs] == ["RUNT01"]
+        assert "RUNT01a was left out: without global values it is no leg of the run" in legs[0].notes[-1]
+    assert radioss_th.open_legs([Source("RUNT01a", additional)], Selection())[0].parts

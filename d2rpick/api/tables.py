@@ -1,0 +1,76 @@
+"""Tables of other libraries, made frames of pandas without importing any of these libraries."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_SERIES_NAME: Final = "internal_energy"
+_METHODS_OF_TABLES: Final = ("to_pandas", "to_dataframe", "to_frame", "get_column", "columns")
+
+
+def is_table(value: Any) -> bool:
+    """Return True if a value is a table of some library, or an array of numbers, and no name of a file.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> is_table(np.zeros((3, 2))), is_table(np.array(["a.csv"])), is_table({"time": [0.0]}), is_table("a.csv")
+    (True, False, True, False)
+    """
+    kind = getattr(getattr(value, "dtype", None), "kind", "")
+    if kind:
+        return hasattr(value, "ndim") and kind not in "OUST"
+    # of its type: to look at the columns of a lazy frame would compute them
+    return isinstance(value, Mapping) or any(hasattr(type(value), name) for name in _METHODS_OF_TABLES)
+
+
+def is_plain_array(table: Any) -> bool:
+    """Return True for an array of numpy whose columns have no names."""
+    return hasattr(table, "__array_interface__") and table.dtype.names is None
+
+
+def frame_of_table(table: Any) -> pd.DataFrame:
+    """Return a table as a pandas.DataFrame.
+
+    Parameters
+    ----------
+    table : pandas, polars, pyarrow or xarray object, numpy array, or mapping of columns
+        A Series or DataArray is the internal energy.  An array of numbers (n, k) has columns without names.
+
+    Raises
+    ------
+    TypeError
+        If it is nothing of that.
+    """
+    import pandas as pd
+
+    if isinstance(table, pd.DataFrame):
+        return table
+    if isinstance(table, pd.Series):
+        return table.to_frame(_SERIES_NAME)
+    if hasattr(table, "to_dataframe"):  # xarray; only an array has a name
+        frame = table.to_dataframe(name=_SERIES_NAME) if hasattr(table, "name") else table.to_dataframe()
+        return pd.DataFrame(frame)
+    if hasattr(table, "collect"):  # a frame of polars that is not computed yet
+        table = table.collect()
+    if hasattr(table, "columns") and hasattr(table, "get_column"):  # polars, whose own way needs pyarrow
+        return pd.DataFrame({str(name): table.get_column(name).to_numpy() for name in table.columns})
+    if hasattr(table, "to_pandas"):  # pyarrow and others
+        frame = table.to_pandas()
+        return frame.to_frame(_SERIES_NAME) if isinstance(frame, pd.Series) else pd.DataFrame(frame)
+    if isinstance(table, Mapping):
+        return pd.DataFrame({str(name): values for name, values in table.items()})
+    kind = getattr(getattr(table, "dtype", None), "kind", "")
+    if kind == "V" or (kind and kind in "iuf" and table.ndim == 2):
+        return pd.DataFrame(table)
+    found = f"frame is of type {type(table).__name__}"
+    if kind:
+        found = f"frame is an array of shape {table.shape}"
+    raise TypeError(
+        f"{found}, a table was expected: of pandas, polars, pyarrow or xarray, an array of rows and columns, "
+        "or a mapping of columns"
+    )

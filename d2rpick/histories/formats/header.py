@@ -1,0 +1,165 @@
+"""What stands above the rows of a table: names and units of the columns, and the title of a curve."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Final
+
+from d2rpick.base.errors import FormatError, listing
+from d2rpick.base.tuples import NamedTuple
+from d2rpick.histories.formats.cells import is_skipped, split
+from d2rpick.histories.meaning import is_time
+from d2rpick.histories.names import is_unit, normalised
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+_SHORT: Final = 60
+# The first columns of th_to_csv of OpenRadioss, in every version; some versions name more or fewer columns behind them
+# than they write (OpenRadioss/Tools, issue 98).
+_TH_TO_CSV: Final = (
+    *("time", "internalenergy", "kineticenergy", "xmomentum", "ymomentum", "zmomentum", "mass", "timestep"),
+    *("rotationenergy", "externalwork", "springenergy", "contactenergy", "hourglassenergy"),
+)
+_SURE_WITHOUT: Final = 2  # columns that may be used below too many names of another program
+
+
+class Header(NamedTuple):
+    """Names and units of columns, empty where there are none; only the first ``sure`` columns have their own name."""
+
+    names: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+    title: str = ""
+    sure: int | None = None
+
+
+def read_header(where: str, lines: Sequence[str], separator: str | None, columns: int) -> Header:
+    """Read the lines above the rows of a table of so many ``columns``.
+
+    Parameters
+    ----------
+    where : str
+        File and line of the first row, for messages.
+    lines : sequence of str
+        All lines above the first row.
+    separator : str or None
+        Between the cells; None for blanks.
+    columns : int
+        How many values each row has.
+
+    Raises
+    ------
+    FormatError
+        If the names belong to other columns than the rows have.
+    """
+    rows = list(_split_rows(lines, separator, columns))
+    units: tuple[str, ...] = ()
+    if len(rows) > 1 and len(rows[-1]) == columns and all(map(is_unit, rows[-1])):
+        units = tuple(rows.pop())
+    if not rows:
+        return Header(_commented_names(lines, separator, columns), units)
+    if composed := _compose_names(rows, columns):
+        return Header(tuple(composed), units)
+    names, title = rows[-1], ""
+    if len(names) > 1 and not names[-1]:
+        names = names[:-1]
+        if len(rows) > 1:  # LS-PrePost: a line of titles, then "Time," or "Time,A8874,"
+            title = next((cell for cell in reversed(rows[-2]) if cell), "")
+    if columns == 2 and len(names) == 1 and is_time(names[0]):
+        names, title = [names[0], title], ""
+    if len(names) == 1:
+        return Header(units=units, title=names[0])
+    sure = _count_sure(where, names, columns)
+    if columns == 2 < len(names):
+        title = " ".join(filter(None, names[2:]))  # 3DEXPERIENCE: the third name is the curve's
+        sure = None
+    return Header(tuple(names), units, title, sure)
+
+
+def shorten(line: str) -> str:
+    """Quote a line in a message, cut to what is readable."""
+    line = line.strip()
+    return repr(line if len(line) <= _SHORT else line[:_SHORT] + "...")
+
+
+def _count_sure(where: str, names: Sequence[str], columns: int) -> int | None:
+    """Return how many columns are sure to have their own name, None for all; FormatError if hardly one is."""
+    if len(names) == columns:
+        return None
+    if tuple(map(normalised, names[: len(_TH_TO_CSV)])) == _TH_TO_CSV[:columns]:
+        return min(len(_TH_TO_CSV), columns)
+    if len(names) < columns or not is_time(names[0]):
+        raise FormatError(
+            f"{where}: {columns} values below a header of {len(names)} names "
+            f"({listing(names)}), expected as many of both; correct the header or delete it"
+        )
+    return _SURE_WITHOUT
+
+
+def _compose_names(rows: Sequence[Sequence[str]], columns: int) -> list[str]:
+    """Join rows of names from the last one upwards until each column has its own; nothing if the last is enough.
+
+    Examples
+    --------
+    >>> _compose_names([["Run 12", ""], ["Time", "Energy", "Energy"], ["", "internal", "kinetic"]], 3)
+    ['Time', 'Energy internal', 'Energy kinetic']
+    """
+    names: list[str] = []
+    for level in reversed(rows):
+        cells = _fit(level, columns)
+        if not cells:
+            return []
+        upper = _fill_from_left(cells) if names else cells
+        names = [_join(*pair) for pair in zip(upper, names or [""] * columns, strict=True)]
+        if all(names) and len({*names}) == columns:
+            return names if names != cells else []
+    return []
+
+
+def _join(upper: str, lower: str) -> str:
+    return lower if is_time(lower) else f"{upper} {lower}".strip()
+
+
+def _fit(cells: Sequence[str], columns: int) -> list[str]:
+    """Return the cells without empty ones beyond the columns; nothing if there are others, or too few."""
+    if len(cells) < columns or any(cells[columns:]) or (columns == 2 and not cells[-1]):
+        return []
+    return list(cells[:columns])
+
+
+def _fill_from_left(cells: Sequence[str]) -> list[str]:
+    """Repeat a name over the empty cells behind it, which a spreadsheet has merged with it; not that of the time."""
+    filled = [cells[0]]
+    for cell in cells[1:]:
+        filled.append(cell or (filled[-1] if len(filled) > 1 else ""))
+    return filled
+
+
+def _split_rows(lines: Sequence[str], separator: str | None, columns: int) -> Iterator[list[str]]:
+    """Cells of the header lines; a quoted name may go on over a line end."""
+    pending = ""
+    for line in lines:
+        if not pending and is_skipped(line):
+            continue
+        pending = f"{pending} {line}" if pending else line
+        if pending.count('"') % 2 == 0:
+            yield _split_header(pending, separator, columns)
+            pending = ""
+    if pending:
+        yield _split_header(pending, separator, columns)
+
+
+def _split_header(line: str, separator: str | None, columns: int) -> list[str]:
+    """Cells of a header line; between blanks names may hold blanks, and what does not fit is one title."""
+    if separator is not None:
+        return split(line, separator)
+    wide = [cell.strip('"') for cell in re.split(r"\s{2,}|\t", line.strip())]
+    narrow = split(line, None)
+    return next((cells for cells in (wide, narrow) if len(cells) == columns), [line.strip()])
+
+
+def _commented_names(lines: Sequence[str], separator: str | None, columns: int) -> tuple[str, ...]:
+    """Names in the last comment line, as numpy.savetxt writes them: one per column, among them a time."""
+    comments = [line.strip().lstrip("#$%/ ") for line in lines if line.strip()]
+    cells = _split_header(comments[-1], separator, columns) if comments else []
+    return tuple(cells) if len(cells) == columns and any(map(is_time, cells)) else ()
