@@ -11,6 +11,7 @@ import numpy as np
 
 from d2rpick.base.errors import Caution, listing, name_units
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.choice.few_states import cautions_of_few_states
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.digits import above, first_as_read, not_after, window_as_read
 from d2rpick.vibration import measures
@@ -37,6 +38,7 @@ def cautions_of(situation: Situation) -> Iterator[Caution]:
     if not situation.history.complete:
         yield Caution("truncated-input", "the input ends within a state; only complete states were used")
     yield from _of_energy(situation)
+    yield from cautions_of_few_states(situation)
     yield from _of_parts(situation)
     yield from _of_flight(situation)
 

@@ -229,14 +229,14 @@ NO_EVIDENCE = Given()
 class History:
     """Internal energy of the parts to switch, over time, in the run's own consistent units.
 
-    ``time`` and ``energy`` are read-only copies, finite, of shape (n,); ``time`` increases strictly.
-    Anything else raises HistoryError.  ``source`` names the files as the user gave them, ``channel`` what
-    in them was taken for the energy, ``parts`` whose energy it is, None for the whole model;
-    ``springs`` are those of them whose energy is left out.  ``complete``
-    is False when a file stopped inside a state; ``notes`` say what was left out or assumed; ``files`` were read.
-    Where the energy is a sum, ``part_names`` (k,) and ``part_energies`` (n, k) are its terms that are not always zero.
-    ``time_unit`` is given only where the file names it; solver databases do not.  ``evidence`` tells when parts fly
-    freely; that of a file is read when it is first asked for.  ``surroundings`` act on them from outside.
+    ``time`` and ``energy`` are read-only copies, finite, of shape (n,); ``time`` increases strictly.  Anything else
+    raises HistoryError.  ``source`` names the files as the user gave them, ``channel`` what in them was taken for the
+    energy, ``parts`` whose energy it is, None for the whole model; ``springs`` are those of them whose energy is left
+    out; ``energy_format`` is that of the file which holds it.  ``complete`` is False when a file stopped inside a
+    state; ``notes`` say what was left out; ``files`` were read.  Where the energy is a sum, ``part_names`` (k,) and
+    ``part_energies`` (n, k) are its terms that are not always zero.  ``time_unit`` is given only where the file names
+    it.  ``evidence`` tells when parts fly freely; that of a file is read when it is first asked for.  ``surroundings``
+    act on them from outside.
     """
 
     time: Samples
@@ -256,6 +256,7 @@ class History:
     complete: bool = True
     notes: tuple[str, ...] = ()
     files: tuple[Source, ...] = ()
+    energy_format: str = ""
     known: Memory = field(default_factory=Memory, init=False)
 
     def __post_init__(self) -> None:

@@ -11,13 +11,13 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.database import Database, Legs
-from d2rpick.histories.formats import READERS
+from d2rpick.histories.formats import FAMILIES, READERS
 from d2rpick.histories.names import Selection
 from d2rpick.histories.run import Run
 from d2rpick.histories.source import Source, open_files
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from d2rpick.histories.database import Indices
     from d2rpick.histories.history import Samples
@@ -28,6 +28,7 @@ __all__ = ["Reader", "Run", "Selection", "Source", "open_run", "open_sources", "
 # Enough of a file for its head and more than one state of the longest blocks.
 _HEAD = 8192
 _DEFAULT = Selection()
+_DIGITS: Final = "0123456789"  # of the number of a file behind the first one of its family
 # A keyword of LS-DYNA at the start of a line, or the first line of a Radioss deck; compiled where it is needed.
 _DECK: Final = rb"\*[A-Za-z][A-Za-z_]{2}|#RADIOSS|/BEGIN"
 # What is often given instead of a history: how it begins, what it is, and the way out.
@@ -82,12 +83,12 @@ def open_run(names: Sequence[str], selection: Selection = _DEFAULT, input_format
 
 def open_sources(sources: Sequence[Source], selection: Selection = _DEFAULT, input_format: str = "auto") -> Run:
     """Open the files of one run whose bytes are at hand; arguments and errors as of `open_run`."""
-    kinds: dict[str, list[Source]] = {}
-    for source in sources:
-        kinds.setdefault(input_format if input_format != "auto" else _format(source), []).append(source)
+    kinds = _by_format(sources, input_format)
     ordered = [kind for kind in READERS if kind in kinds]
     _refuse_time_of_solver(ordered, selection.time)
-    opened = {kind: reader(kind).open_legs(kinds[kind], selection) for kind in ordered}
+    opened, notes = _opened(kinds, ordered, selection)
+    ordered = [kind for kind in ordered if kind in opened]
+    used = {source.name for kind in ordered for source in kinds[kind]}
     for legs in opened.values():
         check_legs(legs)
     databases = tuple(
@@ -96,7 +97,57 @@ def open_sources(sources: Sequence[Source], selection: Selection = _DEFAULT, inp
     )
     _refuse_unknown_channels(databases, selection)
     check_companions(databases)
-    return Run(tuple(source.name for source in sources), databases, tuple(sources))
+    behind = {name for kind in FAMILIES for name in _behind_firsts(kinds.get(kind, ()))}
+    named = tuple(source.name for source in sources if source.name in used - behind)
+    return Run(named, databases, tuple(source for source in sources if source.name in used), notes=notes)
+
+
+def _by_format(sources: Sequence[Source], input_format: str) -> dict[str, list[Source]]:
+    """Sort files by their formats; those behind the first one of a family have its format."""
+    formats: dict[str, str] = {}
+    for source in sorted(sources, key=lambda one: one.name[-2:].isdigit()):
+        first = formats.get(source.name.rstrip(_DIGITS))
+        known = first if first in FAMILIES else None
+        formats[source.name] = known or (input_format if input_format != "auto" else _format(source))
+    kinds: dict[str, list[Source]] = {}
+    for source in sources:
+        kinds.setdefault(formats[source.name], []).append(source)
+    return kinds
+
+
+def _behind_firsts(sources: Sequence[Source]) -> set[str]:
+    """Names of the files that are behind the first one of a family: this one stands for all."""
+    names = {source.name for source in sources}
+    return {name for name in names if name[-1:].isdigit() and name.rstrip(_DIGITS) in names}
+
+
+def _opened(
+    kinds: Mapping[str, list[Source]], ordered: Sequence[str], selection: Selection
+) -> tuple[dict[str, Sequence[Database]], tuple[str, ...]]:
+    """Open the files by their formats, and say what was not used.
+
+    Families of files lie beside everything that LS-DYNA writes: they count where the others leave something out, and
+    where others are there, those that cannot be read stop nothing.
+    """
+    opened: dict[str, Sequence[Database]] = {}
+    notes = []
+    for kind in ordered:
+        if kind in FAMILIES and _hold_all([leg for legs in opened.values() for leg in legs]):
+            continue
+        try:
+            opened[kind] = reader(kind).open_legs(kinds[kind], selection)
+        except FormatError as error:
+            if kind not in FAMILIES or len(ordered) == 1:
+                raise
+            notes.append(f"{error}; it was not used")
+    if not opened:
+        raise FormatError(notes[0].removesuffix("; it was not used"))
+    return opened, tuple(notes)
+
+
+def _hold_all(legs: Sequence[Database]) -> bool:
+    """Whether databases have histories of the whole model and of its parts."""
+    return any(leg.channels for leg in legs) and any(leg.parts for leg in legs)
 
 
 def _refuse_unknown_channels(databases: Sequence[Legs], selection: Selection) -> None:
@@ -130,9 +181,13 @@ def _format(source: Source) -> str:
     for kind, listed in READERS.items():
         if re.search(listed.hint, head, re.DOTALL) and reader(kind).recognises(head):
             return kind
-    if re.search(r"(^|[/\\])d3(plot|part|dump|thdt)[^/\\]*$", source.name):
+    if re.search(r"(^|[/\\.])d3(plot|part|thdt)\d+$", source.name):
+        first = source.name.rstrip(_DIGITS)
+        found = f"{source.name}: the first file of its family says what it holds"
+        raise FormatError(f"{found}; name {first}, with which all files behind it are read")
+    if re.search(r"(^|[/\\.])d3(plot|part|dump|thdt)[^/\\]*$", source.name):
         what = "this is a file of LS-DYNA's d3 family, which holds no energies that are read"
-        raise FormatError(f"{source.name}: {what}; name the glstat, matsum or binout of the run")
+        raise FormatError(f"{source.name}: {what}; name the glstat, matsum, d3plot or binout of the run")
     found = f"{source.name}: binary data of no known format, one of {', '.join(READERS)} was expected"
     raise FormatError(f"{found}; export the energy history as text")
 

@@ -34,6 +34,7 @@ class Run:
     """Databases of one run, one per format, those that say most of it first.
 
     ``sources`` name their files; ``files`` are what was read of them.  ``surroundings`` act on the model from outside.
+    ``notes`` say which files were not used.
     """
 
     def __init__(
@@ -42,12 +43,14 @@ class Run:
         databases: tuple[Legs, ...],
         files: tuple[Source, ...] = (),
         surroundings: Surroundings = UNKNOWN,
+        notes: tuple[str, ...] = (),
     ) -> None:
         self.sources, self.databases, self.files, self.surroundings = sources, databases, files, surroundings
+        self._notes = notes
 
     def within(self, surroundings: Surroundings) -> Run:
         """Give the same run with what is known of its surroundings."""
-        return Run(self.sources, self.databases, self.files, surroundings)
+        return Run(self.sources, self.databases, self.files, surroundings, self._notes)
 
     @property
     def name(self) -> str:
@@ -64,7 +67,7 @@ class Run:
     def notes(self) -> tuple[str, ...]:
         """What a user should know about the files."""
         own = (note for database in self.databases for note in database.notes)
-        return tuple(dict.fromkeys([*own, *doubts(self.databases)]))
+        return tuple(dict.fromkeys([*self._notes, *own, *doubts(self.databases)]))
 
     def history(self, selection: Selection) -> History:
         """Take the selected energy: of parts, of named channels, or by default of the whole model.
@@ -293,6 +296,7 @@ class Run:
             source=self.sources,
             files=self.files,
             format=" + ".join(one.format for one in self.databases),
+            energy_format=database.format,
             channel=channel,
             parts=parts,
             time_precision=time_precision,
