@@ -100,6 +100,10 @@ def _of_evidence(situation: Situation) -> Iterator[Caution]:
         found = "the momentum changes at a constant rate in the flight, which was taken for gravity"
         yield Caution("gravity-assumed", f"{found}; the mass, or kinetic and internal energy, would show whether it is")
         return
+    if flight.source == "contact-force":
+        found = "contacts whose forces are not written, and other loads, do not show in those that are"
+        yield Caution("flight-uncertain", f"{found}; momenta of the parts would make the flight sure")
+        return
     found = "nothing but energies shows the flight, and a fixed wall does no work"
     if flight.unknown_load:
         found = "nothing but energies shows the flight, in which gravity or another load works"

@@ -14,6 +14,7 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, listing
+from d2rpick.histories.contact_forces import joined
 from d2rpick.histories.history import Precision, Samples
 from d2rpick.histories.names import Part, quantity_of, resolve, with_namesakes
 from d2rpick.histories.samples import newest_states, window
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
+
+    from d2rpick.histories.contact_forces import ContactForce
 
     Indices = NDArray[np.intp]
 
@@ -71,6 +74,11 @@ class Database:
     digits = DIGITS[8]
     no_channels = ""
     no_parts = "this table has no parts; give the matsum, binout or T01 instead, or one of its columns by `energy`"
+
+    @property
+    def contact_forces(self) -> tuple[ContactForce, ...]:
+        """Forces of contacts and rigid walls; FormatError where they are written, but cannot be read."""
+        return ()
 
     def branch(self, name: str) -> Database:
         """Give what holds the whole model, ``glstat``, or the parts, ``matsum``; FormatError where there is none."""
@@ -222,6 +230,14 @@ class Legs:
         """Those of the coarsest leg."""
         found = [leg.precisions(names) for leg in self._legs]
         return min((t for t, _ in found), key=_digits), min((e for _, e in found), key=_digits)
+
+    @cached_property
+    def contact_forces(self) -> tuple[ContactForce, ...]:
+        """Forces of the contacts and rigid walls that all legs have."""
+        legs = [{force.name: force for force in leg.contact_forces} for leg in self._legs]
+        common = [name for name in legs[0] if all(name in leg for leg in legs)]
+        pieces = [[leg[name] for leg in legs] for name in common]
+        return tuple(joined(of_one, self._order([leg.time for leg in of_one])[0]) for of_one in pieces)
 
     @cached_property
     def _passing(self) -> tuple[int, ...]:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from d2rpick.histories.contact_forces import ContactForce
     from d2rpick.histories.names import Part
     from d2rpick.histories.source import Source
 
@@ -214,12 +215,13 @@ class Given:
 
     ``momenta`` of the parts, then of the whole model, as far as they are written.  ``balance``: energies of the whole
     model; None where none are written beside the internal energy.  ``masses`` of the parts whose momenta are known, in
-    their order, NaN where unknown; None where none are.
+    their order, NaN where unknown; None where none are.  ``forces`` of contacts and rigid walls.
     """
 
     momenta: tuple[Momenta, ...] = ()
     balance: Balance | None = None
     masses: Samples | None = None
+    forces: tuple[ContactForce, ...] = ()
 
 
 NO_EVIDENCE = Given()

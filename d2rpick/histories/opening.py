@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final, Protocol, cast
 import numpy as np
 
 from d2rpick.base.errors import FormatError
+from d2rpick.histories import force_listings
 from d2rpick.histories.database import Database, Legs
 from d2rpick.histories.formats import FAMILIES, READERS
 from d2rpick.histories.names import Selection
@@ -19,6 +20,7 @@ from d2rpick.histories.source import Source, open_files
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from d2rpick.histories.contact_forces import ContactForce
     from d2rpick.histories.database import Indices
     from d2rpick.histories.history import Samples
 
@@ -83,12 +85,19 @@ def open_run(names: Sequence[str], selection: Selection = _DEFAULT, input_format
 
 def open_sources(sources: Sequence[Source], selection: Selection = _DEFAULT, input_format: str = "auto") -> Run:
     """Open the files of one run whose bytes are at hand; arguments and errors as of `open_run`."""
+    with_forces = [one for one in sources if input_format == "auto" and force_listings.recognises(one.data[:_HEAD])]
+    sources = [one for one in sources if one not in with_forces]
+    if not sources and with_forces:
+        found = f"{with_forces[0].name}: an rcforc or rwforc of LS-DYNA, which holds forces and no internal energy"
+        raise FormatError(f"{found}; name the glstat, matsum or binout of the run with it")
     kinds = _by_format(sources, input_format)
     ordered = [kind for kind in READERS if kind in kinds]
     _refuse_time_of_solver(ordered, selection.time)
     opened, notes = _opened(kinds, ordered, selection)
     ordered = [kind for kind in ordered if kind in opened]
-    used = {source.name for kind in ordered for source in kinds[kind]}
+    forces, unread = _forces_of(with_forces)
+    read = [*(source for kind in ordered for source in kinds[kind]), *([] if unread else with_forces)]
+    used = {source.name for source in read}
     for legs in opened.values():
         check_legs(legs)
     databases = tuple(
@@ -98,8 +107,19 @@ def open_sources(sources: Sequence[Source], selection: Selection = _DEFAULT, inp
     _refuse_unknown_channels(databases, selection)
     check_companions(databases)
     behind = {name for kind in FAMILIES for name in _behind_firsts(kinds.get(kind, ()))}
-    named = tuple(source.name for source in sources if source.name in used - behind)
-    return Run(named, databases, tuple(source for source in sources if source.name in used), notes=notes)
+    named = tuple(
+        source.name for source in (*sources, *with_forces) if source.name not in behind and source.name in used
+    )
+    files = tuple(source for source in (*sources, *with_forces) if source.name in used)
+    return Run(named, databases, files, notes=(*notes, *unread), forces=forces)
+
+
+def _forces_of(sources: Sequence[Source]) -> tuple[tuple[ContactForce, ...], tuple[str, ...]]:
+    """Read the forces of files that hold nothing else, or say why they cannot be: the run is read without them."""
+    try:
+        return force_listings.forces_of(sources), ()
+    except FormatError as error:
+        return (), (f"{error}; it was not used",)
 
 
 def _by_format(sources: Sequence[Source], input_format: str) -> dict[str, list[Source]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from itertools import compress
 from typing import TYPE_CHECKING, Final
 
@@ -16,10 +17,12 @@ from d2rpick.histories.history import Balance, Given, History, Momenta, Samples,
 from d2rpick.histories.names import QUANTITIES, Part, Selection, menu, quantity_note, select_parts
 from d2rpick.histories.samples import median
 from d2rpick.histories.surroundings import UNKNOWN, Surroundings
+from d2rpick.histories.table_forces import forces_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from d2rpick.histories.contact_forces import ContactForce
     from d2rpick.histories.database import Legs
     from d2rpick.histories.source import Source
 
@@ -34,7 +37,7 @@ class Run:
     """Databases of one run, one per format, those that say most of it first.
 
     ``sources`` name their files; ``files`` are what was read of them.  ``surroundings`` act on the model from outside.
-    ``notes`` say which files were not used.
+    ``notes`` say which files were not used; ``forces`` are those of files that hold nothing else.
     """
 
     def __init__(
@@ -44,13 +47,14 @@ class Run:
         files: tuple[Source, ...] = (),
         surroundings: Surroundings = UNKNOWN,
         notes: tuple[str, ...] = (),
+        forces: tuple[ContactForce, ...] = (),
     ) -> None:
         self.sources, self.databases, self.files, self.surroundings = sources, databases, files, surroundings
-        self._notes = notes
+        self._notes, self._forces = notes, forces
 
     def within(self, surroundings: Surroundings) -> Run:
         """Give the same run with what is known of its surroundings."""
-        return Run(self.sources, self.databases, self.files, surroundings, self._notes)
+        return Run(self.sources, self.databases, self.files, surroundings, self._notes, self._forces)
 
     @property
     def name(self) -> str:
@@ -62,6 +66,11 @@ class Run:
         """Parts with histories of their own."""
         holder = self._with_parts()
         return holder.parts if holder else ()
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Which files were not used, and why."""
+        return self._notes
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
@@ -139,6 +148,15 @@ class Run:
             return masses
         kinetic = if_written(lambda: self.part_kinetic_energies(holder.parts))
         return masses if kinetic is None else np.where(np.isnan(masses), least_masses(momenta, kinetic), masses)
+
+    @cached_property
+    def contact_forces(self) -> tuple[ContactForce, ...]:
+        """Forces of contacts and rigid walls, of each the first that a file tells."""
+        written = (if_written(partial(forces_of, database)) or () for database in self.databases)
+        named: dict[str, ContactForce] = {}
+        for force in (*(force for forces in written for force in forces), *self._forces):
+            named.setdefault(force.name, force)
+        return tuple(named.values())
 
     @cached_property
     def _whole_momentum(self) -> Momenta | None:
@@ -322,6 +340,11 @@ class _Written(Given):
     def masses(self) -> Samples | None:
         """Masses of the parts."""
         return self._run.masses
+
+    @cached_property
+    def forces(self) -> tuple[ContactForce, ...]:
+        """Forces of contacts and rigid walls."""
+        return self._run.contact_forces
 
     @cached_property
     def balance(self) -> Balance | None:

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 # Files of LS-DYNA's d3 family, with the name of the job and the number in the family, if any.
 _FAMILY: Final = r"(?i:(?P<first>(?:.*\.)?d3(?:plot|thdt|part))(?P<number>\d{2,})?)"
+# Files of forces, which count beside those that hold energies.
+_FORCES: Final = r"(?i:r[cw]forc(?:\.gz)?)"
 _GZIP = b"\x1f\x8b"
 _BLOCK = 1 << 16  # packed bytes at a time, which become 68 MB at most
 # Files of a folder often share their suffix, and have it in common with any name that has it.
@@ -178,6 +180,8 @@ def _databases(folder: Path) -> list[str]:
 
 def _run_of(file: Path) -> str:
     """Say to which run a file belongs that has the name of a solver's database; nothing of any other."""
+    if re.fullmatch(_FORCES, file.name) and file.is_file():
+        return "one of LS-DYNA"
     for one in READERS.values():
         match = re.fullmatch(rf"{one.files}(?:\.gz)?", file.name) if one.files else None
         if match and file.is_file():

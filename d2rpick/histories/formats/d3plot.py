@@ -16,6 +16,7 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.histories.contact_forces import ContactForce
 from d2rpick.histories.content import content_of
 from d2rpick.histories.database import DIGITS, Database
 from d2rpick.histories.formats.d3plot_head import GLOBALS, Head, read_head
@@ -111,6 +112,17 @@ class D3plot(Database):
         place = self.channels.index(name)
         of_parts = self._head.part_values * len(self.parts) if place >= GLOBALS else 0
         return self._column(1 + place + of_parts)
+
+    @property
+    def contact_forces(self) -> tuple[ContactForce, ...]:
+        """Forces of the rigid walls; those of contacts are in no d3plot."""
+        walls = self.channels[GLOBALS:]
+        return tuple(
+            ContactForce.of_forces(
+                f"rigid wall {number}", self.time, np.outer(self.channel(name), np.array([1.0, 0.0, 0.0]))
+            )
+            for number, name in enumerate(walls, start=1)
+        )
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
         """One quantity of some parts, shape (n, len(ids)); their momenta are those of their masses at their velocity.
