@@ -66,3 +66,13 @@ def test_the_energies_of_a_sample_balance_and_its_health_is_right(name: str) -> 
         assert health["energy_ratio_min"] > 0.999
         assert health["energy_ratio_max"] < 1.001
         assert health["sliding_share"] < 1e-6
+
+
+@pytest.mark.usefixtures("by_level")
+@pytest.mark.parametrize("name", [name for name in NAMES if name.endswith(("matsum", "binout", "d3plot", "d3thdt"))])
+def test_one_run_has_one_answer_in_every_file_of_its_parts(name: str) -> None:
+    found = answer("suggest", "--td", "0.37", "--part", "box", str(KEPT / name))
+    assert found["recommended"]["tr"] == pytest.approx(0.09703, abs=sample_box.INTERVAL)
+    assert found["flight"]["source"] == "momentum"
+    assert found["flight"]["start"] == pytest.approx(0.0865, abs=sample_box.INTERVAL)
+    assert found["flight"]["end"] == pytest.approx(0.379, abs=sample_box.INTERVAL)

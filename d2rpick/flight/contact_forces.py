@@ -20,8 +20,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.histories.contact_forces import ContactForce
-    from d2rpick.histories.history import History, Samples
+    from d2rpick.histories.history import History, Momenta, Samples
 
+# Of the impulse of a contact that acts from outside, which is in the momentum as it is: samples of a force that is hit
+# and miss leave a third of it open.
+_INNER: Final = 0.2
 # Means of the energy over so many pieces of computed flights rise by up to 0.06 of the highest energy, where many modes
 # beat; a crash lifts them to it.
 _PIECES: Final = 4
@@ -35,13 +38,15 @@ class Touches(NamedTuple):
     acts: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, forces: Sequence[ContactForce]) -> Touches | None:
+    def of(cls, forces: Sequence[ContactForce], whole: Momenta | None = None) -> Touches | None:
         """Put the forces of all contacts together that act at some times and not at others; None without.
 
         A contact that always acts holds parts together, as a tied one; one that never acts may not be of these parts.
+        One that does not change the momentum of the ``whole`` model, where that is known, is between its own parts.
         Of forces that were written at different times the time counts that all have.
         """
         telling = [force for force in forces if force.tells]
+        telling = telling if whole is None else _from_outside(telling, whole)
         if not telling:
             return None
         start, end = max(force.time[0] for force in telling), min(force.time[-1] for force in telling)
@@ -74,6 +79,33 @@ class Touches(NamedTuple):
         if last - first + 1 < FEWEST or not long_enough:
             return None
         return FreeFlight.of(time, (first, last), gravity=float("nan"))
+
+
+def _from_outside(forces: Sequence[ContactForce], whole: Momenta) -> list[ContactForce]:
+    """Give the forces whose impulses are found in the momentum of the model, beside that of a constant gravity.
+
+    An impulse from outside changes the momentum by itself, with either sign, since a file may tell of either side; of
+    velocities, whose mass is not known, the largest share stands for that.  What is not known stays.
+    """
+    known = [force for force in forces if np.isfinite(force.impulses).all()]
+    if not known or whole.time.size <= len(known) + 1:
+        return list(forces)
+    steps = np.diff(whole.time)
+    changes = np.diff(whole.of(range(whole.values.shape[1])), axis=0).ravel()
+    by_gravity = [np.outer(steps, axis).ravel() for axis in np.eye(3)]
+    columns = np.stack([*(_between(force, whole.time).ravel() for force in known), *by_gravity], axis=1)
+    sizes = np.linalg.norm(columns, axis=0)
+    sizes[sizes == 0] = 1.0
+    shares = np.abs(np.linalg.lstsq(columns / sizes, changes, rcond=None)[0] / sizes)[: len(known)]
+    whole_share = float(shares.max()) if whole.velocity else 1.0
+    inner = {id(force) for force, share in zip(known, shares.tolist(), strict=True) if share < _INNER * whole_share}
+    return [force for force in forces if id(force) not in inner]
+
+
+def _between(force: ContactForce, time: Samples) -> Samples:
+    """Impulses between other times (m,), of shape (m - 1, 3)."""
+    sums = np.cumsum(force.impulses, axis=0)
+    return np.diff(np.stack([np.interp(time, force.time, axis) for axis in sums.T], axis=1), axis=0)
 
 
 def is_deformed(history: History, flight: FreeFlight) -> bool:

@@ -290,7 +290,9 @@ def _witnesses(history: History) -> Iterator[Witness]:
         around = partial(_first, history, momenta)
         decisive = any(momentum.tells(one) for one in momenta)
         yield Witness.of("momentum", momenta[0].time, around, decisive=decisive)
-    touches, balance, is_better_known = Touches.of(history.evidence.forces), history.balance, bool(history.momenta)
+    forces, whole = history.evidence.forces, next((one for one in history.momenta if one.parts is None), None)
+    touches = Touches.of(forces, whole) if forces else None
+    balance, is_better_known = history.balance, bool(history.momenta)
     if touches is not None:
         by_forces = Witness.of("contact-force", touches.time, partial(_by_forces, history, touches), decisive=False)
         is_better_known = is_better_known or bool(by_forces.flights())
@@ -342,6 +344,8 @@ def _by_forces(history: History, touches: Touches, td: float) -> FreeFlight | No
         return None
     if found and is_deformed(history, found):
         found = _keeping_level(history, found, td)
+    if found and balance and not moves_as_a_whole(balance, found.start, found.end):
+        return None
     return unheld(history.surroundings, found, history.parts, td)
 
 

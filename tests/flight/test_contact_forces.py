@@ -13,7 +13,7 @@ from d2rpick.flight.contact_forces import Touches, is_deformed
 from d2rpick.flight.flight import all_seen, seen_flight
 from d2rpick.flight.window import FreeFlight
 from d2rpick.histories.contact_forces import ContactForce
-from d2rpick.histories.history import Balance, Given, History
+from d2rpick.histories.history import Balance, Given, History, Momenta, Precision
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
 from tests.command import ROOT, answer, codes, put
@@ -153,3 +153,24 @@ def test_a_table_with_a_column_of_forces_is_judged_by_it(tmp_path: Path) -> None
     assert (listed["source"], listed["start"]) == ("contact-force", found["flight"]["start"])
     in_load = answer("suggest", "--td", "0.1", "--exit-zero", str(file))
     assert "the contact force shows no free flight at td = 0.1" in str(in_load["warnings"])
+
+
+def pushed(*forces: ContactForce, velocity: bool = False) -> Momenta:
+    """Momentum of a model of 2 kg on which these forces work, and gravity."""
+    momentum = sum(np.cumsum(force.impulses, axis=0) for force in forces) + np.outer(TIME, [0.0, 0.0, -19.62])
+    values = momentum[:, np.newaxis] / (2.0 if velocity else 1.0)
+    return Momenta(TIME, values, None, Precision(7), (0,), velocity=velocity)
+
+
+@pytest.mark.parametrize("velocity", [False, True])
+@pytest.mark.parametrize("side", [1, -1])
+def test_contacts_of_a_body_with_itself_do_not_end_its_flight(velocity: bool, side: int) -> None:
+    """They are written with a force of one side, although none acts from outside."""
+    ground, inner = contact((0.0, 0.2), (0.8, 0.9)), contact((0.1, 0.6), name="with itself")
+    told = ground._replace(impulses=side * ground.impulses)
+    touches = sure(Touches.of((told, inner), pushed(ground, velocity=velocity)))
+    flight = sure(touches.flight_around(0.5))
+    assert flight.start == pytest.approx(0.2, abs=1.1 * STEP)
+    assert flight.end == pytest.approx(0.8, abs=1.1 * STEP)
+    counted = sure(Touches.of((told, inner)))  # of an unknown momentum
+    assert counted.flight_around(0.5) is None
