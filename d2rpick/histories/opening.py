@@ -11,6 +11,7 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories import force_listings
+from d2rpick.histories.content import Scattered
 from d2rpick.histories.database import Database, Legs
 from d2rpick.histories.formats import FAMILIES, READERS
 from d2rpick.histories.names import Selection
@@ -85,7 +86,7 @@ def open_run(names: Sequence[str], selection: Selection = _DEFAULT, input_format
 
 def open_sources(sources: Sequence[Source], selection: Selection = _DEFAULT, input_format: str = "auto") -> Run:
     """Open the files of one run whose bytes are at hand; arguments and errors as of `open_run`."""
-    with_forces = [one for one in sources if input_format == "auto" and force_listings.recognises(one.data[:_HEAD])]
+    with_forces = [one for one in sources if input_format == "auto" and _holds_forces(one)]
     sources = [one for one in sources if one not in with_forces]
     if not sources and with_forces:
         found = f"{with_forces[0].name}: an rcforc or rwforc of LS-DYNA, which holds forces and no internal energy"
@@ -112,6 +113,11 @@ def open_sources(sources: Sequence[Source], selection: Selection = _DEFAULT, inp
     )
     files = tuple(source for source in (*sources, *with_forces) if source.name in used)
     return Run(named, databases, files, notes=(*notes, *unread), forces=forces)
+
+
+def _holds_forces(source: Source) -> bool:
+    """Whether a file is a listing of forces, as none of a family is of which little is read."""
+    return not isinstance(source.data, Scattered) and force_listings.recognises(source.data[:_HEAD])
 
 
 def _forces_of(sources: Sequence[Source]) -> tuple[tuple[ContactForce, ...], tuple[str, ...]]:
