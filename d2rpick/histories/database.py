@@ -62,6 +62,8 @@ class Database:
         Significant decimal digits of all numbers.
     no_channels, no_parts : str
         What to say where somebody asks for them and there are none.
+    only_forces : bool
+        Whether it holds forces of contacts, and neither the whole model nor parts: it counts beside others alone.
     """
 
     source: str
@@ -73,6 +75,7 @@ class Database:
     parts: tuple[Part, ...] = ()
     digits = DIGITS[8]
     no_channels = ""
+    only_forces = False
     no_parts = "this table has no parts; give the matsum, binout or T01 instead, or one of its columns by `energy`"
 
     @property

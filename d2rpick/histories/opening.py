@@ -101,6 +101,7 @@ def open_sources(sources: Sequence[Source], selection: Selection = _DEFAULT, inp
     used = {source.name for source in read}
     for legs in opened.values():
         check_legs(legs)
+    ordered = _with_forces_last(opened, ordered)
     databases = tuple(
         Legs(opened[kind], cut=[one.name for one in kinds[kind] if one.cut], named=selection.channels)
         for kind in ordered
@@ -113,6 +114,14 @@ def open_sources(sources: Sequence[Source], selection: Selection = _DEFAULT, inp
     )
     files = tuple(source for source in (*sources, *with_forces) if source.name in used)
     return Run(named, databases, files, notes=(*notes, *unread), forces=forces)
+
+
+def _with_forces_last(opened: Mapping[str, Sequence[Database]], ordered: Sequence[str]) -> list[str]:
+    """Give the formats with those last that hold forces alone; FormatError where all do."""
+    alone = {kind: all(leg.only_forces for leg in opened[kind]) for kind in ordered}
+    if all(alone.values()):
+        opened[ordered[0]][0].branch("glstat")  # knows best what is missing
+    return sorted(ordered, key=alone.__getitem__)
 
 
 def _holds_forces(source: Source) -> bool:

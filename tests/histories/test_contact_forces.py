@@ -149,6 +149,17 @@ def test_a_binout_has_them_in_its_branches(tmp_path: Path) -> None:
     ]
 
 
+def test_a_binout_of_forces_alone_counts_beside_others(tmp_path: Path) -> None:
+    content = binout().replace(b"/glstat", b"/nodout")
+    names = put(tmp_path, binout0000=content, glstat=ENERGY)
+    run = open_run(names)
+    assert len(run.contact_forces) == 3
+    assert run.databases[0].format == "glstat"
+    assert run.history(Selection()).time.size == TIMES.size
+    with pytest.raises(FormatError, match="no glstat in it, but nodout, rcforc, rwforc; name the binout"):
+        open_run(names[:1])
+
+
 def t01(groups: Sequence[MadeGroup], values: Samples) -> bytes:
     """States whose groups have these values (n, members, 6) each."""
     parts = (MadePart(3, "box", (1,)),)

@@ -14,7 +14,7 @@ from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.database import DIGITS, Database
 from d2rpick.histories.formats.binout_branch import Branch
-from d2rpick.histories.formats.binout_forces import FORCES, forces_of
+from d2rpick.histories.formats.binout_forces import FORCES, forces_of, writes_forces
 from d2rpick.histories.formats.lsda import Lsda, recognises
 from d2rpick.histories.names import Part, Selection
 
@@ -42,7 +42,7 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[Binout]:
 class Binout(Database):
     """All binout files of one leg, by name and content, those of a family in their order, read as one `Database`.
 
-    FormatError if a file is no binout, or none of them holds glstat or matsum.
+    FormatError if a file is no binout, or none of them holds glstat, matsum or forces of contacts.
     """
 
     format = "binout"
@@ -52,7 +52,8 @@ class Binout(Database):
         self.source = ", ".join(name for name, _ in files)
         whole, parts = self._branches = [Branch(name, self._files, by_part=name == "matsum") for name in _BRANCHES]
         head = whole or parts
-        if not head:
+        self.only_forces = not head and writes_forces(self._files)
+        if not head and not self.only_forces:
             raise FormatError(self._without("glstat or matsum"))
         revision = head.text("revision")
         names = (head.text("version"), f"rev {revision}" if revision else "", head.text("build_id"))

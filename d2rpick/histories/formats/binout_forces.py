@@ -23,6 +23,11 @@ if TYPE_CHECKING:
 FORCES: Final = {"rcforc": "contact", "rwforc/forces": "rigid wall"}
 
 
+def writes_forces(files: Sequence[Lsda]) -> bool:
+    """Whether any state of a family holds forces."""
+    return any(ForceBranch(name, files, by_part=True).writes_forces for name in FORCES)
+
+
 def forces_of(files: Sequence[Lsda]) -> tuple[ContactForce, ...]:
     """Give the forces of all contacts and rigid walls of a family; FormatError where they cannot be assigned."""
     branches = [ForceBranch(name, files, by_part=True) for name in FORCES]

@@ -53,16 +53,20 @@ _IMPULSES: Final = ((1, 2, 3), (4, 5, 6))
 
 
 class _Group(NamedTuple):
-    """A group with a history: its kind, number and title of each member, the numbers of its variables."""
+    """A group with a history: its kind, its members, the numbers of its variables.
+
+    ``named`` are number and title of each member, of a group of forces alone.
+    """
 
     kind: int
-    members: tuple[tuple[int, str], ...]
+    members: int
+    named: tuple[tuple[int, str], ...]
     variables: tuple[int, ...]
 
     @property
     def values(self) -> int:
         """Values of a state."""
-        return len(self.members) * len(self.variables)
+        return self.members * len(self.variables)
 
 
 class _Head(NamedTuple):
@@ -149,11 +153,11 @@ class TimeHistory(Database):
             self._force_of(record, group, place)
             for record, group in enumerate(groups, start=first)
             if group.kind in _TOUCHING and {*_IMPULSES[0]} <= {*group.variables}
-            for place in range(len(group.members))
+            for place in range(group.members)
         )
 
     def _force_of(self, record: int, group: _Group, place: int) -> ContactForce:
-        number, title = group.members[place]
+        number, title = group.named[place]
         axes = [axes for axes in _IMPULSES if {*axes} <= {*group.variables}]
         places = [place * len(group.variables) + group.variables.index(axis) for triple in axes for axis in triple]
         impulses = self._columns(record, places).reshape(self._states, len(axes), 3).sum(axis=1)
@@ -308,12 +312,12 @@ class _HeadRecords:
         """Read a group, its elements and its list of variables."""
         record = self._titled(5)
         kind, elements, variables = (INT.unpack_from(record, WIDTH * place)[0] for place in (1, 3, 4))
-        self._count(elements), self._count(variables)
-        members = []
-        for _ in range(elements):
-            member = self._titled(1)
-            members.append((INT.unpack_from(member)[0], plain_text(member[WIDTH:])))
-        return _Group(kind, tuple(members), self._integers(variables))
+        for number in (elements, variables):
+            self._count(number)
+        members = [self._titled(1) for _ in range(elements)]
+        forces = members if kind in _TOUCHING else []
+        named = tuple((INT.unpack_from(member)[0], plain_text(member[WIDTH:])) for member in forces)
+        return _Group(kind, elements, named, self._integers(variables))
 
     def _titled(self, numbers: int) -> bytes:
         """Read a record of a title and so many integers."""
