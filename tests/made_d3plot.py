@@ -80,7 +80,8 @@ class D3plotWriter:
     walls: int = 0
     numbered: bool = True
     family: int = 1
-    release: float = 971.0
+    name: str = "R920"
+    release: float = 960.0  # as all named ones say
     values_of_part: int = 7
 
     def real(self, values: Sequence[float]) -> bytes:
@@ -96,7 +97,8 @@ class D3plotWriter:
         parts = len(self.ids)
         sizes = {"numnp": 5, "nel8": 2, "nel4": 1, "nel2": 1, "nelt": 1, "nv3d": 7, "nv2d": 9, "nv1d": 6, "nv3dt": 8}
         switches = {"filetype": self.family, "ndim": 4, "icode": 6, "iu": 1, "iv": 1, "ia": 1, "maxint": -10003}
-        values = 6 + self.values_of_part * parts + (4 if self.release >= 971 else 1) * self.walls
+        of_wall = 4 if self.name.strip().startswith("R") or self.release >= 971 else 1
+        values = 6 + self.values_of_part * parts + of_wall * self.walls
         found = {**sizes, **switches, "nglbv": values, "nmmat": parts, "nummat8": parts, "extra": 64, **self.control}
         return {"narbs": self._numbers(found).size if self.numbered else 0, **found}
 
@@ -107,7 +109,7 @@ class D3plotWriter:
             plain[_PLACES[name]] = value
         data = bytearray(plain.tobytes())
         data[: 10 * self.width] = self.title.encode().ljust(10 * self.width)
-        data[13 * self.width : 13 * self.width + 4] = b"R920"
+        data[13 * self.width : 13 * self.width + 4] = self.name.encode()
         data[14 * self.width : 15 * self.width] = self.real([self.release])
         solids = abs(words["nel8"])
         elements = 9 * solids + 9 * words["nelt"] + 6 * words["nel2"] + 5 * words["nel4"]

@@ -86,7 +86,7 @@ def read_head(content: Content, source: str) -> Head:
         globals=control["nglbv"],
         parts=parts,
         part_values=values,
-        walls=_walls(control["nglbv"], len(parts), values, words.release()),
+        walls=_walls(control["nglbv"], len(parts), values, words),
         no_parts=no_parts,
     )
 
@@ -120,10 +120,13 @@ def _values_of_parts(values: int, number: int, source: str) -> tuple[int, str]:
     return each, ""
 
 
-def _walls(values: int, parts: int, of_part: int, release: float) -> int:
-    """Count the rigid walls, whose forces stand behind the values of the parts."""
+def _walls(values: int, parts: int, of_part: int, words: Words) -> int:
+    """Count the rigid walls, whose forces stand behind the values of the parts; 0 where they cannot be told apart.
+
+    Releases that are named R9 and so on come behind 971, although the number in their files is 960.
+    """
     rest = values - GLOBALS - parts * of_part
-    each = 4 if release >= _WITH_WALL_PLACES else 1
+    each = 4 if words.is_named or words.release() >= _WITH_WALL_PLACES else 1
     return rest // each if parts and rest % each == 0 else 0
 
 

@@ -100,6 +100,11 @@ class Words:
         """Read the number of the release, as 971."""
         return float(np.frombuffer(self.bytes((_RELEASE + 1) * self.form.width, self.form.width), self.form.real)[0])
 
+    @property
+    def is_named(self) -> bool:
+        """Whether the release has a name that begins with R, as R920 and R12, and not a number alone."""
+        return self.bytes(_RELEASE * self.form.width, 4).strip().startswith(b"R")
+
     def version(self) -> str:
         """Read the name of the release, as R920, which older files have not."""
         name = plain_text(self.bytes(_RELEASE * self.form.width, 4))

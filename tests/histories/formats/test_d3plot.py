@@ -149,8 +149,10 @@ def test_a_restart_writes_states_anew_and_the_newer_count(tmp_path: Path) -> Non
     assert any("newer" in note for note in run.notes)
 
 
-def test_rigid_walls_have_their_forces(tmp_path: Path) -> None:
-    run = opened(tmp_path, D3plotWriter(walls=2).written(states(TIMES, walls=2), 2))
+@pytest.mark.parametrize("name", ["R712", " R12"])
+def test_rigid_walls_have_their_forces(name: str, tmp_path: Path) -> None:
+    """Of all releases that are named so the number says 960, and their walls have places all the same."""
+    run = opened(tmp_path, D3plotWriter(walls=2, name=name).written(states(TIMES, walls=2), 2))
     holds(run, STATES)
     for wall in (1, 2):
         found = run.databases[0].channel(f"rigid_wall_{wall}_force")
@@ -215,7 +217,7 @@ def test_a_d3thdt_is_read_by_itself_and_before_a_d3plot(tmp_path: Path) -> None:
 def test_older_files_have_fewer_values(release: float, tmp_path: Path) -> None:
     """Before 971 a rigid wall has its force alone; still older files have no hourglass energy of parts."""
     made = [State(**{**vars(one), "walls": [3.0, 4.0] if release < 971 else [3.0, 4.0, *[0.0] * 6]}) for one in STATES]
-    run = opened(tmp_path, D3plotWriter(walls=2, release=release).written(made))
+    run = opened(tmp_path, D3plotWriter(walls=2, name="    ", release=release).written(made))
     assert run.databases[0].channel("rigid_wall_2_force").tolist() == [4.0] * 5
     made = [State(**{**vars(one), "hourglass": []}) for one in STATES]
     run = opened(tmp_path / "older", D3plotWriter(values_of_part=6).written(made))
