@@ -24,13 +24,15 @@ from d2rpick.base.errors import D2RPickError
 from d2rpick.base.workers import cores, on_cores
 from d2rpick.deck.reader import read_deck
 from d2rpick.histories.formats import csv_table, hdf5_file
+from d2rpick.histories.formats.d3plot import open_legs
 from d2rpick.histories.history import History
-from d2rpick.histories.opening import Selection, open_run
+from d2rpick.histories.opening import Selection, Source, open_run
 from tests.command import DECK
 from tests.damaged_files import FILES
 from tests.faults import Fault, damage
 from tests.hdf5_files import plain, written
 from tests.histories.formats import test_curves, test_faults_text
+from tests.made_d3plot import D3plotWriter, states
 from tests.reading import run_of, states_of
 from tests.relations import RELATIONS, check_relation
 
@@ -40,6 +42,7 @@ _SHOWN: Final = 5  # faults of a format that are printed
 _KINDS: Final = ("flip", "cut", "drop", "double", "swap", "insert", "blank")
 _LIKELY: Final = b"\n 0123456789.,;E+-*eND\"'\x00\x1b\xff"
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
+_D3PLOT_STATES: Final = states([0.125 * state for state in range(6)], walls=1)
 _CSV: Final = b"time,internal_energy,kinetic_energy\n" + b"".join(
     b"%.3f,%.5e,%.4f\n" % (state / 8, state**3 - 10, state) for state in range(40)
 )
@@ -96,6 +99,15 @@ def hdf5(random: Random) -> bool:
     return bool(_read(lambda: run_of(hdf5_file, data).history(Selection())))
 
 
+def d3plot(random: Random) -> bool:
+    """Damage a d3plot of one file or two; the numbers bear no mark of their own, but there are not more states."""
+    contents = [_d3plot().together(_D3PLOT_STATES[:3]), _d3plot().file(_D3PLOT_STATES[3:])]
+    place = random.randrange(2)
+    contents[place] = damage(contents[place], faults(random), [])
+    sources = [Source(name, data) for name, data in zip(("d3plot", "d3plot01"), contents, strict=True) if data]
+    return bool(_read(lambda: [leg.part_channel("internal_energy", ()) for leg in open_legs(sources, Selection())]))
+
+
 def deck(random: Random) -> bool:
     """Damage a deck."""
     with TemporaryDirectory() as folder:
@@ -119,7 +131,7 @@ def companions(random: Random) -> bool:
 
 FORMATS: Final[dict[str, Callable[[Random], bool]]] = {
     "glstat": glstat, "matsum": matsum, "binout": binout, "radioss-th": time_history, "hdf5": hdf5, "csv": csv,
-    "curves": curves, "deck": deck, "companions": companions,
+    "d3plot": d3plot, "curves": curves, "deck": deck, "companions": companions,
 }  # fmt: skip
 
 
@@ -206,6 +218,11 @@ def _table(data: bytes) -> bool:
 def _numbers(line: str) -> list[float]:
     texts = [*_NUMBER.findall(line), *_NUMBER.findall(line.replace(",", "."))]
     return [float(text.upper().replace("D", "E")) for text in texts]
+
+
+@cache
+def _d3plot() -> D3plotWriter:
+    return D3plotWriter(control={"numnp": 2, "nel2": 0, "nelt": 0, "nv2d": 1}, walls=1)
 
 
 @cache

@@ -35,12 +35,17 @@ class T01Writer:
         if numbers:
             self.record(packed("f", numbers))
 
-    def state(self, time: float, whole: Sequence[float], parts: Sequence[float], subset_variables: int = 2) -> None:
+    def state(
+        self, time: float, whole: Sequence[float], parts: Sequence[float], subset_variables: int = 2,
+        groups: Sequence[Sequence[float]] = (),
+    ) -> None:  # fmt: skip
         self.reals([time])
         self.reals(whole)
         self.reals(parts)
         self.reals([0.0] * subset_variables)
         self.reals([0.0] * 18)
+        for values in groups:
+            self.reals(values)
 
 
 @dataclass
@@ -100,6 +105,15 @@ class MadePart:
     material: int = 1
 
 
+@dataclass(frozen=True)
+class MadeGroup:
+    """A group of interfaces (101) or rigid walls (102) with a history, its members by their numbers."""
+
+    kind: int
+    members: dict[int, str]
+    variables: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
+
+
 def value(state: int, part: int, code: int) -> float:
     """A number that belongs to one state, part (0: globals) and variable only, exact in single precision."""
     return state + part * 16384.0 + code / 64
@@ -132,6 +146,7 @@ def headed(
     title: int = 40,
     subset_variables: int = 2,
     made: T01Writer | None = None,
+    groups: Sequence[MadeGroup] = (),
 ) -> T01Writer:
     """Write what stands before the states, into ``made`` where it is given: a text."""
     made = T01Writer() if made is None else made
@@ -141,7 +156,7 @@ def headed(
         made.setting(2)
         made.setting(title)
         made.reals([1, 1, 1])
-    made.integers(len(parts), 2, 1, 1, 1, globals_)
+    made.integers(len(parts), 2, 1, 1, 1 + len(groups), globals_)
     made.integers(*range(1, globals_ + 1))
     for part in parts:
         numbers = (0, 0 if part.is_group else part.material, 0 if part.is_group else 2, len(part.codes))
@@ -156,4 +171,9 @@ def headed(
     for node in (5, 6, 7):
         made.titled([node], "corner".ljust(title))
     made.integers(*range(1, 7))
+    for number, group in enumerate(groups, start=2):
+        made.titled([number, group.kind, 0, len(group.members), len(group.variables)], "forces".ljust(title))
+        for id_, name in group.members.items():
+            made.titled([id_], name.ljust(title))
+        made.integers(*group.variables)
     return made

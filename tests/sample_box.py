@@ -1,8 +1,8 @@
 """Writes the run of the rollover box in every format that is read: ``python -m tests.sample_box`` from the root.
 
 One run, a state each millisecond, so that all files hold the same numbers to the digits of their format.  csv, hdf5,
-glstat and matsum are what ``d2rpick rollover --dt 1e-3 -o FILE`` writes; a binout and a Radioss time history are not
-written by the program, and the writers of the tests make them.
+glstat and matsum are what ``d2rpick rollover --dt 1e-3 -o FILE`` writes; a binout, a d3plot and a Radioss time history
+are not written by the program, and the writers of the tests make them.
 """
 
 import struct
@@ -17,6 +17,7 @@ from d2rpick.models.box_run import PARTS, Record, simulate
 from d2rpick.report.history_files import BOX_WRITERS
 from tests.command import ROOT
 from tests.made_binout import LsdaWriter
+from tests.made_d3plot import D3plotWriter, State
 from tests.made_t01 import T01Writer
 
 T_END, INTERVAL = 0.42, 1e-3
@@ -32,6 +33,8 @@ def files(record: Record) -> Mapping[str, bytes]:
         **{f"rollover_box.{suffixes[form]}": write(record) for form, write in BOX_WRITERS.items()},
         "rollover_box.binout": binout(record),
         "rollover_boxT01": t01(record),
+        "rollover_box.d3plot": d3plot(record, family=1),
+        "rollover_box.d3thdt": d3plot(record, family=3),
     }
 
 
@@ -101,6 +104,28 @@ def t01(record: Record) -> bytes:
         made.reals(values.tolist())
         made.reals(numbers.ravel().tolist())
     return bytes(made.data)
+
+
+def d3plot(record: Record, family: int) -> bytes:
+    """A family of one file in double precision, without nodes and elements."""
+    nothing = dict.fromkeys(("numnp", "nel8", "nel4", "nel2", "nelt"), 0)
+    ids = tuple(range(1, len(PARTS) + 1))
+    made = D3plotWriter(8, ids=ids, titles=PARTS, title=_TITLE, control=nothing, family=family)
+    masses, speed = _masses(), record.momentum.sum(axis=1) / record.mass
+    velocities = record.momentum / np.array(masses)
+    states = [
+        State(
+            time=float(record.time[i]),
+            kinetic=record.kinetic_energy[i].tolist(),
+            internal=record.internal_energy[i].tolist(),
+            velocities=np.stack([velocities[i].real, 0 * velocities[i].real, velocities[i].imag], axis=1),
+            masses=masses,
+            hourglass=[0.0] * len(PARTS),
+            model=(float(speed[i].real), 0.0, float(speed[i].imag)),
+        )
+        for i in range(record.time.size)
+    ]
+    return made.together(states)
 
 
 def _t01_globals(record: Record) -> Samples:

@@ -16,7 +16,8 @@ from tests.command import ROOT, answer, put
 from tests.energies import sure
 
 KEPT = ROOT / "sample_data"
-NAMES = (*(f"rollover_box.{suffix}" for suffix in ("csv", "h5", "glstat", "matsum", "binout")), "rollover_boxT01")
+NAMES = (*(f"rollover_box.{suffix}" for suffix in ("csv", "h5", "glstat", "matsum", "binout")), "rollover_boxT01",
+         *(f"rollover_box.{suffix}" for suffix in ("d3plot", "d3thdt")))  # fmt: skip
 LARGEST = 320_000  # bytes of one sample
 
 
@@ -61,7 +62,17 @@ def test_a_sample_is_what_the_model_gives(name: str, fresh: Mapping[str, bytes],
 @pytest.mark.parametrize("name", NAMES)
 def test_the_energies_of_a_sample_balance_and_its_health_is_right(name: str) -> None:
     health = answer("info", str(KEPT / name))["health"]
-    if not name.endswith("matsum"):  # has no energies of the whole model
+    if not name.endswith(("matsum", "d3plot", "d3thdt")):  # have no energies of the whole model, or no external work
         assert health["energy_ratio_min"] > 0.999
         assert health["energy_ratio_max"] < 1.001
         assert health["sliding_share"] < 1e-6
+
+
+@pytest.mark.usefixtures("by_level")
+@pytest.mark.parametrize("name", [name for name in NAMES if name.endswith(("matsum", "binout", "d3plot", "d3thdt"))])
+def test_one_run_has_one_answer_in_every_file_of_its_parts(name: str) -> None:
+    found = answer("suggest", "--td", "0.37", "--part", "box", str(KEPT / name))
+    assert found["recommended"]["tr"] == pytest.approx(0.09703, abs=sample_box.INTERVAL)
+    assert found["flight"]["source"] == "momentum"
+    assert found["flight"]["start"] == pytest.approx(0.0865, abs=sample_box.INTERVAL)
+    assert found["flight"]["end"] == pytest.approx(0.379, abs=sample_box.INTERVAL)

@@ -107,8 +107,9 @@ class Request:
         *("file", "HISTORY"), many=True,
     )  # fmt: skip
     input_format: str = option(
-        "Format of the history; auto recognises it by content.", ("auto", *READERS), default="auto", short=("-F",)
-    )
+        f"Format of the history: auto, which recognises it by content, or {', '.join(READERS)}.",
+        *(("auto", *READERS), "FORMAT"), default="auto", short=("-F",),
+    )  # fmt: skip
     time: str | None = option("Time column, by name, number or HDF5 path.", metavar="NAME|NUMBER")
     energy: tuple[str, ...] = option(
         "Energy column, label or HDF5 path; repeat it to add several.",

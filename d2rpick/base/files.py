@@ -16,6 +16,7 @@ from d2rpick.base.errors import D2RPickError
 from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from io import FileIO
     from pathlib import Path
 
@@ -117,12 +118,15 @@ class FileState(NamedTuple):
         return cls.of_stat(os.fstat(file.fileno()))
 
     @classmethod
-    def of_stat(cls, found: os.stat_result) -> FileState:
-        """Take from what the system tells just now."""
+    def of_stat(cls, found: os.stat_result, *, may_grow: bool = False) -> FileState:
+        """Take from what the system tells just now.
+
+        Of a file that ``may_grow`` a write that is under way goes on behind the size that it has.
+        """
         now = time.time_ns()
         # Of the two times the modification can be set, to one in the future too, which would never be past.
         latest = max(found.st_ctime_ns, found.st_mtime_ns if found.st_mtime_ns <= now else 0)
-        settled = now - latest > _TICK + _slowness(latest, found.st_size)
+        settled = now - latest > _TICK + _slowness(latest, 0 if may_grow else found.st_size)
         return cls(found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns, settled)
 
     def is_as(self, other: FileState) -> bool:
@@ -153,6 +157,28 @@ def settled_state(file: FileIO, *, may_grow: bool = False) -> FileState | None:
         if now.is_as(found) or (may_grow and now.continues(found)):
             return found
     return None
+
+
+def settled_states(names: Sequence[str], error: type[D2RPickError]) -> list[FileState]:
+    """States of many files that may grow, as `settled_state`, with one pause for all; ``error`` where one changes."""
+    states = [_state_of(name) for name in names]
+    for _ in range(_TRIES):
+        moving = [found for found in states if not found.settled]
+        if not moving:
+            return states
+        time.sleep(_PAUSE + max(_slowness(found.changed, 0) for found in moving) * 1e-9)
+        looks = [
+            (found, found if found.settled else _state_of(name)) for name, found in zip(names, states, strict=True)
+        ]
+        states = [found._replace(settled=True) if now.continues(found) else now for found, now in looks]
+    name = next((name for name, found in zip(names, states, strict=True) if not found.settled), None)
+    if name is not None:
+        raise error(f"{name}: the file keeps changing while it is read; read it again when it is complete")
+    return states
+
+
+def _state_of(name: str) -> FileState:
+    return FileState.of_stat(os.stat(name), may_grow=True)  # noqa: PTH116  of many files
 
 
 def at_rest(name: str, file: FileIO, error: type[D2RPickError], *, may_grow: bool = False) -> FileState | bytes:

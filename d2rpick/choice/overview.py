@@ -41,6 +41,13 @@ class PartOverview(NamedTuple):
     energy_max: float | None
 
 
+class ForceOverview(NamedTuple):
+    """A contact or rigid wall by its name, and the times (start, end) in which it ``acts`` [time]."""
+
+    name: str
+    acts: tuple[tuple[float, float], ...]
+
+
 class Sampling(NamedTuple):
     """Output intervals [time]."""
 
@@ -78,6 +85,7 @@ class Overview(NamedTuple):
     health: Health | None
     notes: tuple[str, ...]
     alarms: tuple[Caution, ...] = ()
+    contact_forces: tuple[ForceOverview, ...] = ()
 
     @property
     def cautions(self) -> tuple[Caution, ...]:
@@ -92,7 +100,7 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
     if deck is not None:
         run, told = _in_deck(run, deck)
     first = run.databases[0]
-    notes = [note for database in run.databases for note in _notes(database)]
+    notes = [*run.left_out, *(note for database in run.databases for note in _notes(database))]
     notes += doubts(run.databases)
     notes += run.unused_energies(selection)
     states, time = None, np.empty(0)
@@ -126,6 +134,7 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
         health=_health(run, history, [flight for _, flight in flights], rigid),
         notes=tuple(dict.fromkeys(notes)),
         alarms=(*(unsound(history) if history else ()), *_of_rigid_legs(rigid), *told),
+        contact_forces=tuple(ForceOverview(force.name, force.times) for force in run.contact_forces),
     )
 
 
@@ -144,7 +153,7 @@ def _missing(run: Run) -> str:
     written = {database.format for database in run.databases}
     if written & {"radioss-th"}:
         what = _RADIOSS
-    elif written & {"glstat", "matsum", "binout"}:
+    elif written & {"glstat", "matsum", "binout", "d3plot", "d3thdt"}:
         what = f"{_LS_DYNA}, with the DT of *DATABASE_GLSTAT"
     else:
         momentum = (

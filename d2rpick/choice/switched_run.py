@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 Times = tuple[float, float]
 # Evidence that tells the start of a flight to some states; the energy alone gives time away there.
-_SHARP: Final = ("momentum", "contact-energy", "energy-balance")
+_SHARP: Final = ("momentum", "contact-force", "contact-energy", "energy-balance")
 # Parts that have no more of the momentum of a model than this share are not what moves in it.
 _HARDLY: Final = 0.1
 # Of a part that is deformable fewer states follow each other without kinetic energy, or with one internal energy.

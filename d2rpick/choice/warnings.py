@@ -12,6 +12,7 @@ import numpy as np
 
 from d2rpick.base.errors import Caution, listing, name_units
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.choice.few_states import cautions_of_few_states
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.digits import above, first_as_read, not_after, window_as_read
 from d2rpick.vibration import measures
@@ -39,6 +40,7 @@ def cautions_of(situation: Situation) -> Iterator[Caution]:
     if not situation.history.complete:
         yield Caution("truncated-input", "the input ends within a state; only complete states were used")
     yield from _of_energy(situation)
+    yield from cautions_of_few_states(situation)
     yield from _of_parts(situation)
     yield from _of_flight(situation)
 
@@ -99,6 +101,10 @@ def _of_evidence(situation: Situation) -> Iterator[Caution]:
     if flight.source == "momentum":
         found = "the momentum changes at a constant rate in the flight, which was taken for gravity"
         yield Caution("gravity-assumed", f"{found}; the mass, or kinetic and internal energy, would show whether it is")
+        return
+    if flight.source == "contact-force":
+        found = "contacts whose forces are not written, and other loads, do not show in those that are"
+        yield Caution("flight-uncertain", f"{found}; momenta of the parts would make the flight sure")
         return
     found = "nothing but energies shows the flight, and a fixed wall does no work"
     if flight.unknown_load:

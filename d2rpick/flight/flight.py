@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.flight.contact_forces import Touches, is_deformed
 from d2rpick.flight.internal_energy import landing_after, moves_as_a_whole, quiet_time, settled_from
 from d2rpick.flight.window import SHORTEST, all_windows, marks, unheld
 
@@ -20,7 +21,16 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
 
 # Where a flight may be known from, best first.
-SOURCES: Final = ("given", "momentum", "contact-energy", "energy-balance", "oscillator", "energy", None)
+SOURCES: Final = (
+    "given",
+    "momentum",
+    "contact-force",
+    "contact-energy",
+    "energy-balance",
+    "oscillator",
+    "energy",
+    None,
+)
 _SURE: Final = ("given", "momentum", "oscillator")
 _BY_ENERGIES: Final = ("contact-energy", "energy-balance")
 # In free flight no load works.  An energy that is off by 4 % is a deformation that is off by 0.02, within which two
@@ -29,7 +39,9 @@ MOST_WORK: Final = 0.04
 # So often an energy that keeps its level turns at least, or it does not change.
 _LEAST_TURNS: Final = 4
 # What must show every flight that a better source shows: a contact of any part is a contact.
-_AGREEING: Final = ("contact-energy",)
+_AGREEING: Final = ("contact-force", "contact-energy")
+# Forces that are not written, and loads, do not show in the forces of contacts, nor do walls in energies.
+_PARTIAL: Final = (*_BY_ENERGIES, "contact-force")
 # Ends of a flight by two sources are the same within this share of it, or so many output intervals.
 _SAME, _SAME_STATES = 0.01, 3
 
@@ -79,7 +91,7 @@ class Flight(NamedTuple):
         A fixed rigid wall does no work and has no contact energy: without the momentum, only an oscillator that swings
         on tells a flight from a crash into it.
         """
-        if self.source in _BY_ENERGIES:
+        if self.source in _PARTIAL:
             return self.described and not self.unknown_load
         return self.source in _SURE and not isnan(self.gravity)
 
@@ -251,7 +263,8 @@ def all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
         kept, flights = [], witness.flights()
         for flight in flights:
             middle = (flight.start + flight.end) / 2
-            others = [(one.source, one.around(middle)) for one in asked[place + 1 :] if _may_deny(one, flight)]
+            may_deny = (one for one in asked[place + 1 :] if _may_deny(one, flight) and one.counts())
+            others = [(one.source, one.around(middle)) for one in may_deny]
             if not all(other for _, other in others):
                 continue
             found = [(witness.source, flight), *((source, other) for source, other in others if other)]
@@ -284,13 +297,19 @@ def _witnesses(history: History) -> Iterator[Witness]:
         around = partial(_first, history, momenta)
         decisive = any(momentum.tells(one) for one in momenta)
         yield Witness.of("momentum", momenta[0].time, around, decisive=decisive)
-    balance = history.balance
+    forces, whole = history.evidence.forces, next((one for one in history.momenta if one.parts is None), None)
+    touches = Touches.of(forces, whole) if forces else None
+    balance, is_better_known = history.balance, bool(history.momenta)
+    if touches is not None:
+        by_forces = Witness.of("contact-force", touches.time, partial(_by_forces, history, touches), decisive=False)
+        is_better_known = is_better_known or bool(by_forces.flights())
+        yield by_forces
     if balance is None:
         return
     from d2rpick.flight import work
 
     if work.shows_contacts(balance):
-        around = partial(_by_energies, history, work.plateau_around, level=not history.momenta)
+        around = partial(_by_energies, history, work.plateau_around, level=not is_better_known)
         yield Witness.of("contact-energy", balance.time, around, decisive=False)
     if work.can_tell(balance):
         around = partial(_by_energies, history, work.balanced_around, level=True)
@@ -319,6 +338,21 @@ def _by_energies(
         if found and isinf(found.gravity) and history.surroundings.gravity_on(None) == (0.0,):
             return None  # no gravity feeds the energies
         found = found if found and moves_as_a_whole(history.balance, found.start, found.end) else None
+    return unheld(history.surroundings, found, history.parts, td)
+
+
+def _by_forces(history: History, touches: Touches, td: float) -> FreeFlight | None:
+    """Give the flight around td by forces; where the energy rises as if another load acted, what keeps its level.
+
+    Before any contact has ended a load of another kind may act, which only the external work shows.
+    """
+    found, balance = touches.flight_around(td), history.balance
+    if found and found.start <= touches.time[0] and (balance is None or balance.external_work is None):
+        return None
+    if found and is_deformed(history, found):
+        found = _keeping_level(history, found, td)
+    if found and balance and not moves_as_a_whole(balance, found.start, found.end):
+        return None
     return unheld(history.surroundings, found, history.parts, td)
 
 

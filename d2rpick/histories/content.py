@@ -14,10 +14,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import ChangedError, FormatError
-from d2rpick.base.files import FileState, at_rest, settled_state
+from d2rpick.base.files import FileState, at_rest, settled_state, settled_states
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from threading import local
+
     from numpy.typing import NDArray
 
     Bytes = NDArray[np.uint8]
@@ -58,6 +62,16 @@ class Content:
     def fields(self, addresses: Addresses, width: int) -> Bytes:
         """Bytes at many addresses, ``width`` of each, shape (n, width)."""
         return _gathered(self.view(0, len(self)), addresses, width)
+
+    def fill_rows(self, room: Bytes, begin: int, stride: int, rest: int) -> bytes:
+        """Fill each row of ``room`` (n, width) with the bytes at every ``stride``; what begins behind the last one.
+
+        ``begin`` is where the first row begins; of the ``rest`` so many bytes are given, less where the file ends.
+        """
+        end = begin + len(room) * stride
+        if len(room):
+            room[:] = self.fields(np.arange(begin, end, stride, dtype=np.int64), room.shape[1])
+        return self[end : end + rest]
 
     def check(self) -> None:
         """Nothing to be done: what is held does not change."""
@@ -197,13 +211,16 @@ class OnDisk(Content):
     def _fill(self, room: memoryview, begin: int) -> None:
         """Read as many bytes as there is room."""
         with self._lock:
-            self._file.seek(begin)
-            done = self._file.readinto(room)
-            while done < len(room):  # a single call gives 2 GB at most
-                more = self._file.readinto(room[done:])
-                if not more:
-                    raise self._shortened()
-                done += more
+            self._fill_from(self._file, room, begin)
+
+    def _fill_from(self, file: FileIO, room: memoryview, begin: int) -> None:
+        file.seek(begin)
+        done = file.readinto(room)
+        while done < len(room):  # a single call gives 2 GB at most
+            more = file.readinto(room[done:])
+            if not more:
+                raise self._shortened()
+            done += more
 
     def _shortened(self) -> ChangedError:
         found = f"{self._name}: the file was {self._size} bytes long and became shorter while it was read"
@@ -234,6 +251,67 @@ class OnDisk(Content):
         """First and last bytes of what counts."""
         length = min(_END, self._size)
         return self.view(0, length).tobytes(), self.view(self._size - length, self._size).tobytes()
+
+
+class Scattered(OnDisk):
+    """Bytes of a file of which little is read, here and there.
+
+    It is opened for each reading: a run may have written more such files than a process may have open.
+    """
+
+    window = 1 << 12
+
+    def __init__(self, name: str, state: FileState) -> None:
+        self._name, self._state, self._size = name, state, state.size
+        self._digest = ""
+
+    @cached_property
+    def _own(self) -> local:  # type: ignore[override]  # few files are read but for the heads of their states
+        from threading import local
+
+        return local()
+
+    def __del__(self) -> None:
+        """Nothing to be closed."""
+
+    def __bytes__(self) -> bytes:
+        data = self.view(0, self._size).tobytes()
+        self.check()
+        return data
+
+    def check(self) -> None:
+        """Make sure that the file has at most grown since; ChangedError where it has not."""
+        try:
+            now = FileState.of_stat(os.stat(self._name))  # noqa: PTH116  many files
+        except OSError:
+            raise self._shortened() from None
+        if not now.continues(self._state):
+            raise ChangedError(f"{self._name}: the file was rewritten while it was read; read it again")
+
+    def _fill(self, room: memoryview, begin: int) -> None:
+        with FileIO(self._name) as file:
+            self._fill_from(file, room, begin)
+
+    def fill_rows(self, room: Bytes, begin: int, stride: int, rest: int) -> bytes:
+        """The same, for which the file is opened once."""
+        end = begin + len(room) * stride
+        with FileIO(self._name) as file:
+            for row, place in zip(room, range(begin, end, stride), strict=True):
+                self._fill_from(file, row.data, place)
+            file.seek(end)
+            return file.read(max(0, min(rest, self._size - end)))
+
+
+def scattered(names: Sequence[str]) -> list[Scattered]:
+    """Give the contents of files of which little is read, each at rest.
+
+    Raises
+    ------
+    FormatError
+        If one changes all the time.
+    """
+    states = settled_states(names, FormatError)
+    return [Scattered(name, state) for name, state in zip(names, states, strict=True)]
 
 
 def stored(name: str) -> bytes | OnDisk:

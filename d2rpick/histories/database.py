@@ -15,6 +15,7 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, listing
+from d2rpick.histories.contact_forces import joined
 from d2rpick.histories.history import Precision, Samples
 from d2rpick.histories.meaning import find_quantities
 from d2rpick.histories.names import Part, resolve, with_namesakes
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
+
+    from d2rpick.histories.contact_forces import ContactForce
 
     Indices = NDArray[np.intp]
 
@@ -63,6 +66,8 @@ class Database:
         Whether people or other programs than solvers chose the names of the channels, so that they may mean anything.
     no_channels, no_parts : str
         What to say where somebody asks for them and there are none.
+    only_forces : bool
+        Whether it holds forces of contacts, and neither the whole model nor parts: it counts beside others alone.
     """
 
     source: str
@@ -75,7 +80,13 @@ class Database:
     digits = DIGITS[8]
     no_channels = ""
     named_by_people = False
+    only_forces = False
     no_parts = "this table has no parts; give the matsum, binout or T01 instead, or one of its columns by `energy`"
+
+    @property
+    def contact_forces(self) -> tuple[ContactForce, ...]:
+        """Forces of contacts and rigid walls; FormatError where they are written, but cannot be read."""
+        return ()
 
     def branch(self, name: str) -> Database:
         """Give what holds the whole model, ``glstat``, or the parts, ``matsum``; FormatError where there is none."""
@@ -230,6 +241,14 @@ class Legs:
         """Those of the coarsest leg."""
         found = [leg.precisions(names) for leg in self._legs]
         return min((t for t, _ in found), key=_digits), min((e for _, e in found), key=_digits)
+
+    @cached_property
+    def contact_forces(self) -> tuple[ContactForce, ...]:
+        """Forces of the contacts and rigid walls that all legs have."""
+        legs = [{force.name: force for force in leg.contact_forces} for leg in self._legs]
+        common = [name for name in legs[0] if all(name in leg for leg in legs)]
+        pieces = [[leg[name] for leg in legs] for name in common]
+        return tuple(joined(of_one, self._order([leg.time for leg in of_one])[0]) for of_one in pieces)
 
     @cached_property
     def _passing(self) -> tuple[int, ...]:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
+    from d2rpick.histories.contact_forces import ContactForce
     from d2rpick.histories.names import Part
     from d2rpick.histories.source import Source
 
@@ -221,12 +222,13 @@ class Given:
 
     ``momenta`` of the parts, then of the whole model, as far as they are written.  ``balance``: energies of the whole
     model; None where none are written beside the internal energy.  ``masses`` of the parts whose momenta are known, in
-    their order, NaN where unknown; None where none are.
+    their order, NaN where unknown; None where none are.  ``forces`` of contacts and rigid walls.
     """
 
     momenta: tuple[Momenta, ...] = ()
     balance: Balance | None = None
     masses: Samples | None = None
+    forces: tuple[ContactForce, ...] = ()
 
     def internal_energies(self, parts: Sequence[Part]) -> Track | None:  # noqa: ARG002  what files hold is read below
         """Internal energies of some parts, ``values`` of shape (n, parts) [energy]; None if they are not written."""
@@ -247,14 +249,14 @@ NO_EVIDENCE = Given()
 class History:
     """Internal energy of the parts to switch, over time, in the run's own consistent units.
 
-    ``time`` and ``energy`` are read-only copies, finite, of shape (n,); ``time`` increases strictly.
-    Anything else raises HistoryError.  ``source`` names the files as the user gave them, ``channel`` what
-    in them was taken for the energy, ``parts`` whose energy it is, None for the whole model;
-    ``springs`` are those of them whose energy is left out.  ``complete``
-    is False when a file stopped inside a state; ``notes`` say what was left out or assumed; ``files`` were read.
-    Where the energy is a sum, ``part_names`` (k,) and ``part_energies`` (n, k) are its terms that are not always zero.
-    ``time_unit`` is given only where the file names it; solver databases do not.  ``evidence`` tells when parts fly
-    freely; that of a file is read when it is first asked for.  ``surroundings`` act on them from outside.
+    ``time`` and ``energy`` are read-only copies, finite, of shape (n,); ``time`` increases strictly.  Anything else
+    raises HistoryError.  ``source`` names the files as the user gave them, ``channel`` what in them was taken for the
+    energy, ``parts`` whose energy it is, None for the whole model; ``springs`` are those of them whose energy is left
+    out; ``energy_format`` is that of the file which holds it.  ``complete`` is False when a file stopped inside a
+    state; ``notes`` say what was left out; ``files`` were read.  Where the energy is a sum, ``part_names`` (k,) and
+    ``part_energies`` (n, k) are its terms that are not always zero.  ``time_unit`` is given only where the file names
+    it.  ``evidence`` tells when parts fly freely; that of a file is read when it is first asked for.  ``surroundings``
+    act on them from outside.
     """
 
     time: Samples
@@ -274,6 +276,7 @@ class History:
     complete: bool = True
     notes: tuple[str, ...] = ()
     files: tuple[Source, ...] = ()
+    energy_format: str = ""
     known: Memory = field(default_factory=Memory, init=False)
 
     def __post_init__(self) -> None:

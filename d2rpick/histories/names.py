@@ -202,6 +202,18 @@ def plain_text(raw: bytes) -> str:
     return "".join(letter if letter.isprintable() else " " for letter in text).strip()
 
 
+def number_in_family(name: str, first: str) -> int | None:
+    """Give the number that the name of a file has behind that of the first one of its family; None where it has none.
+
+    Examples
+    --------
+    >>> number_in_family("run/d3plot07", "run/d3plot"), number_in_family("run/d3plotaa", "run/d3plot")
+    (7, None)
+    """
+    number = name[len(first) :] if name.startswith(first) else ""
+    return int(number) if 2 <= len(number) <= 9 and number.isascii() and number.isdigit() else None
+
+
 class Part(NamedTuple):
     """A part of the model, by the number and the title that the solver gives it."""
 

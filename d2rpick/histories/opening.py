@@ -11,15 +11,18 @@ from typing import TYPE_CHECKING, Final, Protocol, cast
 import numpy as np
 
 from d2rpick.base.errors import FormatError
+from d2rpick.histories import force_listings
+from d2rpick.histories.content import Scattered
 from d2rpick.histories.database import Database, Legs
-from d2rpick.histories.formats import READERS
+from d2rpick.histories.formats import FAMILIES, READERS
 from d2rpick.histories.names import Selection
 from d2rpick.histories.run import Run
 from d2rpick.histories.source import Source, open_files
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
+    from d2rpick.histories.contact_forces import ContactForce
     from d2rpick.histories.database import Indices
     from d2rpick.histories.history import Samples
     from d2rpick.histories.surroundings import Surroundings
@@ -32,6 +35,7 @@ _HEAD = 8192
 _DEFAULT = Selection()
 # No legend of an ASCII database has more bytes.
 _LONGEST_LEGEND: Final = 1 << 24
+_DIGITS: Final = "0123456789"  # of the number of a file behind the first one of its family
 
 
 class Reader(Protocol):
@@ -72,12 +76,22 @@ def open_run(names: Sequence[str], selection: Selection = _DEFAULT, input_format
 
 def open_sources(sources: Sequence[Source], selection: Selection = _DEFAULT, input_format: str = "auto") -> Run:
     """Open the files of one run whose bytes are at hand; arguments and errors as of `open_run`."""
-    kinds, left_out = _sort_by_format(sources) if input_format == "auto" else ({input_format: [*sources]}, [])
+    with_forces = [one for one in sources if input_format == "auto" and _holds_forces(one)]
+    sources = [one for one in sources if one not in with_forces]
+    if not sources and with_forces:
+        found = f"{with_forces[0].name}: an rcforc or rwforc of LS-DYNA, which holds forces and no internal energy"
+        raise FormatError(f"{found}; name the glstat, matsum or binout of the run with it")
+    kinds, left_out = _sort_by_format(sources, input_format)
     ordered = [kind for kind in READERS if kind in kinds]
     _refuse_time_of_solver(ordered, selection.time)
-    opened = {kind: reader(kind).open_legs(kinds[kind], selection) for kind in ordered}
+    opened, notes = _opened(kinds, ordered, selection)
+    ordered = [kind for kind in ordered if kind in opened]
+    forces, unread = _forces_of(with_forces)
+    read = [*(source for kind in ordered for source in kinds[kind]), *([] if unread else with_forces)]
+    used = {source.name for source in read}
     for legs in opened.values():
         check_legs(legs)
+    ordered = _with_forces_last(opened, ordered)
     databases = tuple(
         Legs(
             opened[kind],
@@ -87,40 +101,50 @@ def open_sources(sources: Sequence[Source], selection: Selection = _DEFAULT, inp
         )
         for kind in ordered
     )
-    sources = [source for source in sources if any(source in used for used in kinds.values())]
     _refuse_unknown_channels(databases, selection)
     check_companions(databases)
-    names, reopen = tuple(source.name for source in sources), partial(_reopen, tuple(sources), selection, input_format)
-    return Run(names, databases, tuple(sources), reopen=reopen)
+    behind = {name for kind in FAMILIES for name in _behind_firsts(kinds.get(kind, ()))}
+    every = (*sources, *with_forces)
+    named = tuple(source.name for source in every if source.name not in behind and source.name in used)
+    files = tuple(source for source in every if source.name in used)
+    reopen = partial(_reopen, files, selection, input_format)
+    return Run(named, databases, files, notes=(*notes, *unread), forces=forces, reopen=reopen)
 
 
 def _reopen(sources: Sequence[Source], selection: Selection, input_format: str, surroundings: Surroundings) -> Run:
     return open_sources(sources, selection, input_format).within(surroundings)
 
 
-def _sort_by_format(sources: Sequence[Source]) -> tuple[dict[str, list[Source]], list[str]]:
+def _sort_by_format(sources: Sequence[Source], input_format: str) -> tuple[dict[str, list[Source]], list[str]]:
     """Sort the files of a run by their formats, and say which of those that a pattern matched are left out.
 
-    Of a pattern the histories are used, as of a folder: a table only if there is no database of a solver.
+    Of a pattern the histories are used, as of a folder: a table only if there is no database of a solver.  Files
+    behind the first one of a family have its format.
 
     Raises
     ------
     FormatError
         If a file that was named is no history, or none of a pattern is.
     """
-    kinds: dict[str, list[Source]] = {}
+    formats: dict[str, str] = {}
     foreign: list[tuple[Source, FormatError]] = []
-    for source in sources:
+    for source in sorted(sources, key=lambda one: one.name[-2:].isdigit()):
+        first = formats.get(source.name.rstrip(_DIGITS))
         try:
-            kinds.setdefault(_format(source), []).append(source)
+            known = first if first in FAMILIES else None
+            formats[source.name] = known or (input_format if input_format != "auto" else _format(source))
         except FormatError as error:
             if not source.by_pattern:
                 raise
             foreign.append((source, error))
+    kinds: dict[str, list[Source]] = {}
+    for source in sources:
+        if source.name in formats:
+            kinds.setdefault(formats[source.name], []).append(source)
     if foreign and not kinds:
         raise foreign[0][1]
     notes = [_left_out(source, str(error)) for source, error in foreign]
-    if any(READERS[kind].solver for kind in kinds):
+    if input_format == "auto" and any(READERS[kind].solver for kind in kinds):
         tables = [source for source in kinds.get("csv", []) if source.by_pattern]
         notes += [
             f"{source.name} was left out: a table beside databases of the solver; name it to use it"
@@ -134,6 +158,62 @@ def _sort_by_format(sources: Sequence[Source]) -> tuple[dict[str, list[Source]],
 def _left_out(source: Source, refusal: str) -> str:
     reason = refusal.removeprefix(f"{source.name}: ").partition(";")[0].removesuffix(", an energy history was expected")
     return f"{source.name} was left out: {reason}"
+
+
+def _with_forces_last(opened: Mapping[str, Sequence[Database]], ordered: Sequence[str]) -> list[str]:
+    """Give the formats with those last that hold forces alone; FormatError where all do."""
+    alone = {kind: all(leg.only_forces for leg in opened[kind]) for kind in ordered}
+    if all(alone.values()):
+        opened[ordered[0]][0].branch("glstat")  # knows best what is missing
+    return sorted(ordered, key=alone.__getitem__)
+
+
+def _holds_forces(source: Source) -> bool:
+    """Whether a file is a listing of forces, as none of a family is of which little is read."""
+    return not isinstance(source.data, Scattered) and force_listings.recognises(source.data[:_HEAD])
+
+
+def _forces_of(sources: Sequence[Source]) -> tuple[tuple[ContactForce, ...], tuple[str, ...]]:
+    """Read the forces of files that hold nothing else, or say why they cannot be: the run is read without them."""
+    try:
+        return force_listings.forces_of(sources), ()
+    except FormatError as error:
+        return (), (f"{error}; it was not used",)
+
+
+def _behind_firsts(sources: Sequence[Source]) -> set[str]:
+    """Names of the files that are behind the first one of a family: this one stands for all."""
+    names = {source.name for source in sources}
+    return {name for name in names if name[-1:].isdigit() and name.rstrip(_DIGITS) in names}
+
+
+def _opened(
+    kinds: Mapping[str, list[Source]], ordered: Sequence[str], selection: Selection
+) -> tuple[dict[str, Sequence[Database]], tuple[str, ...]]:
+    """Open the files by their formats, and say what was not used.
+
+    Families of files lie beside everything that LS-DYNA writes: they count where the others leave something out, and
+    where others are there, those that cannot be read stop nothing.
+    """
+    opened: dict[str, Sequence[Database]] = {}
+    notes = []
+    for kind in ordered:
+        if kind in FAMILIES and _hold_all([leg for legs in opened.values() for leg in legs]):
+            continue
+        try:
+            opened[kind] = reader(kind).open_legs(kinds[kind], selection)
+        except FormatError as error:
+            if kind not in FAMILIES or len(ordered) == 1:
+                raise
+            notes.append(f"{error}; it was not used")
+    if not opened:
+        raise FormatError(notes[0].removesuffix("; it was not used"))
+    return opened, tuple(notes)
+
+
+def _hold_all(legs: Sequence[Database]) -> bool:
+    """Whether databases have histories of the whole model and of its parts."""
+    return any(leg.channels for leg in legs) and any(leg.parts for leg in legs)
 
 
 def _refuse_unknown_channels(databases: Sequence[Legs], selection: Selection) -> None:
@@ -160,9 +240,13 @@ def _format(source: Source) -> str:
             _refuse_foreign(source.name, head)
         if re.search(listed.hint, head, re.DOTALL) and reader(kind).recognises(head):
             return kind
-    if re.search(r"(^|[/\\])d3(plot|part|dump|thdt)[^/\\]*$", source.name):
+    if re.search(r"(^|[/\\.])d3(plot|part|thdt)\d+$", source.name):
+        first = source.name.rstrip(_DIGITS)
+        found = f"{source.name}: the first file of its family says what it holds"
+        raise FormatError(f"{found}; name {first}, with which all files behind it are read")
+    if re.search(r"(^|[/\\.])d3(plot|part|dump|thdt)[^/\\]*$", source.name):
         what = "this is a file of LS-DYNA's d3 family, which holds no energies that are read"
-        raise FormatError(f"{source.name}: {what}; name the glstat, matsum or binout of the run")
+        raise FormatError(f"{source.name}: {what}; name the glstat, matsum, d3plot or binout of the run")
     found = f"{source.name}: binary data of no known format, one of {', '.join(READERS)} was expected"
     raise FormatError(f"{found}; export the energy history as text")
 

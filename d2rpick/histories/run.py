@@ -18,10 +18,12 @@ from d2rpick.histories.meaning import is_any_internal_energy, note_other_quantit
 from d2rpick.histories.names import QUANTITIES, Part, Selection, menu, select_parts
 from d2rpick.histories.samples import median
 from d2rpick.histories.surroundings import UNKNOWN, Surroundings
+from d2rpick.histories.table_forces import forces_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from d2rpick.histories.contact_forces import ContactForce
     from d2rpick.histories.database import Legs
     from d2rpick.histories.source import Source
 
@@ -37,6 +39,7 @@ class Run:
 
     ``sources`` name their files; ``files`` are what was read of them.  ``surroundings`` act on the model from outside.
     ``reopen`` opens the same files again within other surroundings: so it is copied, also to another process.
+    ``notes`` say which files were not used; ``forces`` are those of files that hold nothing else.
     """
 
     def __init__(
@@ -45,10 +48,12 @@ class Run:
         databases: tuple[Legs, ...],
         files: tuple[Source, ...] = (),
         surroundings: Surroundings = UNKNOWN,
+        notes: tuple[str, ...] = (),
+        forces: tuple[ContactForce, ...] = (),
         reopen: Callable[[Surroundings], Run] | None = None,
     ) -> None:
         self.sources, self.databases, self.files, self.surroundings = sources, databases, files, surroundings
-        self._reopen = reopen
+        self._notes, self._forces, self._reopen = notes, forces, reopen
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self._reopen is None:
@@ -57,7 +62,7 @@ class Run:
 
     def within(self, surroundings: Surroundings) -> Run:
         """Give the same run with what is known of its surroundings."""
-        return Run(self.sources, self.databases, self.files, surroundings, self._reopen)
+        return Run(self.sources, self.databases, self.files, surroundings, self._notes, self._forces, self._reopen)
 
     @property
     def name(self) -> str:
@@ -70,11 +75,16 @@ class Run:
         holder = self._with_parts()
         return holder.parts if holder else ()
 
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Which files were not used, and why."""
+        return self._notes
+
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """What a user should know about the files."""
         own = (note for database in self.databases for note in database.notes)
-        return tuple(dict.fromkeys([*own, *doubts(self.databases)]))
+        return tuple(dict.fromkeys([*self._notes, *own, *doubts(self.databases)]))
 
     def history(self, selection: Selection) -> History:
         """Take the selected energy: of parts, of named channels, or by default of the whole model.
@@ -159,6 +169,15 @@ class Run:
             return masses
         kinetic = if_written(lambda: self.part_kinetic_energies(holder.parts))
         return masses if kinetic is None else np.where(np.isnan(masses), least_masses(momenta, kinetic), masses)
+
+    @cached_property
+    def contact_forces(self) -> tuple[ContactForce, ...]:
+        """Forces of contacts and rigid walls, of each the first that a file tells."""
+        written = (if_written(partial(forces_of, database)) or () for database in self.databases)
+        named: dict[str, ContactForce] = {}
+        for force in (*(force for forces in written for force in forces), *self._forces):
+            named.setdefault(force.name, force)
+        return tuple(named.values())
 
     @cached_property
     def _whole_momentum(self) -> Momenta | None:
@@ -316,6 +335,7 @@ class Run:
             source=self.sources,
             files=self.files,
             format=" + ".join(one.format for one in self.databases),
+            energy_format=database.format,
             channel=channel,
             parts=parts,
             time_precision=time_precision,
@@ -341,6 +361,11 @@ class _Written(Given):
     def masses(self) -> Samples | None:
         """Masses of the parts."""
         return self._run.masses
+
+    @cached_property
+    def forces(self) -> tuple[ContactForce, ...]:
+        """Forces of contacts and rigid walls."""
+        return self._run.contact_forces
 
     @cached_property
     def balance(self) -> Balance | None:

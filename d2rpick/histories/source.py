@@ -11,15 +11,19 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.base.files import STDIN, FileState, bound, unpacked_beyond
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.content import OnDisk, stored
+from d2rpick.histories.content import OnDisk, scattered, stored
 from d2rpick.histories.formats import READERS
-from d2rpick.histories.names import in_seconds, near_miss
+from d2rpick.histories.names import in_seconds, near_miss, number_in_family
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
 
+# Files of LS-DYNA's d3 family, with the name of the job and the number in the family, if any.
+_FAMILY: Final = r"(?i:(?P<first>(?:.*\.)?d3(?:plot|thdt|part))(?P<number>\d{2,})?)"
+# Files of forces, which count beside those that hold energies.
+_FORCES: Final = r"(?i:r[cw]forc(?:\.gz)?)"
 _GZIP = b"\x1f\x8b"
 _BLOCK = 1 << 16  # packed bytes at a time, which become 68 MB at most
 # Files of a folder often share their suffix, and have it in common with any name that has it.
@@ -75,14 +79,30 @@ def open_files(names: Sequence[str]) -> list[Source]:
         If one cannot be read, or one of several was replaced or cut meanwhile: they may be of two runs.
     """
     files = expand(names)
-    before = {name: _state(name) for name in files}
+    apart = _of_families(files)  # what is read of them is checked when it is
+    before = {name: _state(name) for name in files if name not in apart}
     given = {*names, *(file for name in names if not _is_pattern(name) for file in _files(name))}
-    sources = [open_source(name)._replace(by_pattern=name not in given) for name in files]
+    opened = (apart[name] if name in apart else open_source(name) for name in files)
+    sources = [source._replace(by_pattern=source.name not in given) for source in opened]
     for name, state in before.items():
         now = _state(name)
         if len(files) > 1 and not (now.continues(state) if now and state else now is state):
             found = f"{name}: this file was replaced or written anew while the others of its run were opened"
             raise FormatError(f"{found}; read them again when they are complete")
+    return sources
+
+
+def _of_families(names: Sequence[str]) -> dict[str, Source]:
+    """Open those of the files of which little is read, by their names."""
+    family = re.compile(_FAMILY)
+    found = [name for name in names if family.fullmatch(os.path.basename(name))]  # noqa: PTH119
+    try:
+        sources = {name: Source(name, data) for name, data in zip(found, scattered(found), strict=True)}
+    except OSError as error:
+        raise _unread(error.filename, error) from None
+    for name, source in sources.items():
+        if not source.data and not name[-1].isdigit():  # a solver opens the next file before it writes a state
+            raise _empty(name)
     return sources
 
 
@@ -106,14 +126,18 @@ def open_source(name: str) -> Source:
     data = _read_stdin() if name == STDIN else _read_file(name)
     source = _unpacked(name, data) if data[:2] == _GZIP else Source(name, data)
     if not source.data:
-        raise FormatError(f"{name}: the file is empty; has the run been started?")
+        raise _empty(name)
     return source
+
+
+def _empty(name: str) -> FormatError:
+    return FormatError(f"{name}: the file is empty; has the run been started?")
 
 
 def _files(name: str) -> Sequence[str]:
     # os.path, not pathlib: start-up
     if name == STDIN or os.path.isfile(name):  # noqa: PTH113
-        return [name]
+        return [name, *_behind(name)]
     from pathlib import Path
 
     path = Path(name)
@@ -135,12 +159,26 @@ def _is_pattern(name: str) -> bool:
     return any(sign in name for sign in "*?[")
 
 
+def _behind(name: str) -> Sequence[str]:
+    """Find the files behind the first one of a family, in their order: who names that one means all."""
+    folder, first = os.path.split(name)
+    match = re.fullmatch(_FAMILY, first)
+    if match is None or match["number"]:
+        return []
+    try:
+        beside = os.listdir(folder or ".")  # noqa: PTH208  not pathlib: start-up
+    except OSError:
+        return []
+    numbers = {name: number for name in beside if (number := number_in_family(name, first)) is not None}
+    return [os.path.join(folder, name) for name in sorted(numbers, key=numbers.__getitem__)]  # noqa: PTH118
+
+
 def _databases(folder: Path) -> list[str]:
     found = {file: run for file in sorted(folder.iterdir()) if (run := _run_of(file))}
     if not found:
         inner = any(map(_run_of, folder.glob("*/*")))
         cure = f"its folders are runs: give one, or all to study as '{folder}/*'" if inner else "give the file"
-        raise FormatError(f"{folder}: no glstat, matsum, binout or T01 in this folder; {cure}")
+        raise FormatError(f"{folder}: no glstat, matsum, binout, d3plot or T01 in this folder; {cure}")
     runs = sorted({*found.values()})
     if len(runs) > 1:
         what = f"{folder}: this folder holds several runs ({listing(runs, most=5)}), one was expected"
@@ -150,6 +188,8 @@ def _databases(folder: Path) -> list[str]:
 
 def _run_of(file: Path) -> str:
     """Say to which run a file belongs that has the name of a solver's database; nothing of any other."""
+    if re.fullmatch(_FORCES, file.name) and file.is_file():
+        return "one of LS-DYNA"
     for one in READERS.values():
         match = re.fullmatch(rf"{one.files}(?:\.gz)?", file.name) if one.files else None
         if match and file.is_file():
@@ -169,11 +209,15 @@ def _read_stdin() -> bytes:
 def _read_file(name: str) -> bytes | OnDisk:
     try:
         return stored(name)
-    except FileNotFoundError:
-        raise FormatError(f"{name}: no such file{_meant(name)}; check the name and the folder") from None
     except (OSError, ValueError) as error:  # ValueError: a NUL character in the name
-        reason = getattr(error, "strerror", None) or error
-        raise FormatError(f"{name}: cannot be read ({reason}); check the name and the permissions") from None
+        raise _unread(name, error) from None
+
+
+def _unread(name: str, error: OSError | ValueError) -> FormatError:
+    if isinstance(error, FileNotFoundError):
+        return FormatError(f"{name}: no such file{_meant(name)}; check the name and the folder")
+    reason = getattr(error, "strerror", None) or error
+    return FormatError(f"{name}: cannot be read ({reason}); check the name and the permissions")
 
 
 def _meant(name: str) -> str:

@@ -96,7 +96,9 @@ FRAME: Final = (
           "the cost of elements that the run time rests on; null where it does not rest on any", _weights),
 )  # fmt: skip
 
-_SOURCE: Final = one_of("given", "momentum", "contact-energy", "energy-balance", "oscillator", "energy")
+_SOURCE: Final = one_of(
+    "given", "momentum", "contact-force", "contact-energy", "energy-balance", "oscillator", "energy"
+)
 FLIGHT: Final = row(
     Field("start", "number?"),
     Field("end", "number?", "next contact, null when none was seen"),

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import printable
+from d2rpick.base.errors import listing, printable
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, kind_of, many, maybe, one_of, row
 from d2rpick.report.situation import head, measures_of, spoken
 
 if TYPE_CHECKING:
-    from d2rpick.choice.overview import Overview
+    from d2rpick.choice.overview import ForceOverview, Overview
     from d2rpick.flight.window import FreeFlight
     from d2rpick.report.formats import Shown
 
-_EVIDENCE: Final = one_of("momentum", "contact-energy", "energy-balance", "oscillator", "energy")
+_EVIDENCE: Final = one_of("momentum", "contact-force", "contact-energy", "energy-balance", "oscillator", "energy")
 _FLIGHT: Final = row(
     Field("start", "number", get=lambda seen: seen[1].start),
     Field("end", "number?", "null where the record ends in flight",
@@ -23,6 +23,13 @@ _FLIGHT: Final = row(
           lambda seen: seen[1].parts or None),
     Field("source", _EVIDENCE, get=lambda seen: seen[0]),
 )  # fmt: skip
+_TIMES: Final = row(
+    Field("start", "number", get=lambda times: times[0]), Field("end", "number", get=lambda times: times[1])
+)
+_FORCE: Final = row(
+    Field("name", "text", "of a contact, an interface or a rigid wall, or of a column of forces"),
+    Field("acts", many(_TIMES), "times in which it acts, to one output interval"),
+)
 _PART: Final = row(
     *keys.PART.of_part(lambda one: one.part),
     Field("energy_max", "number?", "null where not written in every state"),
@@ -48,7 +55,9 @@ DOCUMENT: Final = Document("d2rpick/info/1", "Answer of d2rpick info; times in t
           "output of the solver that would show the flights for sure, null where the files have it"),
     keys.HEALTH,
     Field("notes", "texts"),
+    Field("contact_forces", many(_FORCE), "contacts and rigid walls whose forces are written", later=True),
 ))  # fmt: skip
+_MOST_TIMES: Final = 4  # that are named of a contact which acts at many
 _PARTS_HEAD = ("part", "title", "highest internal energy")
 # Keys of the JSON output with a single value.
 _PLAIN = ("format", "version", "title", "states", "time_start", "time_end", "time_unit", "complete")
@@ -86,6 +95,7 @@ def as_csv(overview: Overview, _: Shown) -> str:
         "should_write": overview.should_write,
         "health": "; ".join(f"{what} {value}" for what, value, *_ in _health(overview)),
         "notes": "; ".join(overview.notes),
+        "contact_forces": "; ".join(map(_force, overview.contact_forces)),
     }
     return tables.as_csv(list(row), [list(row.values())]).rstrip("\n")
 
@@ -108,6 +118,7 @@ def facts(overview: Overview) -> list[tuple[str, tables.Cell]]:
         ("complete", overview.complete),
         ("channels", ", ".join(overview.channels) or None),
     ]
+    rows += [("contact force", _force(force)) for force in overview.contact_forces]
     rows += [("flight", _flight(*flight)) for flight in overview.flights]
     if overview.should_write:
         rows.append(("should write", overview.should_write))
@@ -124,6 +135,13 @@ def _health(overview: Overview) -> list[list[tables.Cell]]:
 
 def _parts(overview: Overview) -> list[list[tables.Cell]]:
     return [[one.part.id, one.part.title, one.energy_max] for one in overview.parts]
+
+
+def _force(force: ForceOverview) -> str:
+    """Name a contact and the times in which it acts."""
+    times = [f"{start:.6g} to {end:.6g}" for start, end in force.acts]
+    when = f"acts from {listing(times, most=_MOST_TIMES)}" if times else "never acts"
+    return f"{force.name} {when}"
 
 
 def _flight(source: str, flight: FreeFlight) -> str:

@@ -204,6 +204,10 @@ ROWS = (
     Row("memory / (2 answers + 64 MB): glstat", reading("memory_over_limit", "glstat"), most=1.0),
     Row("memory / (2 answers + 64 MB): matsum", reading("memory_over_limit", "matsum"), most=1.0),
     Row("memory / (2 answers + 64 MB): binout", reading("memory_over_limit", "binout"), most=1.0),
+    Row("d3plot, 10 GB, 5 files / bare read of the heads of states", reading("d3plot_to_bare_read", 5, 400), most=3.0),
+    Row(
+        "d3plot, 10 GB, 100 files / bare read of the heads of states", reading("d3plot_to_bare_read", 100, 20), most=3.0
+    ),
     Row("csv, 1e6 rows, 2 columns / numpy.loadtxt", reading("csv_to_loadtxt"), most=1.5),
     Row("memory / (3 answers + 64 MB): csv, 1e6 rows", reading("csv_memory_over_limit"), most=1.0),
     Row("csv, 1e6 rows, 2 columns / pandas.read_csv", reading("csv_to_pandas", 2), most=2.0),

@@ -24,6 +24,7 @@ from d2rpick.histories.formats import csv_table, hdf5_file
 from d2rpick.histories.opening import Selection, open_run
 from tests.benchmarks.timing import ROOT, environment, output, own_seconds, processor_seconds, ratio, seconds
 from tests.made_binout import GLSTAT, LsdaWriter, values
+from tests.made_d3plot import END, D3plotWriter, states as made_states
 from tests.text_files import glstat_text, matsum_text
 
 if TYPE_CHECKING:
@@ -191,6 +192,24 @@ def _memory(file: Path, times: int) -> float:
     return taken / (times * answer + _ROOM)
 
 
+def d3plot_to_bare_read(files: int, states: int) -> float:
+    """Reading a d3plot of so many files and states of 5 MB over seeking and reading what its states begin with."""
+    first, size, head = _d3plot(files, states)
+
+    def bare() -> list[bytes]:
+        found = []
+        for number in range(1, files + 1):
+            with Path(f"{first}{number:02d}").open("rb", buffering=0) as file:
+                for state in range(states):
+                    file.seek(state * size)
+                    found.append(file.read(head))
+        return found
+
+    times = [float(np.frombuffer(state, "<f4", 1)[0]) for state in bare()]
+    np.testing.assert_array_equal(_read(first).time, times)
+    return ratio(lambda: _read(first), bare, _ROUNDS)
+
+
 def csv_to_loadtxt() -> float:
     """Reading a csv of 1e6 rows and two columns over numpy.loadtxt, of the same file."""
     file = _csv(_ROWS, 2)
@@ -346,6 +365,23 @@ def _matsum() -> Path:
     ids: Sequence[int] = [10 * part + 1 for part in range(_PARTS)]
     energies = np.random.default_rng(2).normal(size=(_PART_STATES, _PARTS))
     return _made("matsum", matsum_text(np.linspace(0, 1, _PART_STATES), ids, energies))
+
+
+@cache
+def _d3plot(files: int, states: int) -> tuple[Path, int, int]:
+    """A family of sparse files, what of each state is not nodes and elements written: its name, bytes of both."""
+    made = D3plotWriter(ids=range(1, 101), titles=(), control={"numnp": 0, "nel2": 0, "nelt": 0, "nv2d": 1_250_000})
+    first = _made(f"of_{files}.d3plot", made.filled(made.head()))
+    some = made_states((0.001 * np.arange(files * states)).tolist(), 100)
+    size, head = len(made.state(some[0])), len(some[0].values()) * made.width
+    for number in range(files):
+        with Path(f"{first}{number + 1:02d}").open("wb") as file:
+            for place in range(states):
+                file.seek(place * size)
+                file.write(made.real(some[number * states + place].values()))
+            file.seek(states * size)
+            file.write(made.real([END]))
+    return first, size, head
 
 
 @cache

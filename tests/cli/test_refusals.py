@@ -28,7 +28,7 @@ suggest --td nan x | --td | finite
 suggest --td inf x | --td | finite
 suggest --td 1 -f jsno x | 'jsno' | 'json'
 verify --tr 1 --td 2 -f value x | 'value' | 'markdown'
-suggest --td 1 -F d3plot x | 'd3plot' | 'hdf5' | 'glstat'
+suggest --td 1 -F d3hsp x | 'd3hsp' | 'hdf5' | 'glstat'
 suggest --td 1 --limit 0 x | --limit | 1
 suggest --td 1 --margin -1 x | --margin | -1 was found | at least 0 was expected
 suggest --td 1 --tolerance -1 x | --tolerance | at least 0 was expected
@@ -143,7 +143,7 @@ suggest --td 0.06 --step-ratio 2 {ENERGY} | --step-ratio needs --cost-share
 suggest --td 0.06 --cost-share 2 {ENERGY} | at most 1
 # inputs that are not there, or not so
 suggest --td 0.064 absent.csv | absent.csv: no such file | check the name
-suggest --td 0.064 {Path(__file__).parent} | {Path(__file__).parent}: no glstat, matsum, binout or T01 | give the file
+suggest --td 0.064 {Path(__file__).parent} | {Path(__file__).parent}: no glstat, matsum, binout, d3plot | give the file
 suggest --td 0.064 {GLSTAT} -F csv | {GLSTAT}:1:  | a table of time and energy
 suggest --td 0.064 {GLSTAT} --energy 'internal enrgy' | did you mean 'internal energy' | kinetic energy
 suggest --td 0.064 {GLSTAT} --time cycle | no time 'cycle' | leave --time out

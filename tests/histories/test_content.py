@@ -26,6 +26,7 @@ from tests.command import put
 from tests.hdf5_files import ENERGY, plain, written
 from tests.histories.test_source import CONTENTS, TIMES
 from tests.made_binout import binout
+from tests.made_d3plot import D3plotWriter, states
 from tests.made_t01 import t01
 from tests.reading import on_disk, read_history, run_of_file, run_on_disk
 from tests.text_files import glstat_text, matsum_text
@@ -223,6 +224,8 @@ ANEW = {
     "matsum": matsum_text(TIMES, [7, 3], np.full((3, 2), 2.0)),
     "hdf5": written(plain).getvalue().replace(ENERGY.tobytes(), (ENERGY + 1).tobytes()),
     "csv": b"time,IE\n0,2\n1,1\n",
+    "d3thdt": D3plotWriter(family=3).together(states(TIMES)[::-1]),
+    "d3plot": D3plotWriter(order=">").together(states(TIMES)),
 }
 
 

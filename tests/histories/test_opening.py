@@ -39,8 +39,8 @@ def file(tmp_path: Path) -> Write:
     return write
 
 
-def test_the_order_is_a_signature_first_and_any_text_last() -> None:
-    assert list(READERS) == ["binout", "radioss-th", "glstat", "matsum", "hdf5", "csv"]
+def test_the_order_is_a_signature_first_and_what_is_written_seldom_last() -> None:
+    assert list(READERS) == ["binout", "radioss-th", "glstat", "matsum", "hdf5", "csv", "d3thdt", "d3plot"]
 
 
 @pytest.mark.parametrize(("data", "name"), [(CSV, "glstat"), (GLSTAT, "energy.csv")])
@@ -95,9 +95,9 @@ def zipped(*names: str) -> bytes:
 
 
 def test_what_ls_dyna_draws_is_no_history(tmp_path: Path) -> None:
-    (tmp_path / "d3plot01").write_bytes(bytes(range(256)))
-    with pytest.raises(FormatError, match=r"d3 family, .*; name the glstat, matsum or binout"):
-        read_history([str(tmp_path / "d3plot01")])
+    (tmp_path / "d3dump01").write_bytes(bytes(range(256)))
+    with pytest.raises(FormatError, match=r"d3 family, .*; name the glstat, matsum, d3plot or binout"):
+        read_history([str(tmp_path / "d3dump01")])
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,7 @@ from tests.command import refused
 from tests.computed import stored
 from tests.hdf5_files import plain, written
 from tests.made_binout import binout
+from tests.made_d3plot import D3plotWriter, states
 from tests.made_t01 import t01
 from tests.reading import read_history
 from tests.text_files import glstat_text, matsum_text
@@ -33,6 +34,8 @@ CONTENTS = {
     "matsum": matsum_text(TIMES, [7, 3], np.ones((3, 2))),
     "hdf5": written(plain).getvalue(),
     "csv": b"time,IE\n0,1\n1,2\n",
+    "d3thdt": D3plotWriter(family=3).together(states(TIMES)),
+    "d3plot": D3plotWriter().together(states(TIMES)),
 }
 
 
@@ -67,7 +70,8 @@ def test_every_format_is_read_by_its_content_from_a_file_gzip_and_standard_input
 @pytest.mark.usefixtures("here")
 def test_a_folder_holds_the_databases_of_one_run() -> None:
     run = names("run/binout0000", "run/binout0000%001", "run/binout0004", "run/GLSTAT", "run/matsum.gz")
-    names("run/d3plot", "run/messag", "run/glstat.txt", "run/nodout", "run/binout.log")
+    run = [*run, *names("run/d3plot", "run/d3plot01", "run/d3thdt")]
+    names("run/d3hsp", "run/d3dump01", "run/messag", "run/glstat.txt", "run/nodout", "run/binout.log")
     assert expand(["run"]) == tuple(sorted(run))
     legs = names("rad/box_T01", "rad/box_T02.gz", "rad/box_T03")
     names("rad/box_0001.out", "rad/box_T01.csv")
@@ -117,7 +121,7 @@ def test_a_glob_takes_what_has_such_a_name() -> None:
     [
         (("run/aT01", "run/bT01", "run/bT02"), r"run: this folder holds several runs \(aT01, bT01\)"),
         (("run/aT01", "run/binout"), r"several runs \(aT01, one of LS-DYNA\)"),
-        (("run/d3plot",), "run: no glstat, matsum, binout or T01 in this folder; give the file"),
+        (("run/d3dump01",), "run: no glstat, matsum, binout, d3plot or T01 in this folder; give the file"),
     ],
 )
 def test_a_folder_of_several_runs_or_none_is_refused(files: Sequence[str], reason: str) -> None:

@@ -29,7 +29,7 @@ class Listed(NamedTuple):
 
 
 # In the order they are asked, and in which they are preferred as sources of one quantity: binary before text, since it
-# holds more digits; csv takes any text, so it comes last.
+# holds more digits; csv takes any text, so it comes last of those; and what a run writes seldom comes behind all.
 READERS: Final[Mapping[str, Listed]] = {
     "binout": Listed("binout", rb"\A[\x08-\x40].{5}\0", "LS-DYNA", r"(?i:binout[\d%]*)"),
     "radioss-th": Listed("radioss_th", rb"\A\0\0\0T|ZZZZZEOR", "Radioss", r"(?P<root>.*)T\d\d"),
@@ -37,4 +37,8 @@ READERS: Final[Mapping[str, Listed]] = {
     "matsum": Listed("matsum", rb" time =|{BEGIN LEGEND}", "LS-DYNA", "(?i:matsum)"),
     "hdf5": Listed("hdf5_file", rb"\x89HDF"),
     "csv": Listed("csv_table", b""),
+    "d3thdt": Listed("d3thdt", b"", "LS-DYNA", r"(?i:d3thdt(?:\d{2,})?)"),
+    "d3plot": Listed("d3plot", b"", "LS-DYNA", r"(?i:d3plot(?:\d{2,})?)"),
 }
+# Of the formats that are families of files, of which only the first says what it is.
+FAMILIES: Final = ("d3thdt", "d3plot")

@@ -91,7 +91,7 @@ class Lsda:
     source : str
         Name of the file, for messages.
     branches : collection of str
-        Top-level directories whose variables are wanted; of the others only the names are kept.
+        Directories of states whose variables are wanted, by their paths; of the others only the names are kept.
 
     Attributes
     ----------
@@ -195,7 +195,7 @@ class Lsda:
         if position < size:
             self.stop = f"no complete record at byte {position} of {size}"
         if number >= 0 and (self.stop or command == VARIABLE):
-            self.unfinished = path[0]
+            self.unfinished = "/".join(path[:-1])
 
     def _goes_on(self, rest: bytes, heads: set[bytes]) -> bool:
         """Whether the file was cut in the record that begins so; else bytes are lost or too many in the one before.
@@ -211,7 +211,8 @@ class Lsda:
         """Keep what the directory that is now left held, if it is wanted."""
         while records and self._head.unpack_from(records[-1])[1] != VARIABLE:
             records.pop()  # a symbol table behind the variables is no part of their layout
-        if not records or len(path) != 2 or path[0] not in self.visits:
+        branch = "/".join(path[:-1])
+        if not records or branch not in self.visits:
             return
         key = tuple(records)
         layout = self._known.get(key)
@@ -219,13 +220,13 @@ class Lsda:
             layout = self._known[key] = len(self.layouts)
             self.layouts.append(self._layout(records))
         if number >= 0:
-            self.visits[path[0]].extend((number, start, layout))
-            if self._forms.get(path[0], (-1,))[0] != layout:
-                self._forms[path[0]] = layout, self._form(key)
-        elif path[1] == "metadata":
-            self.metadata[path[0]].append((start, layout))
+            self.visits[branch].extend((number, start, layout))
+            if self._forms.get(branch, (-1,))[0] != layout:
+                self._forms[branch] = layout, self._form(key)
+        elif path[-1] == "metadata":
+            self.metadata[branch].append((start, layout))
         else:
-            self.odd[path[0]].append(path[1])
+            self.odd[branch].append(path[-1])
 
     def _layout(self, records: list[bytes]) -> DirectoryLayout:
         """Sort out the heads of a directory's records; one that makes no sense holds no variable."""
@@ -256,9 +257,10 @@ class Lsda:
 
     def _same_again(self, path: tuple[str, ...], start: int) -> _Form | None:
         """Look whether a state has the records of the last one of its branch."""
-        if len(path) != 2 or path[0] not in self._forms:
+        branch = "/".join(path[:-1])
+        if branch not in self._forms:
             return None
-        form = self._forms[path[0]][1]
+        form = self._forms[branch][1]
         block = int.from_bytes(self.data[start : start + form.length])
         return form if start + form.length <= len(self.data) and block & form.mask == form.fixed else None
 
@@ -279,7 +281,7 @@ class Lsda:
         # A number ends its record: the next byte is where the state's records start.
         growth = {previous + at + width: step for (at, width), step in zip(numbers, steps, strict=True)}
         ahead = np.arange(1, times)[:, None, None]
-        for visits in self.visits.values():
+        for visits in filter(None, self.visits.values()):  # a branch that is not there has none
             known = np.array(visits[-3 * len(growth) :]).reshape(-1, 3)
             repeated = known[np.isin(known[:, 1], [*growth])]
             more = [[growth[start], stride, 0] for start in repeated[:, 1].tolist()]

@@ -16,6 +16,7 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.histories.contact_forces import ContactForce
 from d2rpick.histories.content import Content, content_of
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats.radioss_records import INT, RUN, WIDTH, Records, integers, is_binary, is_text, records_of
@@ -46,6 +47,28 @@ _PART_VARIABLES: Final = {
 }  # fmt: skip
 
 
+# Kinds of groups that have forces: interfaces and rigid walls, and their variables: normal and tangential impulses.
+_TOUCHING: Final = {101: "interface", 102: "rigid wall"}
+_IMPULSES: Final = ((1, 2, 3), (4, 5, 6))
+
+
+class _Group(NamedTuple):
+    """A group with a history: its kind, its members, the numbers of its variables.
+
+    ``named`` are number and title of each member, of a group of forces alone.
+    """
+
+    kind: int
+    members: int
+    named: tuple[tuple[int, str], ...]
+    variables: tuple[int, ...]
+
+    @property
+    def values(self) -> int:
+        """Values of a state."""
+        return self.members * len(self.variables)
+
+
 class _Head(NamedTuple):
     """What the records before the first state say."""
 
@@ -55,6 +78,7 @@ class _Head(NamedTuple):
     parts: tuple[Part, ...]
     columns: dict[tuple[int, str], int]  # number of a part's variable among those of all parts
     counts: tuple[int, ...]  # of numbers in the records of one state
+    groups: tuple[_Group, ...]  # whose records are the last ones
 
 
 def recognises(head: bytes) -> bool:
@@ -128,6 +152,26 @@ class TimeHistory(Database):
         if name not in self.channels:
             raise FormatError(f"{self.source}: no global {name}, there are {listing(self.channels, most=30)}")
         return self._columns(1, [self.channels.index(name)])[:, 0]
+
+    @cached_property
+    def contact_forces(self) -> tuple[ContactForce, ...]:
+        """Forces of the interfaces and rigid walls that have a history (cards /TH/INTER and /TH/RWALL)."""
+        groups = [group for group in self._head.groups if group.values]
+        first = len(self._begins) - len(groups)
+        return tuple(
+            self._force_of(record, group, place)
+            for record, group in enumerate(groups, start=first)
+            if group.kind in _TOUCHING and {*_IMPULSES[0]} <= {*group.variables}
+            for place in range(group.members)
+        )
+
+    def _force_of(self, record: int, group: _Group, place: int) -> ContactForce:
+        number, title = group.named[place]
+        axes = [axes for axes in _IMPULSES if {*axes} <= {*group.variables}]
+        places = [place * len(group.variables) + group.variables.index(axis) for triple in axes for axis in triple]
+        impulses = self._columns(record, places).reshape(self._states, len(axes), 3).sum(axis=1)
+        name = f"{_TOUCHING[group.kind]} {number}{f' {title!r}' if title else ''}"
+        return ContactForce.of_impulses(name, self.time, impulses)
 
     def size_until(self, time: float) -> int:
         """Bytes of the head and of the states up to a time [time]."""
@@ -233,7 +277,8 @@ class _HeadRecords:
         for _ in range(materials + properties):
             self._titled(1)
         subset_values = sum(self._subset() for _ in range(subsets))
-        values = [1, variables, part_values, subset_values, *(self._group() for _ in range(groups))]
+        described_groups = tuple(self._group() for _ in range(groups))
+        values = [1, variables, part_values, subset_values, *(group.values for group in described_groups)]
         return _Head(
             title=plain_text(run[WIDTH:]),
             version=" ".join(version.split()),
@@ -241,6 +286,7 @@ class _HeadRecords:
             parts=described,
             columns=columns,
             counts=tuple(count for count in values if count),
+            groups=described_groups,
         )
 
     def _parts(self, count: int) -> tuple[tuple[Part, ...], dict[tuple[int, str], int], int]:
@@ -271,13 +317,16 @@ class _HeadRecords:
             self._integers(count)
         return variables
 
-    def _group(self) -> int:
-        """Pass over a group, its elements and its list of variables; the number of values per state."""
-        elements, variables = (self._count(n) for n in integers(self._titled(5)[3 * WIDTH : 5 * WIDTH]))
-        for _ in range(elements):
-            self._titled(1)
-        self._integers(variables)
-        return elements * variables
+    def _group(self) -> _Group:
+        """Read a group, its elements and its list of variables."""
+        record = self._titled(5)
+        kind, elements, variables = (INT.unpack_from(record, WIDTH * place)[0] for place in (1, 3, 4))
+        for number in (elements, variables):
+            self._count(number)
+        members = [self._titled(1) for _ in range(elements)]
+        forces = members if kind in _TOUCHING else []
+        named = tuple((INT.unpack_from(member)[0], plain_text(member[WIDTH:])) for member in forces)
+        return _Group(kind, elements, named, self._integers(variables))
 
     def _titled(self, numbers: int) -> bytes:
         """Read a record of a title and so many integers."""

@@ -1,0 +1,38 @@
+"""Whether the states of a file that is written seldom show the level of an energy that swings."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from d2rpick.base.errors import Caution, listing
+from d2rpick.histories.formats import FAMILIES
+from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from d2rpick.choice.situation import Situation
+
+_TURNS_PER_PERIOD: Final = 2
+# What LS-DYNA writes more often than a d3plot.
+_OFTENER: Final = ("d3thdt", "glstat", "matsum", "binout")
+
+
+def cautions_of_few_states(situation: Situation) -> Iterator[Caution]:
+    """Say so where the states up to td are too few for the level at td: fewer than ten in a period that they show.
+
+    Whoever sees no period may have missed all of them, since a d3plot has some hundred states at most.
+    """
+    history, td, start = situation.history, situation.td, situation.flight.start
+    if history.energy_format not in FAMILIES or situation.at_rest:
+        return
+    begin = float(history.time[0]) if start is None else start
+    states = history.between(begin, td)[0].size
+    turns = int(np.count_nonzero((history.turns > begin) & (history.turns < td)))
+    if turns >= _TURNS_PER_PERIOD and states * _TURNS_PER_PERIOD >= MIN_SAMPLES_PER_PERIOD * turns:
+        return
+    oftener = listing([name for name in _OFTENER if name != history.energy_format])
+    found = f"{states} states of the {history.energy_format} up to td = {td:.6g} do not show how the energy swings"
+    yield Caution("few-states", f"{found}, so its level at td is unsure; name what was written more often: {oftener}")

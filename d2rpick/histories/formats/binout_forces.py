@@ -1,0 +1,72 @@
+"""LS-DYNA binout: the branches rcforc (contacts) and rwforc (rigid walls), whose states hold a force of each."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from d2rpick.histories.contact_forces import ContactForce
+from d2rpick.histories.formats.binout_branch import Branch
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from d2rpick.histories.formats.lsda import Lsda
+    from d2rpick.histories.history import Samples
+
+    Indices = NDArray[np.int64]
+
+# Branches of forces, and what each tells of.
+FORCES: Final = {"rcforc": "contact", "rwforc/forces": "rigid wall"}
+
+
+def writes_forces(files: Sequence[Lsda]) -> bool:
+    """Whether any state of a family holds forces."""
+    return any(ForceBranch(name, files, by_part=True).writes_forces for name in FORCES)
+
+
+def forces_of(files: Sequence[Lsda]) -> tuple[ContactForce, ...]:
+    """Give the forces of all contacts and rigid walls of a family; FormatError where they cannot be assigned."""
+    branches = [ForceBranch(name, files, by_part=True) for name in FORCES]
+    return tuple(force for branch in branches if branch.writes_forces for force in _forces_of(branch))
+
+
+class ForceBranch(Branch):
+    """A branch whose variables are lists with one value for each side of each contact, or for each wall."""
+
+    @property
+    def writes_forces(self) -> bool:
+        """Whether its states hold forces; a run without a contact writes states of their time alone."""
+        return bool(self._variables) and all("x_force" in held for held in self._variables)
+
+    def of_each(self, name: str) -> tuple[Indices, Samples]:
+        """Ids of all that is listed, of contacts once for each side, and one variable of theirs, of shape (n, ids)."""
+        listed: Indices | None = None
+        columns: list[tuple[Indices, Samples]] = []
+        for group, variable in self.checked(name):
+            ids = self.ids_of(group)
+            first = ids[0] if listed is None else listed
+            if variable.count != ids.shape[1] or ids.shape[1] != first.size or (ids != first).any():
+                raise self.refused(group, f"other ids than before, which the values of {name} cannot be assigned to")
+            listed = first
+            values = group.values(variable, np.arange(variable.count)[None, :])
+            columns.append((group.rows, values))
+        found = np.empty((self.time.size, 0 if listed is None else listed.size))
+        for rows, values in columns:
+            found[rows] = values
+        return np.empty(0, np.int64) if listed is None else listed, found
+
+
+def _forces_of(branch: ForceBranch) -> Iterator[ContactForce]:
+    """Put the sides of each contact together: they have the same force in opposite directions, or one has none."""
+    ids, first = branch.of_each("x_force")
+    forces = np.stack([first, *(branch.of_each(f"{axis}_force")[1] for axis in "yz")], axis=2)
+    for id_ in dict.fromkeys(ids.tolist()):
+        sides = forces[:, ids == id_]
+        strongest = int(np.abs(sides).sum(axis=(0, 2)).argmax())
+        title = branch.legend.get(id_, "")
+        name = f"{FORCES[branch.name]} {id_}{f' {title!r}' if title else ''}"
+        yield ContactForce.of_forces(name, branch.time, sides[:, strongest])

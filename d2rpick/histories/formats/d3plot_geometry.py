@@ -1,0 +1,205 @@
+"""The sections between the control words and the states of a d3plot: nodes, elements, ids of the parts, titles.
+
+Only what says something of the states is read of them; the rest is passed over by the lengths that the control words
+tell.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from d2rpick.histories.formats.d3plot_words import CONTROL, LONG_IDS, dimensions_of
+from d2rpick.histories.names import plain_text
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from d2rpick.histories.formats.d3plot_words import Words
+
+_WITH_MATERIAL_TYPES: Final = (5, 7)
+_WITH_ROADS: Final = (6, 7, 9)
+WITH_RIGID_BODIES: Final = (8, 9)
+# Words of an element of each kind in the section behind the numbers of nodes and elements.
+_EXTRA_NODES: Final = {"nel48": 5, "nel20": 13}
+_FULL_QUADRATIC: Final = {"nel27": 28, "nel21p": 22, "nel15t": 8}
+_CUBIC: Final = {"nel20t": 21, "nel40p": 41, "nel64": 65}
+
+_NUMBERING: Final = 10  # words before the ids
+_PART_NUMBERING: Final = 16  # the same where ids of parts are among them
+_TITLE: Final = 72  # bytes, whatever a word has
+_RUN_TITLE: Final = 90_000
+_PART_TITLES: Final = 90_001
+_KEYWORDS: Final = 90_100
+_OTHER_TITLES: Final = (90_002, 90_020)
+_KEYWORD: Final = 80  # bytes of a line of them
+_MOST_TITLES: Final = 1_000_000
+
+
+class Geometry:
+    """The sections between the control words and the titles, passed over one after the other.
+
+    ``at`` is the word where the next one begins; ``part_ids`` are those of the parts, sorted and as they were
+    defined, where the file tells them.  The rest counts what a state holds of each.
+    """
+
+    def __init__(self, words: Words, control: Mapping[str, int]) -> None:
+        self._words, self._control = words, control
+        self.at = CONTROL + max(0, control["extra"])
+        self.part_ids: tuple[tuple[int, ...], ...] = ()
+        self.rigid_shells = self.values_of_sph = self.airbag_values = self.roads = self.rigid_bodies = 0
+        self._airbag_geometry = self._left_nodes = 0
+
+    def pass_over(self) -> None:
+        """Go through all sections in their order."""
+        self._material_types()
+        self.at += self._control["ialemat"]
+        self._sph_flags()
+        self._airbag_flags()
+        self._nodes_and_elements()
+        self._rigid_bodies()
+        self.at += 2 * self._control["nadapt"] + 2 * self._control["nmsph"] + self._airbag_geometry
+        self._roads()
+        self._extra_nodes()
+
+    def _next(self, count: int) -> tuple[int, ...]:
+        """Take so many counts; FormatError where one is none."""
+        found = self._words.integers(self.at, count)
+        if min(found) < 0:
+            raise self._words.damaged(f"a count of {min(found)} at word {self.at}")
+        self.at += count
+        return found
+
+    def _material_types(self) -> None:
+        if self._control["ndim"] in _WITH_MATERIAL_TYPES:
+            self.rigid_shells, materials = self._next(2)
+            self.at += materials
+
+    def _sph_flags(self) -> None:
+        if self._control["nmsph"] <= 0:
+            return
+        begin = self.at
+        (length,) = self._next(1)
+        flags = self._words.integers(begin + 1, 10)
+        histories = flags[-1] if length > len(flags) else 0  # older files have no word for them
+        self.values_of_sph = 1 + sum(abs(flag) for flag in flags[:-1]) + histories
+        self.at = begin + length
+
+    def _airbag_flags(self) -> None:
+        airbags, version = self._control["npefg"] % 1000, self._control["npefg"] // 1000
+        if self._control["npefg"] <= 0:
+            return
+        of_geometry, of_particle, particles, of_airbag = self._next(4)
+        self.at += version == 4  # the number of chambers
+        self.at += 9 * (of_geometry + of_particle + of_airbag)  # a type and a name of each value
+        self._airbag_geometry = airbags * of_geometry
+        self.airbag_values = airbags * of_airbag + particles * of_particle
+
+    def _nodes_and_elements(self) -> None:
+        control, solids = self._control, abs(self._control["nel8"])
+        self.at += dimensions_of(control) * control["numnp"] + 9 * solids
+        shells = 9 * control["nelt"] + 6 * control["nel2"] + 5 * control["nel4"]
+        more = 2 * solids if control["nel8"] < 0 else 0  # two more nodes of each solid
+        # they are told of behind the solids or, by other releases, behind all: where the numbering begins shows it
+        follows = not more or self._begins_numbering(self.at + more + shells)
+        self.at += shells + (more if follows else 0)
+        self._left_nodes = 0 if follows else more
+        self._numbering()
+
+    def _begins_numbering(self, place: int) -> bool:
+        if not self._words.has(place * self._words.form.width, _NUMBERING * self._words.form.width):
+            return False
+        counts = self._words.integers(place + 5, 2)
+        return counts == (self._control["numnp"], abs(self._control["nel8"]))
+
+    def _numbering(self) -> None:
+        """Pass over the numbers of nodes and elements, and read those of the parts."""
+        size = self._control["narbs"]
+        if size <= 0:
+            return
+        head = self._words.integers(self.at, _NUMBERING)
+        if head[0] < 0:
+            self.part_ids = self._ids(head, size)
+        self.at += size
+
+    def _ids(self, head: tuple[int, ...], size: int) -> tuple[tuple[int, ...], ...]:
+        form, count = self._words.form, self._control["nmmat"]
+        long = self._control["filetype"] >= LONG_IDS
+        width = 8 if long else form.width
+        expected = _PART_NUMBERING + (sum(head[5:]) + 3 * count) * width // form.width
+        if size != expected:
+            raise self._words.damaged(f"a section of ids of {size} words, not of {expected}")
+        begin = (self.at + size) * form.width - 3 * count * width
+        found_ids = np.frombuffer(self._words.bytes(begin, 2 * count * width), f"{form.order}i{width}")
+        return tuple(tuple(ids.tolist()) for ids in found_ids.reshape(2, count))
+
+    def _rigid_bodies(self) -> None:
+        if self._control["ndim"] not in WITH_RIGID_BODIES:
+            return
+        (self.rigid_bodies,) = self._next(1)
+        for _ in range(self.rigid_bodies):
+            _, nodes = self._next(2)
+            self.at += nodes
+            (active,) = self._next(1)
+            self.at += active
+
+    def _roads(self) -> None:
+        if self._control["ndim"] not in _WITH_ROADS:
+            return
+        nodes, _, self.roads, _ = self._next(4)
+        self.at += 4 * nodes
+        for _ in range(self.roads):
+            _, segments = self._next(2)
+            self.at += 4 * segments
+
+    def _extra_nodes(self) -> None:
+        control, kinds = self._control, dict(_EXTRA_NODES)
+        if control["quadr"]:
+            kinds |= _FULL_QUADRATIC
+        if control["cubic"]:
+            kinds |= _CUBIC
+        self.at += self._left_nodes + sum(words * control[name] for name, words in kinds.items())
+
+
+class Titles:
+    """The titles behind the geometry; ``at`` is the byte behind them, where states may begin."""
+
+    def __init__(self, words: Words, at: int) -> None:
+        self._words, self.at = words, at
+        self.of_run, self.of_parts = "", dict[int, str]()
+
+    def read(self) -> None:
+        """Read all of them; FormatError where the geometry does not end here."""
+        width = self._words.form.width
+        if not self._words.has(self.at, width):
+            self._words.bytes(self.at, width)
+        if not self._words.ends_at(self.at):
+            raise self._words.damaged(f"no end of the geometry at byte {self.at}, where its head says")
+        self.at += width
+        while self._words.has(self.at, width) and self._section():
+            if self._words.ends_at(self.at):
+                self.at += width
+
+    def _section(self) -> bool:
+        """Read what begins here; False where it is no titles."""
+        (kind,), width = self._integers(1), self._words.form.width
+        if kind == _RUN_TITLE:
+            self.of_run = plain_text(self._words.bytes(self.at + width, _TITLE))
+            self.at += width + _TITLE
+            return True
+        if kind not in (_PART_TITLES, _KEYWORDS, *_OTHER_TITLES):
+            return False
+        kind, count = self._integers(2)
+        size = _KEYWORD if kind == _KEYWORDS else width + _TITLE
+        rows = self._words.bytes(self.at + 2 * width, min(count, _MOST_TITLES) * size)
+        if kind == _PART_TITLES:
+            for begin in range(0, len(rows), size):
+                id_ = int(np.frombuffer(rows[begin : begin + width], self._words.form.integer)[0])
+                self.of_parts[id_] = plain_text(rows[begin + width : begin + size])
+        self.at += 2 * width + len(rows)
+        return True
+
+    def _integers(self, count: int) -> tuple[int, ...]:
+        found = self._words.bytes(self.at, count * self._words.form.width)
+        return tuple(np.frombuffer(found, self._words.form.integer).tolist())

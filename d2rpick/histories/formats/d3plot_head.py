@@ -1,0 +1,164 @@
+"""The head of a d3plot or d3thdt of LS-DYNA: how its numbers are written, how long states are, which parts it has."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from d2rpick.base.errors import FormatError
+from d2rpick.base.tuples import NamedTuple
+from d2rpick.histories.formats.d3plot_geometry import WITH_RIGID_BODIES, Geometry, Titles
+from d2rpick.histories.formats.d3plot_words import HEAD, Form, Words, dimensions_of, form_of
+from d2rpick.histories.names import Part, plain_text
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from d2rpick.histories.content import Content
+
+GLOBALS: Final = 6  # kinetic, internal and total energy, and the velocity of the whole model
+
+_FEMZIP: Final = 76_893_465  # stands in place of the number of parts in packed files
+_BY_ELEMENT: Final = -10_000  # at most this: the state tells which elements are deleted, else which nodes
+_WITH_WALL_PLACES: Final = 971.0  # since this release a rigid wall has its place beside its force
+
+_THERMAL: Final = {0: 0, 1: 1, 2: 4, 3: 6}  # values of a node: temperatures of one layer or three, and heat flux
+
+
+class Head(NamedTuple):
+    """What the first file of a family says of its states.
+
+    ``begin`` is where states begin in it, ``state`` how long each is [bytes].  Of each state ``globals`` words follow
+    its time: those of the model, ``part_values`` quantities of each part and the forces of so many rigid ``walls``.
+    ``no_parts`` says why there are no parts where there are none.
+    """
+
+    form: Form
+    title: str
+    version: str
+    begin: int
+    state: int
+    globals: int
+    parts: tuple[Part, ...]
+    part_values: int
+    walls: int
+    no_parts: str
+
+
+def read_head(content: Content, source: str) -> Head:
+    """Read the head of the first file of a family.
+
+    Raises
+    ------
+    FormatError
+        If the file ends within it, is packed by femzip, or a section does not end where it should.
+    """
+    form = form_of(content[:HEAD])
+    if form is None:
+        raise FormatError(f"{source}: this is not the first file of a d3plot or d3thdt; name that of the run")
+    words = Words(content, form, source)
+    control = words.control()
+    if control["nmmat"] == _FEMZIP:
+        raise FormatError(
+            f"{source}: this file is packed by femzip; unpack it, or name the glstat or binout of the run"
+        )
+    if control["nglbv"] < GLOBALS:
+        found = f"{source}: its states have {control['nglbv']} global values, {GLOBALS} or more were expected"
+        raise FormatError(f"{found}; name the glstat or binout of the run")
+    geometry = Geometry(words, control)
+    geometry.pass_over()
+    titles = Titles(words, geometry.at * form.width)
+    titles.read()
+    number = _number_of_parts(control)
+    values, no_parts = _values_of_parts(control["nglbv"], number, source)
+    ids = _ids_by(geometry, titles, number) if values else ()
+    if len({*ids}) < len(ids):
+        raise words.damaged("the id of a part twice")
+    parts = tuple(Part(id_, titles.of_parts.get(id_, "")) for id_ in ids)
+    state = form.width * _words_of_state(control, geometry)
+    if state < form.width * (1 + control["nglbv"]):
+        raise words.damaged(f"states of {state} bytes, less than the values of the model have,")
+    return Head(
+        form=form,
+        title=plain_text(content[: 10 * form.width]) or titles.of_run,
+        version=words.version(),
+        begin=titles.at,
+        state=state,
+        globals=control["nglbv"],
+        parts=parts,
+        part_values=values,
+        walls=_walls(control["nglbv"], len(parts), values, words),
+        no_parts=no_parts,
+    )
+
+
+def _number_of_parts(control: Mapping[str, int]) -> int:
+    return control["nmmat"] or sum(control[name] for name in ("nummat8", "nummat2", "nummat4", "nummatt", "ngpsph"))
+
+
+def _ids_by(geometry: Geometry, titles: Titles, number: int) -> tuple[int, ...]:
+    """Give the ids of the parts in the order of their values.
+
+    A file of parts that are numbered one by one has no list of them; the titles have their ids, too.
+    """
+    titled = tuple(titles.of_parts)
+    lists = geometry.part_ids or (tuple(range(1, number + 1)),)
+    if len(titled) == number and (titled in lists or not geometry.part_ids):
+        return titled
+    return lists[0]
+
+
+def _values_of_parts(values: int, number: int, source: str) -> tuple[int, str]:
+    """Give how many quantities a state has of each part: 7, or less in older files; 0 and the reason where none."""
+    of_parts = values - GLOBALS
+    if number == 0 or of_parts == 0:
+        return 0, f"{source}: its states hold the whole model alone; give the matsum or binout of the run for its parts"
+    each = 7 if of_parts >= 7 * number else of_parts // number
+    fits = of_parts >= 7 * number or of_parts % number == 0
+    if not fits or each < 2:
+        found = f"{source}: its states have {of_parts} values for {number} parts, which cannot be told apart"
+        return 0, f"{found}; give the matsum or binout of the run for its parts"
+    return each, ""
+
+
+def _walls(values: int, parts: int, of_part: int, words: Words) -> int:
+    """Count the rigid walls, whose forces stand behind the values of the parts; 0 where they cannot be told apart.
+
+    Releases that are named R9 and so on come behind 971, although the number in their files is 960.
+    """
+    rest = values - GLOBALS - parts * of_part
+    each = 4 if words.is_named or words.release() >= _WITH_WALL_PLACES else 1
+    return rest // each if parts and rest % each == 0 else 0
+
+
+def _words_of_state(control: Mapping[str, int], geometry: Geometry) -> int:
+    """Count the words of a state: its time, global values, nodes, elements, and what else there may be."""
+    solids = abs(control["nel8"])
+    elements = (
+        solids * (control["nv3d"] + control["nt3d"])
+        + control["nelt"] * control["nv3dt"]
+        + control["nel2"] * control["nv1d"]
+        + (control["nel4"] - geometry.rigid_shells) * control["nv2d"]
+    )
+    others = (
+        control["nmsph"] * geometry.values_of_sph
+        + geometry.airbag_values
+        + 6 * geometry.roads
+        + geometry.rigid_bodies * (12 if control["ndim"] == max(WITH_RIGID_BODIES) else 24)
+    )
+    nodes = control["numnp"] * _values_of_node(control)
+    return 1 + control["nglbv"] + nodes + elements + _deletions(control) + others
+
+
+def _values_of_node(control: Mapping[str, int]) -> int:
+    vectors = sum(control[name] != 0 for name in ("iu", "iv", "ia"))
+    heat, scaled_mass = control["it"] % 10, control["it"] // 10 % 10 == 1
+    rates, residuals = control["idtdt"] % 10 == 1, control["idtdt"] // 10 % 10 == 1
+    contact = control["penout"] + (control["engout"] == 1)
+    return dimensions_of(control) * vectors + _THERMAL.get(heat, 0) + scaled_mass + rates + 6 * residuals + contact
+
+
+def _deletions(control: Mapping[str, int]) -> int:
+    """Count the words that say which elements or nodes are deleted."""
+    if control["maxint"] <= _BY_ELEMENT:
+        return abs(control["nel8"]) + control["nelt"] + control["nel4"] + control["nel2"]
+    return control["numnp"] if control["maxint"] < 0 else 0

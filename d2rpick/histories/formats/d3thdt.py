@@ -1,0 +1,27 @@
+"""LS-DYNA d3thdt: a d3plot of chosen nodes and elements, which is mostly written far more often."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from d2rpick.histories.formats import d3plot
+from d2rpick.histories.formats.d3plot_words import family_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from d2rpick.histories.names import Selection
+    from d2rpick.histories.source import Source
+
+
+def recognises(head: bytes) -> bool:
+    """Whether a file that begins like this is the first one of a d3thdt; never raises."""
+    return family_of(head) == "d3thdt"
+
+
+def open_legs(sources: Sequence[Source], selection: Selection) -> list[d3plot.D3plot]:
+    """Open each family as a leg of the run."""
+    legs = d3plot.open_legs(sources, selection)
+    for leg in legs:
+        leg.format = "d3thdt"
+    return legs

@@ -1,0 +1,169 @@
+"""Writes families of d3plot files for tests and benchmarks: either precision and byte order, any states a file."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+END = -999999.0
+BLOCK = 512  # words that files are filled up to
+
+# Control words that are not 0 in every file here, by their places.
+_PLACES = {
+    "filetype": 11, "ndim": 15, "numnp": 16, "icode": 17, "nglbv": 18, "it": 19, "iu": 20, "iv": 21, "ia": 22,
+    "nel8": 23, "nummat8": 24, "nv3d": 27, "nel2": 28, "nummat2": 29, "nv1d": 30, "nel4": 31, "nummat4": 32,
+    "nv2d": 33, "maxint": 36, "nmsph": 37, "narbs": 39, "nelt": 40, "nv3dt": 42, "ialemat": 47, "nadapt": 50,
+    "nmmat": 51, "npefg": 54, "nel48": 55, "idtdt": 56, "extra": 57, "nel20": 64, "nt3d": 65, "nel27": 66,
+    "nel20t": 71, "quadr": 74, "cubic": 75, "penout": 78, "engout": 79,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class State:
+    """Time and values of the model and its parts; ``velocities`` are of shape (parts, 3)."""
+
+    time: float
+    kinetic: Sequence[float]
+    internal: Sequence[float]
+    velocities: Any
+    masses: Sequence[float]
+    hourglass: Sequence[float]
+    model: Sequence[float]
+    walls: Sequence[float] = ()
+
+    def values(self) -> list[float]:
+        """Give what the state begins with."""
+        whole = [sum(self.kinetic), sum(self.internal), sum(self.kinetic) + sum(self.internal), *self.model]
+        velocities = np.ravel(self.velocities)
+        parts = [*self.internal, *self.kinetic, *velocities, *self.masses, *self.hourglass]
+        return [self.time, *whole, *parts, *self.walls]
+
+
+def states(times: Sequence[float], parts: int = 2, walls: int = 0) -> list[State]:
+    """Make states whose values are all different."""
+    made = []
+    for number, time in enumerate(times, start=1):
+        each = np.arange(1, parts + 1)
+        velocities = np.outer(each, [1.0, -2.0, 0.5]) * number
+        forces = [7.0 * number + wall for wall in range(4 * walls)]
+        made.append(
+            State(
+                time=time,
+                kinetic=(each * 10 + number).tolist(),
+                internal=(each * 100 + number).tolist(),
+                velocities=velocities,
+                masses=(each * 2.5).tolist(),
+                hourglass=(each * 0.25 * number).tolist(),
+                model=(0.1 * number, 0.2 * number, -0.3 * number),
+                walls=forces,
+            )
+        )
+    return made
+
+
+@dataclass
+class D3plotWriter:
+    """Writes a family: ``control`` words, ids and titles of parts, and states.
+
+    ``sections`` are put in by the names of the sections that they follow: "control", "elements", "ids".
+    """
+
+    width: int = 4
+    order: str = "<"
+    ids: Sequence[int] = (7, 3)
+    titles: Sequence[str] = ("roof", "door")
+    title: str = "made for a test"
+    control: Mapping[str, int] = field(default_factory=dict)
+    sections: Mapping[str, Sequence[int]] = field(default_factory=dict)
+    more_of_state: int = 0
+    walls: int = 0
+    numbered: bool = True
+    family: int = 1
+    name: str = "R920"
+    release: float = 960.0  # as all named ones say
+    values_of_part: int = 7
+
+    def real(self, values: Sequence[float]) -> bytes:
+        """Write reals."""
+        return np.asarray(values, f"{self.order}f{self.width}").tobytes()
+
+    def whole(self, values: Sequence[int]) -> bytes:
+        """Write integers."""
+        return np.asarray(values, f"{self.order}i{self.width}").tobytes()
+
+    def words(self) -> dict[str, int]:
+        """Give the control words by their names."""
+        parts = len(self.ids)
+        sizes = {"numnp": 5, "nel8": 2, "nel4": 1, "nel2": 1, "nelt": 1, "nv3d": 7, "nv2d": 9, "nv1d": 6, "nv3dt": 8}
+        switches = {"filetype": self.family, "ndim": 4, "icode": 6, "iu": 1, "iv": 1, "ia": 1, "maxint": -10003}
+        of_wall = 4 if self.name.strip().startswith("R") or self.release >= 971 else 1
+        values = 6 + self.values_of_part * parts + of_wall * self.walls
+        found = {**sizes, **switches, "nglbv": values, "nmmat": parts, "nummat8": parts, "extra": 64, **self.control}
+        return {"narbs": self._numbers(found).size if self.numbered else 0, **found}
+
+    def head(self) -> bytes:
+        """Write the control words, the geometry and the titles."""
+        words, plain = self.words(), np.zeros(128, f"{self.order}i{self.width}")
+        for name, value in words.items():
+            plain[_PLACES[name]] = value
+        data = bytearray(plain.tobytes())
+        data[: 10 * self.width] = self.title.encode().ljust(10 * self.width)
+        data[13 * self.width : 13 * self.width + 4] = self.name.encode()
+        data[14 * self.width : 15 * self.width] = self.real([self.release])
+        solids = abs(words["nel8"])
+        elements = 9 * solids + 9 * words["nelt"] + 6 * words["nel2"] + 5 * words["nel4"]
+        data += self.whole(self.sections.get("control", ()))
+        data += self.real([0.5 + node for node in range(3 * words["numnp"])])
+        data += self.whole([1] * elements) + self.whole(self.sections.get("elements", ()))
+        if self.numbered:
+            data += self.whole(self._numbers(words))
+        data += self.whole(self.sections.get("ids", ()))
+        return bytes(data) + self._titles()
+
+    def _numbers(self, words: dict[str, int]) -> Any:
+        """Ids of nodes, elements and parts."""
+        counts = [words["numnp"], abs(words["nel8"]), words["nel2"], words["nel4"], words["nelt"]]
+        head = [-1, 1, 1, 1, 1, *counts, 0, 0, 0, len(self.ids), 0, len(self.ids)]
+        each = [number for count in counts for number in range(1, count + 1)]
+        return np.array([*head, *each, *self.ids, *self.ids, *range(1, len(self.ids) + 1)])
+
+    def _titles(self) -> bytes:
+        rows = b"".join(
+            self.whole([id_]) + title.encode().ljust(72) for id_, title in zip(self.ids, self.titles, strict=False)
+        )
+        parts = self.whole([90001, len(self.titles)]) + rows if self.titles else b""
+        end = self.real([END])
+        return end + parts + self.whole([90000]) + self.title.encode().ljust(72) + end
+
+    def state(self, state: State) -> bytes:
+        """Write one state: its values, then nodes and elements, none of them 0."""
+        words = self.words()
+        elements = (
+            abs(words["nel8"]) * words["nv3d"]
+            + words["nel4"] * words["nv2d"]
+            + words["nel2"] * words["nv1d"]
+            + words["nelt"] * words["nv3dt"]
+        )
+        solids = abs(words["nel8"]) + words["nel4"] + words["nel2"] + words["nelt"]
+        deleted = solids if words["maxint"] <= -10000 else words["numnp"] if words["maxint"] < 0 else 0
+        rest = 9 * words["numnp"] + elements + deleted + self.more_of_state
+        return self.real([*state.values(), *[0.125] * rest])
+
+    def file(self, states: Sequence[State], *, ended: bool = True) -> bytes:
+        """Write a file of states alone, filled up behind the mark of its end."""
+        return self.filled(b"".join(map(self.state, states)) + (self.real([END]) if ended else b""))
+
+    def filled(self, data: bytes) -> bytes:
+        """Fill a file up to whole blocks."""
+        return data + bytes(-len(data) % (BLOCK * self.width))
+
+    def together(self, states: Sequence[State]) -> bytes:
+        """Write one file of all."""
+        return self.head() + self.file(states)
+
+    def written(self, states: Sequence[State], per_file: int = 1, name: str = "d3plot") -> dict[str, bytes]:
+        """Write a family of so many states a file, by the names of its files."""
+        groups = [states[begin : begin + per_file] for begin in range(0, len(states), per_file)]
+        behind = {f"{name}{number:02d}": self.file(group) for number, group in enumerate(groups, start=1)}
+        return {name: self.filled(self.head()), **behind}
