@@ -1,0 +1,231 @@
+"""Switch at pairs with a predicted residual, and see what differs: ``python -m validation.vibration FOLDER [CASE...]``.
+
+A case is a model with a landing after td.  Its reference, the same with a smaller step and a run for each pair are
+computed unless FOLDER has them.  The velocities of all nodes from td to the landing give the residual and the
+correlation; what differs after the landing is printed with what the vibration error is worth: R^2 H over the rise of
+the internal energy.  Without OPENRADIOSS_PATH it is skipped.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import os
+import sys
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from d2rpick.base.caching import cached_property
+from validation import frame_deck
+from validation.frame_deck import Landing, write_deck
+from validation.landing import TOTAL, compare_landings, read_course
+from validation.models import MODELS, Model
+from validation.nodes import compare_vibration, read_motion, read_nodes, vibration_energy
+from validation.run import run
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from validation.landing import Course, LandingDifference
+    from validation.nodes import Nodes, VibrationError
+
+_SMALLER_SCALE: Final = 0.85  # of the stable step: what this changes is the scatter of the model
+_CLEAR: Final = 2e-4  # states so near to td and to the landing are not compared [s]
+
+
+@dataclass(frozen=True)
+class Frame(Model):
+    """The frame of `frame_deck` with the speed at which it lands."""
+
+    landing: Landing = field(default_factory=Landing)
+
+    def deck(self) -> bytes:
+        """Give the starter deck."""
+        return write_deck(self.landing).encode()
+
+
+@dataclass(frozen=True)
+class WholeRollover(Model):
+    """The box of `ROLL` whose rigid body holds the step too, and whose histories hold the motion of all its nodes."""
+
+    def deck(self) -> bytes:
+        """Give the starter deck."""
+        text = super().deck().decode()
+        box, whole = (f"/RBODY/1\nbox\n{self.main:10d}{0:10d}{0:10d}{0:10d}{0:20d}{group:10d}" for group in (1, 2))
+        before, rest = text.split("/TH/NODE/1\n")
+        after = rest[rest.index("/TH/PART/") :]
+        nodes = text.partition("/GRNOD/NODE/2\n")[2].partition("\n/")[0].split("\n", 1)[1].split()
+        watched = "".join(f"{int(node):10d}{0:10d}node {node}\n" for node in nodes)
+        variables = "DX        DY        DZ        VX        VY        VZ"
+        return f"{before.replace(box, whole)}/TH/NODE/1\nnodes\n{variables}\n{watched}{after}".encode()
+
+
+class Pair(NamedTuple):
+    """Switch times [s] and the residual predicted from the reference alone, before the switched run [-]."""
+
+    tr: float
+    td: float
+    predicted: float
+
+
+class Case(NamedTuple):
+    """A model, the parts that are switched, the pairs, and times [s].
+
+    It flies from ``flight_start`` to the landing; what differs is compared for the time ``after_landing``.
+    """
+
+    model: Model
+    parts: tuple[str, ...]
+    pairs: tuple[Pair, ...]
+    flight_start: float
+    after_landing: float
+
+
+_ROLL: Final = MODELS["ROLL"]
+_ROLL_PAIRS: Final = (
+    Pair(0.15527, 0.37225, 0.577),
+    Pair(0.12851, 0.26421, 0.544),
+    Pair(0.0957549, 0.372553, 0.955),
+    Pair(0.10516, 0.37225, 1.792),
+)
+_LANDING, _REACH = 0.1155, 0.0975  # of the frame [s]; how far its lowest foot leads then [m]
+_FRAME_PAIRS: Final = tuple(
+    Pair(tr, 0.10025, predicted)
+    for tr, predicted in (
+        (0.019475, 0.266), (0.018775, 0.395), (0.01835, 0.599), (0.028825, 0.813), (0.0121, 1.000), (0.045325, 1.200),
+        (0.048425, 1.400), (0.014575, 1.597), (0.024125, 1.788),
+    )
+)  # fmt: skip
+
+
+def _frame_case(speed: float, pairs: tuple[Pair, ...]) -> Case:
+    """Give the frame with a speed of landing [m/s]; the ground lies where the frame lands at the same time."""
+    landing = Landing(speed, _LANDING + _REACH / speed)
+    model = Frame(frame_deck.NAME, "frame on four feet", frame_deck.MAIN_NODE, 0.16, 5e-5, 2e-5, landing=landing)
+    return Case(model, frame_deck.PARTS, pairs, 0.004, 0.025)
+
+
+CASES: Final = {
+    "ROLL": Case(
+        WholeRollover(_ROLL.name, _ROLL.what, _ROLL.main, _ROLL.t_end, 1e-4, _ROLL.cap),
+        ("box", "step"),
+        _ROLL_PAIRS,
+        0.0885,
+        0.06,
+    ),
+    "FRAME": _frame_case(5.0, _FRAME_PAIRS),
+    "FRAME-FAST": _frame_case(10.0, _FRAME_PAIRS[::2]),
+    "FRAME-SLOW": _frame_case(2.5, _FRAME_PAIRS[::2]),
+}
+
+
+class Row(NamedTuple):
+    """What came out of a pair, or of the smaller step, which has neither pair nor vibration.
+
+    ``worth`` is R^2 H over the rise of the internal energy at the landing, with the residual R of the nodes [-].
+    """
+
+    pair: Pair | None
+    vibration: VibrationError | None
+    worth: float
+    landing: LandingDifference
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The run of a case without switching, and what its switched runs are compared with."""
+
+    case: Case
+    legs: list[Path]
+    nodes: Nodes
+
+    def course(self, legs: Sequence[Path], td: float) -> Course:
+        """Give a run from its landing on, the first contact after td [s]."""
+        since = np.arange(0.0, self.case.after_landing, self.case.model.interval)
+        return read_course(legs, self.case.parts, self.nodes, td, since)
+
+    def compare_scatter(self, legs: Sequence[Path]) -> Row:
+        """Compare a run that is not switched either."""
+        landing = self._compare_landings(legs, self.case.pairs[0].td)
+        return Row(None, None, 0.0, landing)
+
+    def compare_pair(self, legs: Sequence[Path], pair: Pair) -> Row:
+        """Compare a switched run."""
+        landing = self._compare_landings(legs, pair.td)
+        start, end = pair.td + _CLEAR, self.course(self.legs, pair.td).landing - _CLEAR
+        wanted, found = (read_motion(names, self.nodes, start, end) for names in (self.legs, legs))
+        vibration = compare_vibration(wanted, found, self.nodes)
+        worth = vibration.residual**2 * self.vibration_energy / landing.energies[TOTAL].rise
+        return Row(pair, vibration, worth, landing)
+
+    def _compare_landings(self, legs: Sequence[Path], td: float) -> LandingDifference:
+        wanted, found = (self.course(names, td) for names in (self.legs, legs))
+        return compare_landings(wanted, found, self.case.parts, self.nodes)
+
+    @cached_property
+    def vibration_energy(self) -> float:
+        """Mean energy of the vibration in the second half of the flight [J]."""
+        landing = self.course(self.legs, self.case.pairs[0].td).landing
+        start = (self.case.flight_start + landing) / 2
+        return vibration_energy(read_motion(self.legs, self.nodes, start, landing - _CLEAR), self.nodes)
+
+
+def study(case: Case, folder: Path, solver: Path) -> Iterator[Row]:
+    """Compute what is missing in a folder; give a row for the smaller step, then one for each pair."""
+    model = case.model
+    legs = compute(model, folder / "reference", [], solver)
+    reference = Reference(case, legs, read_nodes(folder / "reference" / f"{model.name}_0000.rad"))
+    smaller = compute(replace(model, scale=_SMALLER_SCALE), folder / "smaller_step", [], solver)
+    yield reference.compare_scatter(smaller)
+    for pair in case.pairs:
+        name = f"tr_{1e3 * pair.tr:g}_td_{1e3 * pair.td:g}"
+        switched = compute(model, folder / name, [(pair.tr, pair.td)], solver)
+        yield reference.compare_pair(switched, pair)
+
+
+def compute(model: Model, folder: Path, windows: list[tuple[float, float]], solver: Path) -> list[Path]:
+    """Run a model unless its folder has a finished run; give its time histories."""
+    done = folder / "done"
+    if not done.exists():
+        run(model, folder, windows, solver)
+        done.touch()
+    return sorted(folder.glob(f"{model.name}T[0-9][0-9]"))
+
+
+_COLUMNS: Final = (
+    "case", "tr_s", "td_s", "R_predicted", "R_nodes", "correlation", "worth", "shift_s", "impulse", "place_m",
+    "turned_deg", "energy", "rise_J", "rms", "peak", "final",
+)  # fmt: skip
+
+
+def cells(name: str, row: Row) -> Iterator[tuple[object, ...]]:
+    """Give the lines of a row in the table of results, one for each energy."""
+    pair, vibration = row.pair or (None, None, None), row.vibration or (None, None)
+    shared = (name, *pair, *vibration, row.worth, *row.landing[1:])
+    for energy, difference in row.landing.energies.items():
+        yield (*shared, energy, difference.rise, difference.rms, difference.peak, difference.final)
+
+
+def main() -> None:
+    """Write the table of results as csv to stdout."""
+    parser = argparse.ArgumentParser(prog="python -m validation.vibration", description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("cases", nargs="*", metavar="CASE", help=f"of {', '.join(CASES)}; by default all")
+    given = parser.parse_args()
+    solver = os.environ.get("OPENRADIOSS_PATH")
+    if not solver:
+        print("skipped: OPENRADIOSS_PATH is not set")
+        return
+    table = csv.writer(sys.stdout, lineterminator="\n")
+    table.writerow(_COLUMNS)
+    for name in given.cases or CASES:
+        for row in study(CASES[name], given.folder / name, Path(solver)):
+            for line in cells(name, row):
+                table.writerow([f"{value:.6g}" if isinstance(value, float) else value for value in line])
+
+
+if __name__ == "__main__":
+    main()
