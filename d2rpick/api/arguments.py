@@ -30,7 +30,8 @@ class Choosing(TypedDict, total=False):
     ``max_kinetic_share``, ``max_residual``: limits that a recommendation must keep.  ``oscillator``: given instead of
     identified, with ``v0``, the velocity of its frame at the first state.  ``fit_window``: (from, to), the oscillator
     is identified there only.  ``replay`` False: judge by the energy level alone.  ``strict``: accept no tr where the
-    energy alone shows when the load is over.  ``cost_share``, ``step_ratio``: of the switched parts in the cost of a
+    energy alone shows when the load is over.  ``keep_vibration``: grade the vibration by itself, however little its
+    error is worth in the next contact.  ``cost_share``, ``step_ratio``: of the switched parts in the cost of a
     step, and of the step while rigid to that while deformable, 1 or more.
     """
 
@@ -45,6 +46,7 @@ class Choosing(TypedDict, total=False):
     fit_window: tuple[float, float] | None
     replay: bool
     strict: bool
+    keep_vibration: bool
     cost_share: float | None
     step_ratio: float
 
@@ -199,13 +201,14 @@ def chosen(choosing: Choosing) -> dict[str, Any]:
     oscillator = given.pop("oscillator", None)
     if (oscillator is None) != (given.get("v0") is None):
         raise ValueError("oscillator and v0 go together: the one vibrates because of the other")
-    for name in given.keys() - {"replay", "strict", "fit_window"}:
+    for name in given.keys() - {"replay", "strict", "keep_vibration", "fit_window"}:
         limits: Any = OPTIONS[name].kind
         if given[name] is not None or name == "tolerance":
             given[name] = number(name, given[name], limits)
     given["fit_window"] = window("fit_window", given.get("fit_window"))
     given["no_verify"] = not given.pop("replay", True)
     given["strict"] = bool(given.get("strict"))
+    given["keep_vibration"] = bool(given.get("keep_vibration"))
     of_oscillator = ("stiffness", "mass", "frame_mass", "alpha")
     return given | {name: float(getattr(oscillator, name)) for name in of_oscillator if oscillator is not None}
 

@@ -82,7 +82,7 @@ JUDGING: Final = ("input_format", "time", "energy", "flying", "channel", "after"
 OSCILLATOR: Final = ("stiffness", "mass", "frame_mass", "beta", "alpha", "v0")
 LIMITS: Final = (
     *("after", "landing", "margin", "tolerance", "max_kinetic_share", "max_residual", *OSCILLATOR),
-    *("fit_window", "no_verify", "strict"),
+    *("fit_window", "no_verify", "strict", "keep_vibration"),
 )
 CHOOSING: Final = (*LIMITS, "cost_share", "step_ratio")
 # Stands for a file that there is not: typed as it is, the command line is refused instead of taking other weights.
@@ -152,6 +152,9 @@ class Request:
     )  # fmt: skip
     strict: bool = option(
         "Recommend nothing where the energy alone shows when the load is over.", "flag", default=False
+    )
+    keep_vibration: bool = option(
+        "Grade the vibration by itself, however little its error is worth in the next contact.", "flag", default=False
     )
     cost_share: float | None = option(
         "Share of the cost of a time step spent on the elements of the switched parts; gives the run time.",

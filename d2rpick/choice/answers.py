@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import Caution, RangeError
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.choice.aftermath import Kept, kept_mean_energy
 from d2rpick.choice.candidates import Candidate, Candidates, Pair, judge
 from d2rpick.choice.health import OF_THE_MODEL, assess, cautions_of_engine, cautions_of_health, refuse_unsound
 from d2rpick.choice.quality import EQUALLY_GOOD, ROUNDING, Quality, candidates_at, over_limits, quality_of
@@ -68,7 +69,12 @@ class Verdict(OfTd):
         """How good the pair is; None where it does not verify."""
         if not self.verified:
             return None
-        return quality_of(self.situation, self.candidate, expectation(self.situation, self.candidate.energy))
+        return quality_of(self.situation, self.candidate)
+
+    @cached_property
+    def kept(self) -> Kept | None:
+        """Bounds of the mean energy after td, over that of the reference; None if nothing tells it."""
+        return kept_mean_energy(self.situation, self.candidate)
 
 
 def verify(history: History, tr: float, td: float, settings: Settings, known: Situation | None = None) -> Verdict:
@@ -181,7 +187,12 @@ class Suggestion(OfTd):
     def quality(self) -> Quality | None:
         """How good the recommended pair is; None without one."""
         best = self.chosen
-        return quality_of(self.situation, best, self.expected) if best else None
+        return quality_of(self.situation, best) if best else None
+
+    @cached_property
+    def kept(self) -> Kept | None:
+        """Bounds of the mean energy after td for the recommended tr, over that of the reference; None if unknown."""
+        return kept_mean_energy(self.situation, self.chosen) if self.chosen else None
 
     @property
     def clearly_better(self) -> Pair | None:

@@ -18,7 +18,7 @@ from d2rpick.choice.warnings import Objection, objections
 from d2rpick.histories.digits import not_before
 from d2rpick.vibration import measures
 from d2rpick.vibration.measures import Measured
-from d2rpick.vibration.model import measured_of, moments_of
+from d2rpick.vibration.model import NEAR_TD, measured_of, moments_of
 from d2rpick.vibration.moments import Moments
 
 if TYPE_CHECKING:
@@ -174,8 +174,22 @@ class Judged:
     def error(self) -> Samples:
         """What the order goes by, as ``Candidate.error`` [-]."""
         residual = self.columns["residual"]
-        error = np.where(np.isnan(residual), self.columns["level_error"], residual)
+        # the least of many that are not known exactly is too good to be true: a wide band counts against it
+        doubted = np.sqrt((residual**2 + self.columns["residual_high"] ** 2) / 2)
+        error = np.where(np.isnan(residual), self.columns["level_error"], np.where(self.modal, doubted, residual))
         return np.where(np.isnan(error), np.inf, error)
+
+    @property
+    def modal(self) -> NDArray[np.bool_]:
+        """Which of them are judged by many modes."""
+        return np.array([one.basis == "modal" for one in self.situations])[self.place]
+
+    @property
+    def near_td(self) -> NDArray[np.bool_]:
+        """Which of them, judged by many modes, lie in the last part of the flight up to td, and so save little."""
+        first = [-np.inf if one.earliest_tr is None else one.earliest_tr for one in self.situations]
+        flown = self.td - np.array(first)[self.place]
+        return np.asarray(self.modal & (self.td - self.moments.tr < NEAR_TD * flown))
 
     @property
     def out_of_place(self) -> NDArray[np.bool_]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import RangeError
 from d2rpick.flight.flight import Flight, all_seen, landed, witnesses
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from d2rpick.choice.question import Settings
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration.span import Fits
+
+# Parts of the record at which a vibration that goes on by itself is looked for.
+_WHERE_IT_VIBRATES: Final = (0.5, 0.75, 0.875)
 
 
 def longest_flight(
@@ -91,7 +94,7 @@ def _last_before(landing: float, flights: Iterable[Flight]) -> Flight | None:
 
 
 def _flights_of(history: History, settings: Settings, fits: Fits | None) -> tuple[Flight, ...]:
-    """Find them without a landing: where the energy is all there is, by one oscillator of the whole record, or none."""
+    """Find them without a landing: where the energy is all there is, by what describes it, or none."""
     seen = all_seen(history)
     if seen:
         return tuple(
@@ -103,10 +106,11 @@ def _flights_of(history: History, settings: Settings, fits: Fits | None) -> tupl
     look = looking(history, settings, fits)
     if settings.replay and not witnesses(history):
         first = float(history.time[0]) if settings.after is None else settings.after
-        middle = look((first + float(history.time[-1])) / 2)
-        start, end = middle.flight.within(history.time)
-        if middle.evidence.span and start < end and not middle.flight.refusal:
-            return (middle.flight,)  # it ends with the oscillator, also where its start is given
+        for share in _WHERE_IT_VIBRATES:
+            flight = look(first + share * (float(history.time[-1]) - first)).flight
+            start, end = flight.within(history.time)
+            if flight.described and start < end and not flight.refusal:
+                return (flight,)  # it ends with the vibration, also if its start is given
         look = looking(history, replace(settings, replay=False))
     found: list[Flight] = []
     for td in sorted(moments(history.time), reverse=True):  # the last quiet time before td tells most of the flight

@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.choice.aftermath import worth_of_error
 from d2rpick.choice.candidates import Candidates, judged_of
-from d2rpick.choice.warnings import POOR_KINETIC_SHARE
 from d2rpick.histories.digits import above
 from d2rpick.vibration.identify import MIN_PLASTIC, MIN_SAMPLES_PER_PERIOD
-from d2rpick.vibration.measures import TOLERATED_GROWTH, wrong_sign
+from d2rpick.vibration.measures import TOLERATED_GROWTH
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
+    from d2rpick.choice.aftermath import Worth
     from d2rpick.choice.candidates import Candidate, Judged
     from d2rpick.choice.situation import Situation
-    from d2rpick.choice.warnings import Expectation
     from d2rpick.histories.history import Samples
 
 # Errors of a deformation within this of the smallest count as equally good: then the earliest tr that is safe wins.
@@ -43,13 +43,15 @@ def candidates_at(situations: Sequence[Situation], *, in_flight: bool = False) -
 def ranked(judged: Judged) -> Iterator[Candidates]:
     """Order the candidates of each td, best first, number them, and recommend the first that keeps the limits, if any.
 
-    Acceptable ones first, of them those on the same swing as td last: they save nothing.  Of each group first those
+    Acceptable ones first, of them those on the same swing as td, or near it, last: they save little.  Of each group first those
     of like quality, the earliest first, but where it is much the same those that leave the body out of place behind the
     others; then the rest by their error.
     """
-    group = np.where(judged.acceptable, judged.columns["same_swing"], np.int8(2)) + 3 * judged.place
+    rigid = judged.td - judged.moments.tr
+    late = judged.columns["same_swing"] | judged.near_td
+    group = np.where(judged.acceptable, late, np.int8(2)) + 3 * judged.place
     room = np.repeat([like_quality(one) for one in judged.situations], 3)
-    places = order(group, judged.error, judged.td - judged.moments.tr, judged.out_of_place, room)
+    places = order(group, judged.error, rigid, judged.out_of_place, room)
     kept = judged.kept[places]
     for one, (first, last) in zip(judged.situations, pairwise(judged.ends), strict=True):
         best = np.flatnonzero(kept[first:last])
@@ -106,17 +108,49 @@ _MOST_FAIR, _MOST_GOOD = 0.5, 0.2
 _MOST_HIDDEN: Final = 0.3
 # Of the standard deviation: an energy passes its mean when it gets so far beyond it; noise near it does not count.
 _BAND: Final = 0.25
-# Decimals of a share that people read.
-_READ: Final = 2
+# Of the energy that the next contact puts into the parts: an error of the vibration with less of it does not make a
+# pair worse than good, or than fair (docs/validation.md).
+_HARDLY_GOOD, _HARDLY_FAIR = 0.01, 0.05
 _NOT_CERTAIN: Final = "the flight is not certain"
 _UNKNOWN_LOAD: Final = "kinetic and internal energy change together, by gravity or by another load"
 
 
-class Quality(NamedTuple):
+class Grade(NamedTuple):
     """A ``grade``, one of `GRADES`, and the ``reasons`` why it is none better; empty for "good"."""
 
     grade: str
     reasons: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, poor: Sequence[str], fair: Sequence[str]) -> Grade:
+        """Grade by the reasons for "poor", else by those for "fair"."""
+        if poor:
+            return cls("poor", tuple(poor))
+        return cls("fair", tuple(fair)) if fair else cls("good")
+
+
+class Quality(NamedTuple):
+    """Two statements on a pair: how the ``motion`` comes out, and the ``vibration`` after td; the worse one counts.
+
+    ``alone``: the grade of the vibration by itself, which ``worth`` may raise: what its error is worth in the next
+    contact, None if that is not known.
+    """
+
+    motion: Grade
+    vibration: Grade
+    alone: Grade
+    worth: Worth | None = None
+
+    @property
+    def grade(self) -> str:
+        """The worse of the two grades."""
+        return min((self.motion.grade, self.vibration.grade), key=GRADES.index)
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why the grade is none better."""
+        both = (self.motion, self.vibration)
+        return tuple(reason for one in both if one.grade == self.grade for reason in one.reasons)
 
     @property
     def told(self) -> str:
@@ -124,31 +158,43 @@ class Quality(NamedTuple):
         return f"{self.grade}{': ' * bool(self.reasons)}{'; '.join(self.reasons)}"
 
 
-def quality_of(situation: Situation, best: Candidate, expected: Expectation | None) -> Quality:
-    """Grade the recommended tr of a td.
-
-    ``expected`` is what the energy alone tells of the time after td, None on another basis.
-    """
+def quality_of(situation: Situation, best: Candidate) -> Quality:
+    """Grade the recommended tr of a td: its motion, and its vibration, also by what its error is worth."""
     flight = situation.flight
-    poor = (*situation.settings.ruined, *(_UNKNOWN_LOAD,) * flight.unknown_load)
-    poor += () if situation.at_rest else tuple(_poor(situation, best, expected))
-    if poor:
-        return Quality("poor", poor)
+    uncertain = () if flight.certain else (_NOT_CERTAIN,)
+    motion = Grade.of((*situation.settings.ruined, *(_UNKNOWN_LOAD,) * flight.unknown_load), uncertain)
     if situation.at_rest:
-        return Quality("good") if flight.certain else Quality("fair", (_NOT_CERTAIN,))
-    fair = tuple(_fair(situation, best, expected))
-    return Quality("fair" if fair else "good", fair)
+        return Quality(motion, Grade("good"), Grade("good"))
+    alone = Grade.of(_poor(situation, best), _fair(best))
+    worth = worth_of_error(situation, best)
+    counted = alone if situation.settings.keep_vibration else _weighed(alone, worth)
+    return Quality(motion, counted, alone, worth)
 
 
-def _poor(situation: Situation, best: Candidate, expected: Expectation | None) -> list[str]:
+def _weighed(alone: Grade, worth: Worth | None) -> Grade:
+    """Raise the grade of a vibration whose error hardly matters in the next contact."""
+    if worth is None or alone.grade == "good" or worth.share > _HARDLY_FAIR:
+        return alone
+    if worth.share <= _HARDLY_GOOD:
+        return Grade("good")
+    return Grade("fair", alone.reasons)
+
+
+def _poor(situation: Situation, best: Candidate) -> list[str]:
     found = []
-    if best.residual is not None and best.residual > _MOST_FAIR:
+    if best.residual is None:
+        found.append(f"how the deformations at tr and td lie to each other is unknown{_refusal(situation)}")
+    elif best.residual > _MOST_FAIR:
         found.append(f"the vibration after td is off by {best.residual:.0%}")
-    if expected and round(expected.kinetic_share, _READ) > POOR_KINETIC_SHARE:  # an estimate: what is read counts
-        found.append(f"about {expected.kinetic_share:.0%} of the vibration energy is kinetic at td")
     if situation.basis == "energy":
         found += _of_record(situation)
     return found
+
+
+def _refusal(situation: Situation) -> str:
+    """Say why the modes could not be identified."""
+    refusal = situation.evidence.refusal
+    return f": {refusal}" if refusal else ""
 
 
 def _of_record(situation: Situation) -> list[str]:
@@ -173,21 +219,16 @@ def _is_loose(best: Candidate) -> bool:
     return TOLERATED_GROWTH * (best.tr_high - best.tr) > _MOST_GOOD * best.timing_tolerance
 
 
-def _fair(situation: Situation, best: Candidate, expected: Expectation | None) -> list[str]:
+def _fair(best: Candidate) -> list[str]:
     found = []
     if best.residual is None:
-        off = f"{wrong_sign(expected.kinetic_share if expected else 0.0):.0%}"
-        found.append(
-            f"the sign of the deformation is unknown, and with a wrong one the vibration after td is off by {off}"
-        )
-    elif best.residual > _MOST_GOOD:
+        return found
+    if best.residual > _MOST_GOOD:
         found.append(f"the vibration after td is off by {best.residual:.0%}")
     elif _is_loose(best):
         found.append("tr is not known well enough for its timing tolerance")
     if best.residual_high is not None and best.residual_high > _MOST_HIDDEN:
-        found.append(f"with a further mode hidden in the record it may be off by {best.residual_high:.0%}")
-    if not situation.flight.certain:
-        found.append(_NOT_CERTAIN)
+        found.append(f"it may be off by up to {best.residual_high:.0%}")
     return found
 
 

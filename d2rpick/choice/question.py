@@ -62,6 +62,7 @@ class Settings:
     ``max_kinetic_share``, ``max_residual``: limits that a recommendation must keep, or None.  ``oscillator``:
     given instead of identified.  ``fit_window``: the oscillator is identified there.  ``replay`` False: judge by
     the energy level alone.  ``strict``: accept no tr of a flight that is not certain.
+    ``keep_vibration``: grade the vibration by itself, however little its error is worth in the next contact.
     ``cost_share``, ``step_ratio``: of the switched parts in the cost of a step, and of the step while rigid to that
     while deformable; without the first nothing is said of the run time.
     ``bodies``: what the parts become while they are rigid, by a deck; None without one, empty where it does not tell.
@@ -81,6 +82,7 @@ class Settings:
     fit_window: tuple[float, float] | None = None
     replay: bool = True
     strict: bool = False
+    keep_vibration: bool = False
     cost_share: float | None = None
     step_ratio: float = 1.0
     bodies: tuple[RigidBody, ...] | None = None

@@ -15,7 +15,7 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import RangeError
 from d2rpick.flight.flight import Flight, Seen, find_flight, landed, seen_flight
-from d2rpick.flight.internal_energy import largest, round_off
+from d2rpick.flight.internal_energy import largest, quiet_time, round_off
 from d2rpick.flight.margin import margin_before_contact
 from d2rpick.histories.digits import sum_as_read
 from d2rpick.vibration import find_models
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.question import Settings
     from d2rpick.flight.position_error import Bodies
+    from d2rpick.flight.vibrating import Beside
     from d2rpick.histories.history import History, Samples
 
     Look = Callable[[float], "Situation"]
@@ -77,6 +78,32 @@ def _faint(history: History, start: float) -> float:
     return max(_SOLVER_ERROR * highest, _QUANTA * quantum, _FAINT * fall)
 
 
+class Together:
+    """What vibrates together in a flight: whether its energy is all of what was chosen, and its kinetic energy."""
+
+    def __init__(self, history: History, flight: Flight) -> None:
+        self._history, self._flight = history, flight
+
+    @cached_property
+    def beside(self) -> Beside:
+        """Parts that vibrate with the chosen ones and were not chosen."""
+        from d2rpick.flight.vibrating import vibrating_beside  # not above: an oscillator does without it
+
+        return vibrating_beside(self._history, self._flight)
+
+    @property
+    def complete(self) -> bool:
+        """Whether all that vibrates together was chosen."""
+        return not self.beside.parts
+
+    @property
+    def kinetic(self) -> tuple[Samples, Samples] | None:
+        """Kinetic energy of what vibrates together, at times in the flight; None if it is not written."""
+        from d2rpick.flight.vibrating import kinetic_energy_of  # not above: an oscillator does without it
+
+        return kinetic_energy_of(self._history, self._flight)
+
+
 class OfTd:
     """An answer about one td, by what the record tells about it: its ``situation``."""
 
@@ -94,7 +121,7 @@ class OfTd:
 
     @property
     def basis(self) -> str:
-        """What the answer rests on: ``"parts"``, ``"oscillator"``, ``"swings"`` or ``"energy"``."""
+        """What the answer rests on: ``"parts"``, ``"oscillator"``, ``"modal"``, ``"swings"`` or ``"energy"``."""
         return self.situation.basis
 
     @property
@@ -134,7 +161,7 @@ class Situation:
 
     @property
     def basis(self) -> str:
-        """What a choice rests on: "parts", "oscillator" (one or several of them), "swings" or "energy"."""
+        """What a choice rests on: "parts", "oscillator" (one or several of them), "modal", "swings" or "energy"."""
         return self.vibration.basis
 
     @property
@@ -168,6 +195,11 @@ class Situation:
         return self.settings.margin or 0.0
 
     @cached_property
+    def together(self) -> Together:
+        """What vibrates together in the flight."""
+        return Together(self.history, self.flight)
+
+    @cached_property
     def at_rest(self) -> bool:
         """Whether nothing vibrates in the flight."""
         start = self.earliest_tr
@@ -195,6 +227,12 @@ class Situation:
     def errors(self, times: Samples) -> Samples:
         """What a tolerance is held against, of the shape of ``times`` [-]: at rest nothing, else the vibration's."""
         return np.zeros(times.shape) if self.at_rest else self.vibration.errors(times)
+
+    @property
+    def most_error(self) -> float:
+        """Largest error of an acceptable tr: the tolerance, of many modes what is better than no vibration [-]."""
+        most = self.vibration.most_lock_in
+        return self.settings.tolerance if most is None else most
 
     @property
     def in_flight(self) -> bool:
@@ -239,7 +277,8 @@ def examine(
     at = (seen.flight.start + seen.flight.end) / 2 if seen.refusal and seen.flight else td
     fits = Fits() if fits is None else fits
     fit, span = _oscillator(history, at, settings, seen, fits, quick=quick)
-    flight = find_flight(history, td, settings.after, seen, _settled(history, fit, span))
+    described = _settled(history, fit, span) or _described_by_modes(history, td, settings, seen, fits)
+    flight = find_flight(history, td, settings.after, seen, described)
     flight = landed(_between_supports(history, flight, td), settings.landing)
     given = settings.oscillator is not None
     evidence = Evidence(fit, span, given, prescribed=given or settings.fit_window is not None)
@@ -250,9 +289,11 @@ def examine(
     # without a sign of the next contact nothing is known of what comes after td
     end = flight.end or (last if flying or span else td)
     around = Span(min(td, first if flight.start is None else flight.start), end)
-    start = flight.start if flight.settled is None else flight.settled
-    within = None if flight.start is None or start is None else Span(start, flight.end or last)
-    models = find_models(history, around, within, lambda: doubtful(situation.whole), fits)
+    within = settled = None
+    if flight.start is not None:
+        within = Span(flight.start, flight.end or last)
+        settled = within if flight.settled is None else within._replace(start=flight.settled)
+    models = find_models(history, around, within, settled, lambda: doubtful(situation.whole), fits, situation.together)
     return replace(situation, evidence=evidence._replace(models=models)) if models else situation
 
 
@@ -321,6 +362,18 @@ def _oscillator(
     if span and span.end - span.start >= _MOST_OF_RECORD * (bounds.end - bounds.start):
         known.append((fit, span))
     return fit, span
+
+
+def _described_by_modes(history: History, td: float, settings: Settings, seen: Seen, fits: Fits) -> Span | None:
+    """Find a window whose modes go on by themselves, if nothing but the energy can tell a flight."""
+    if seen.flight or seen.refusal or settings.after is not None or not settings.replay:
+        return None
+    from d2rpick.vibration.modal_span import find_described  # not above: most records need none
+
+    quiet, last = quiet_time(history, td), float(history.time[-1])
+    guess = None if quiet is None else Span(quiet.start, last if quiet.end is None else quiet.end)
+    found = find_described(history, td, guess, fits)
+    return found.span if found else None
 
 
 def _resolved(history: History, fit: Identification, fits: Fits) -> Identification:

@@ -18,6 +18,7 @@ from d2rpick.flight.internal_energy import round_off
 from d2rpick.flight.margin import margin_before_contact
 from d2rpick.histories.digits import not_after, sum_as_read
 from d2rpick.histories.samples import union
+from d2rpick.vibration.measures import kinetic_share, vertices
 from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.question import Settings
     from d2rpick.choice.situation import Look
     from d2rpick.histories.history import History, Samples
+    from d2rpick.vibration.measures import Profile
 
     Choice = tuple[Situation, Pair]
 
@@ -71,6 +73,9 @@ def _reached(lowest: Samples, highest: Samples, level: Samples, near: Samples) -
 # Peaks of a window that are tried: the highest, since the higher a peak of several modes, the less energy is kinetic,
 # and the last, since the later td the more is saved.
 _MOST_PEAKS: Final = 12
+# Of many modes, the least residual is sought among windows of at least this share of the longest one, at so many td.
+_LEAST_RIGID: Final = 0.5
+_FEWEST_TD, _MOST_TD = 3, 1000
 # td in an even grid: on paper and on a screen a curve of so many points is smooth.
 STEPS: Final = 200
 # Decimals of an error that people read.
@@ -127,6 +132,7 @@ def choose_td(
     look = looking(history, settings, fits, since)
     situation, inside = within_flight(look, history, window)
     choose = _by_level if situation.vibration.unknown else _by_residual
+    choose = _by_modes if situation.basis == "modal" else choose
     chosen, longest = choose(situation, inside, look)
     td = chosen if chosen is not None else inside[1]
     if look(td).at_rest:
@@ -268,6 +274,39 @@ def _by_residual(situation: Situation, window: tuple[float, float], look: Look) 
     limit = min((best.error for _, best in pairs), default=0.0) + like_quality(situation)
     alike = [pair for pair in pairs if pair[1].error <= limit]
     return _td(_longest(alike)), _td(_longest(pairs))
+
+
+def _by_modes(situation: Situation, window: tuple[float, float], look: Look) -> tuple[float | None, float | None]:
+    """Give the same for many modes: the td of the least residuals of long windows, wherever the energy stands there."""
+    start, compared = situation.earliest_tr, situation.vibration.compared
+    if start is None or compared is None or compared.profile is None:
+        return _by_residual(situation, window, look)
+    first, last = max(start, compared.first), min(window[1], compared.last)
+    least_rigid = _LEAST_RIGID * (last - first)
+    times = compared.profile(np.nextafter(last, np.inf)).time
+    times = times[(times >= max(window[0], first + least_rigid)) & (times > first)]
+    if times.size < _FEWEST_TD:
+        return _by_residual(situation, window, look)
+    times = times[:: -(-times.size // _MOST_TD)]
+    shares = np.maximum(kinetic_share(compared.deformation, times), 0.0)
+    squares = np.array([_least_error(compared.profile(td), first, td - least_rigid) ** 2 for td in times.tolist()])
+    squares += shares
+    inner = np.flatnonzero((squares[1:-1] <= squares[:-2]) & (squares[1:-1] < squares[2:])) + 1
+    best = inner[np.argsort(squares[inner], kind="stable")[:_MOST_PEAKS]]
+    candidates = [
+        *vertices(times, squares, best)[0].tolist(),
+        *vertices(times, squares, inner[-_MOST_PEAKS:])[0].tolist(),
+    ]
+    pairs = _acceptable(look(td) for td in dict.fromkeys((*candidates, float(times[np.argmin(squares)]))))
+    long = [pair for pair in pairs if pair[1].rigid_time >= least_rigid] or pairs
+    limit = min((best.error for _, best in long), default=0.0) + like_quality(situation)
+    return _td(_longest(pair for pair in long if pair[1].error <= limit)), _td(_longest(pairs))
+
+
+def _least_error(profile: Profile, first: float, last: float) -> float:
+    """Least lock-in error of a tr between two times [-]; infinite without one."""
+    rows = slice(*np.searchsorted(profile.time, [first, last]).tolist())
+    return float(profile.error[rows].min(initial=np.inf))
 
 
 def _by_level(situation: Situation, window: tuple[float, float], look: Look) -> tuple[float | None, float | None]:

@@ -14,6 +14,7 @@ from d2rpick.base.tuples import NamedTuple
 from d2rpick.flight.internal_energy import round_off
 from d2rpick.histories.digits import above, first_as_read, not_after, window_as_read
 from d2rpick.vibration import measures
+from d2rpick.vibration.model import NOTHING_KEPT
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -332,15 +333,17 @@ def objections(
     moves = np.array([not one.at_rest for one in situations])[place]
     compared = measures.compared(columns)
     described = compared | np.array([bool(one.vibration.unknown) for one in situations])[place]
-    same_sign = columns["sign_match"] != 0
+    modal = np.array([one.basis == "modal" for one in situations])[place]
+    same_sign = (columns["sign_match"] != 0) | modal
     yield Objection(moves & ~described, lambda i: [situations[place[i]].vibration.undescribed])
     yield Objection(moves & ~same_sign, lambda _: ["opposite sign of the deformation"])
     error, judged = np.where(compared, columns["lock_in_error"], columns["level_error"]), moves & described & same_sign
     nothing = "the energy is not positive here, so there is nothing to compare"
     yield Objection(judged & np.isnan(error), lambda _: [nothing])
-    most = situations[0].settings.tolerance
+    most = np.array([one.most_error for one in situations])[place]
     too_much = judged & (error > most)
-    yield Objection(too_much, lambda i: [f"error {above(error[i], most)} above the tolerance {most:g}"])
+    yield Objection(too_much & ~modal, lambda i: [f"error {above(error[i], most[i])} above the tolerance {most[i]:g}"])
+    yield Objection(too_much & modal, lambda i: [_keeps_nothing(situations[place[i]], columns["residual"][i])])
     # beyond its end the flight tells nothing of what comes after td
     means = [means_of(one) if one.td <= one.latest_td else None for one in situations]
     if any(means):
@@ -353,6 +356,15 @@ def _in_load(situation: Situation) -> str:
     if situation.earliest_tr is None:
         return situation.flight.refusal or "unknown: nothing shows when the load is over"
     return f"before {end_of_load(situation)}"
+
+
+def _keeps_nothing(situation: Situation, residual: float) -> str:
+    """Say that a switch is worse than a release without any vibration, or than the best one there is."""
+    least = situation.vibration.least_residual or 0.0
+    better = f"{NOTHING_KEPT:g}, which a release without any vibration has"
+    if situation.vibration.keeps_nothing:
+        better = f"{least:.2g}, which is the least at this td"
+    return f"residual {residual:.2g} above {better}"
 
 
 def _above_the_reference(means: Means | None, energy: float) -> Iterator[str]:

@@ -50,7 +50,7 @@ def acceptable_windows(situation: Situation, candidates: Candidates, recommended
     if situation.at_rest:  # any tr before td is right, unless td itself is wrong
         widest = grid[np.newaxis, [0, -1]]
     else:
-        widest = _windows_below(situation, grid, min(situation.settings.tolerance, _residual_left(situation)))
+        widest = _windows_below(situation, grid, min(situation.most_error, _residual_left(situation)))
     judged = judge(situation, np.append(widest, widest.mean(axis=1, keepdims=True), axis=1).ravel().tolist())
     kept = widest[judged.kept.reshape(-1, 3).all(axis=1)]
     if situation.at_rest:

@@ -40,7 +40,7 @@ DECK_OF_PARTS: Final = f"{DECK}; `--part recommended` stands for the set that d2
 GROUPS: Final[dict[str, tuple[str, ...]]] = {
     "Times": (
         *("tr", "td", "td_window", "steps", "min_rigid", "after", "landing", "margin", "wait"),
-        *("tolerance", "max_kinetic_share", "max_residual", "min_mean_energy", "strict"),
+        *("tolerance", "max_kinetic_share", "max_residual", "min_mean_energy", "strict", "keep_vibration"),
     ),
     "What to read": ("history", "switched", "from", *READING, "done", "before"),
     "Deck and cost": ("deck", "weights", "write_deck"),

@@ -170,7 +170,14 @@ def find_flight(
             end = history.known.once(("landing", after), lambda: landing_after(history, after))
         else:
             end = span[1] if span[1] < history.time[-1] else None
-        return Flight(after, None if seen.refusal else end, "given", refusal=seen.refusal, doubts=seen.doubts)
+        return Flight(
+            after,
+            None if seen.refusal else end,
+            "given",
+            refusal=seen.refusal,
+            doubts=seen.doubts,
+            described=span is not None,
+        )
     if seen.refusal:
         return Flight(refusal=seen.refusal, doubts=seen.doubts)
     if span:

@@ -97,6 +97,18 @@ def landing_spread(history: History, flight: Flight) -> float | None:
     return float(np.sqrt(vibration / approach) / omega) if approach > 0 else float("inf")
 
 
+def energy_of_approach(history: History, flight: Flight) -> float | None:
+    """Give the kinetic energy of the motion along gravity at the end of a flight [energy].
+
+    None if kinetic energy or momentum are not written, or other parts move beside those that fly.
+    """
+    balance, momentum = history.balance, _momentum(history, flight)
+    if balance is None or balance.kinetic is None or momentum is None:
+        return None
+    kinetic = balance.kinetic[window(balance.time, *flight.within(history.time))]
+    return float(kinetic[-1]) * _towards_ground(momentum) if kinetic.size else None
+
+
 def _momentum(history: History, flight: Flight) -> Samples | None:
     """Momentum of what flies during the flight, shape (k, 3 or 1); None where others move too, or none is written."""
     for momenta in history.momenta:

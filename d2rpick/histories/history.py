@@ -162,7 +162,7 @@ class Momenta:
 
 
 class Track(NamedTuple):
-    """Vectors over time: ``time`` of shape (n,), ``values`` of shape (n, 3); a momentum, or the place of a part."""
+    """Values over time: ``time`` of shape (n,), ``values`` of shape (n, 3) for a momentum or the place of a part."""
 
     time: Samples
     values: Samples
@@ -220,6 +220,19 @@ class Given:
     momenta: tuple[Momenta, ...] = ()
     balance: Balance | None = None
     masses: Samples | None = None
+
+    def internal_energies(self, parts: Sequence[Part]) -> Track | None:
+        """Internal energies of some parts, ``values`` of shape (n, parts) [energy]; None if they are not written."""
+        return None
+
+    def kinetic_energy(self, parts: Sequence[Part] | None) -> Track | None:
+        """Kinetic energy of some parts together, or of the whole model, ``values`` of shape (n,) [energy]; None if it
+        is not written.
+        """
+        balance = self.balance
+        if parts is not None or balance is None or balance.kinetic is None:
+            return None
+        return Track(balance.time, balance.kinetic)
 
 
 NO_EVIDENCE = Given()

@@ -326,6 +326,18 @@ class _Written(Given):
 
         return terms_of(self._run.databases)
 
+    def internal_energies(self, parts: Sequence[Part]) -> Track | None:
+        """Internal energies of some parts."""
+        values = if_written(lambda: self._run.part_energies(parts))
+        return None if values is None else Track(self._run.part_time, values)
+
+    def kinetic_energy(self, parts: Sequence[Part] | None) -> Track | None:
+        """Kinetic energy of some parts together, or of the whole model."""
+        if parts is None:
+            return super().kinetic_energy(parts)
+        values = if_written(lambda: self._run.part_kinetic_energies(parts))
+        return None if values is None else Track(self._run.part_time, values.sum(axis=1))
+
 
 def _median_of_some(values: Samples) -> Samples:
     """Median over the states of each column of values (n, k) that are not 0: the mass of a rigid part is written so."""

@@ -236,11 +236,10 @@ def _texts(offer: Offer, start: Offer, unit: str) -> dict[str, str | None]:
 
 def _of_best(offer: Offer, best: Candidate, unit: str) -> dict[str, str | None]:
     """What is said of the recommended tr."""
-    expected, windows = offer.answer.expected, offer.answer.windows
-    ratio = expected.ratio if expected else None
+    kept, windows = offer.answer.kept, offer.answer.windows
     return {
         "residual": shown(best.residual, ".3f"),
-        "after": None if ratio is None else f"about {ratio:.0%} of what the reference has",
+        "after": None if kept is None else f"{kept.low:.0%} to {kept.high:.0%} of what the reference has",
         "level_error": shown(best.level_error if best.residual is None else None, ".3f"),
         "rigid": f"for {short(best.rigid_time)}{unit}, {best.rigid_fraction:.1%} of the record",
         "run_time": None if best.run_time_share is None else f"about {best.run_time_share:.0%} of the reference's",

@@ -198,15 +198,25 @@ CANDIDATE: Final = row(
     Field("notes", "texts"),
     Field("run_time_share", "size?", "expected run time over that of the reference, with --cost-share"),
     Field("same_swing", "flag", "the energy turns less than twice from tr to td: hardly anything is saved"),
-    Field("residual_high", "size?"),
+    Field("residual_high", "size?", "the highest residual that the record allows"),
     *_POSITION,
+    Field("residual_low", "size?", "the lowest residual that the record allows", later=True),
 )
 # What tells a tr and does not measure the pair; and the measures that ``verify`` shows first, in their order there.
 _OF_TR: Final = (
     "rank", "tr", "kind", "rising", "tr_low", "tr_high", "acceptable", "recommended", "notes", "same_swing",
 )  # fmt: skip
 _FIRST: Final = (
-    *("energy", "energy_ratio", "level_error", "sign_match", "lock_in_error", "residual", "residual_high"),
+    *(
+        "energy",
+        "energy_ratio",
+        "level_error",
+        "sign_match",
+        "lock_in_error",
+        "residual",
+        "residual_high",
+        "residual_low",
+    ),
     *("part_mismatch", "timing_tolerance", "rigid_time", "rigid_fraction", "run_time_share"),
 )
 MEASURES: Final = (*_FIRST, *(key for key in CANDIDATE.keys if key not in (*_OF_TR, *_FIRST)))
@@ -225,6 +235,24 @@ QUALITY: Final = (
     Field("quality", GRADE, "of the pair; null without one", lambda answer: answer.quality and answer.quality.grade),
     Field("quality_reasons", "texts?", "why it is none better",
           lambda answer: answer.quality and answer.quality.reasons),
+    Field("motion", GRADE, "grade of the motion: will the parts fly and land as without switching",
+          lambda answer: answer.quality and answer.quality.motion.grade, later=True),
+    Field("motion_reasons", "texts?", "why it is none better",
+          lambda answer: answer.quality and answer.quality.motion.reasons, later=True),
+    Field("vibration", GRADE, "grade of the vibration after td, by what its error is worth in the next contact",
+          lambda answer: answer.quality and answer.quality.vibration.grade, later=True),
+    Field("vibration_alone", GRADE, "grade of the vibration by itself",
+          lambda answer: answer.quality and answer.quality.alone.grade, later=True),
+    Field("vibration_reasons", "texts?", "why that is none better",
+          lambda answer: answer.quality and answer.quality.alone.reasons, later=True),
+    Field("vibration_worth", "size?",
+          "energy of the error of the vibration over that which the next contact puts into the parts, at most; null "
+          "where that is not known",
+          lambda answer: answer.quality and answer.quality.worth and answer.quality.worth.share, later=True),
+    Field("mean_energy_low", "size?", "least mean energy after td that is expected, over the reference's",
+          lambda answer: answer.kept and answer.kept.low, later=True),
+    Field("mean_energy_high", "size?", "largest mean energy after td that is expected, over the reference's",
+          lambda answer: answer.kept and answer.kept.high, later=True),
 )  # fmt: skip
 EXPECTED: Final = Field("expected", maybe(row(
     Field("mean_energy", "number", "mean of the energy in the flight"),

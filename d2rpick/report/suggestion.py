@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from d2rpick.choice.answers import AcceptableWindow, Suggestion
     from d2rpick.choice.candidates import Pair
-    from d2rpick.choice.quality import Quality
+    from d2rpick.choice.quality import Grade, Quality
     from d2rpick.report.formats import Shown
 
 # Windows of acceptable tr that a line names.
@@ -114,6 +114,7 @@ def verdict(answer: Suggestion) -> list[tuple[str, str]]:
             ("saves", _saved(best)),
             ("keeps", _kept(answer, best)),
             ("quality", _sure(best, quality)),
+            *statements(quality),
         ]
     return [*found, ("better pair", f"{_times(better)}: {better_about(answer, better)}")] if better else found
 
@@ -129,20 +130,45 @@ def _sure(best: Candidate, quality: Quality) -> str:
     return f"{quality.told}{known}{room}"
 
 
+def statements(quality: Quality) -> list[tuple[str, str]]:
+    """What is said of motion and vibration, each by itself; nothing where both are good by themselves."""
+    if quality.motion.grade == quality.alone.grade == "good":
+        return []
+    alone = quality.alone
+    said = (
+        alone.grade if alone.grade == quality.vibration.grade else f"{quality.vibration.grade}, by itself {alone.grade}"
+    )
+    worth = ""
+    if quality.worth is not None:
+        worth = f"; its error holds at most {quality.worth.share:.2g} of the energy of the next contact"
+    return [("motion", graded(quality.motion)), ("vibration", f"{graded(alone._replace(grade=said))}{worth}")]
+
+
+def graded(grade: Grade) -> str:
+    """Give a grade with the reasons why it is none better."""
+    return f"{grade.grade}{': ' * bool(grade.reasons)}{'; '.join(grade.reasons)}"
+
+
 def _kept(answer: Suggestion, best: Candidate) -> str:
-    """What is left of the vibration after td."""
-    share, expected = answer.situation.kinetic_share, answer.expected
+    """What is left after td: of the mean energy, and of the vibration."""
     if answer.situation.at_rest:
         return "everything: nothing vibrates in the flight up to td"
-    if share is not None and best.residual is not None:
-        high = best.residual_high
-        hidden = high is not None and high > best.residual + MUCH_HIGHER
-        more = f", up to {high:.0%} if the record hides a further mode" if hidden else ""
-        return f"{1 - share:.0%} of the vibration energy; the vibration after td is off by {best.residual:.1%}{more}"
-    if expected and expected.ratio is not None:
-        least = f", {expected.ratio_low:.0%} at worst" if expected.ratio_low is not None else ""
-        return f"about {expected.ratio:.0%} of the energy that the reference has after td{least}"
-    return "unknown"
+    kept, found = answer.kept, []
+    if kept is not None:
+        found.append(f"{kept.low:.0%} to {kept.high:.0%} of the mean energy after td")
+    if best.residual is not None:
+        found.append(f"the vibration is off by {_off(best)}")
+    if answer.situation.vibration.keeps_nothing:
+        found.append("no switch keeps this vibration")
+    return "; ".join(found) or "unknown"
+
+
+def _off(best: Candidate) -> str:
+    """Give the residual, with its band where that is wide."""
+    low, high = best.residual_low, best.residual_high
+    if best.residual is None or low is None or high is None or high <= best.residual + MUCH_HIGHER:
+        return f"{best.residual:.1%}"
+    return f"{best.residual:.0%}, between {low:.0%} and {high:.0%}"
 
 
 def better_about(answer: Suggestion, better: Pair) -> str:

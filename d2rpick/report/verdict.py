@@ -8,6 +8,7 @@ from d2rpick.base.errors import printable
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import Document, Field, kind_of, maybe, row
 from d2rpick.report.situation import heading
+from d2rpick.report.suggestion import statements
 
 if TYPE_CHECKING:
     from d2rpick.choice.answers import Verdict
@@ -60,7 +61,8 @@ def as_table(answer: Verdict, shown: Shown) -> str:
     reasons = [f"  {printable(reason)}" for reason in answer.reasons]
     if answer.switched:
         lines += ["", *_comparison(answer.switched)]
-    head = [("verdict", told(answer)), *([("quality", answer.quality.told)] if answer.quality else [])]
+    graded = [("quality", answer.quality.told), *statements(answer.quality)] if answer.quality else []
+    head = [("verdict", told(answer)), *graded]
     above = tables.in_line(heading(answer.situation, verbose=shown.verbose))
     return "\n".join([*tables.in_line(head), *reasons, "", *above, "", *lines])
 

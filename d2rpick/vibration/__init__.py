@@ -9,33 +9,57 @@ the kinetic share "is what ..." (``kinetic``), and why a tr has no measures (``u
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Protocol
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import TypeAlias
 
-    from d2rpick.histories.history import History, Memory
+    from d2rpick.histories.history import History, Memory, Samples
+    from d2rpick.vibration.modal import ModalVibration
     from d2rpick.vibration.part_signs import SignedParts
     from d2rpick.vibration.span import Span
     from d2rpick.vibration.swings import Swings
 
-    SignedModel: TypeAlias = SignedParts | Swings
-    Finder: TypeAlias = Callable[[History, Span], SignedModel | None]
+    SignedModel: TypeAlias = SignedParts | ModalVibration | Swings
+    Finder: TypeAlias = Callable[[History, Span, Together], SignedModel | None]
 
 
-def _parts(history: History, within: Span) -> SignedModel | None:
+class Together(Protocol):
+    """What vibrates together in a flight."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether the energy is that of all that vibrates together."""
+
+    @property
+    def kinetic(self) -> tuple[Samples, Samples] | None:
+        """Its kinetic energy at times in the flight, without that of its fall, both (n,); None if not written."""
+
+
+def _parts(history: History, within: Span, _: Together) -> SignedModel | None:
     """Read the signs of single parts, where their energies are written."""
     time, _ = history.between(*within)
     if history.part_energies is None or time.size < 3:
         return None
     from d2rpick.histories.samples import window
+    from d2rpick.vibration.modal import ModalVibration
     from d2rpick.vibration.part_signs import SignedParts
 
     return SignedParts(time, history.part_energies[window(history.time, *within)], history.part_names)
 
 
-def _swings(history: History, within: Span) -> SignedModel | None:
+def _modal(history: History, within: Span, together: Together) -> SignedModel | None:
+    """Identify the modes of the structure from the lines of its energy, and of its kinetic energy if that is known."""
+    if not together.complete:
+        return None
+    from d2rpick.vibration.modal import confirm, identify_modal
+
+    internal, kinetic = identify_modal(*history.between(*within)), together.kinetic
+    return confirm(internal, identify_modal(*kinetic, kinetic=True) if kinetic else None)
+
+
+def _swings(history: History, within: Span, _: Together) -> SignedModel | None:
     """Count the swings of the energy, where they come down to a floor."""
     from d2rpick.vibration.swings import count_swings
 
@@ -43,15 +67,28 @@ def _swings(history: History, within: Span) -> SignedModel | None:
 
 
 # By what a choice is said to rest on; an oscillator, and the energy alone, are known of each td in another way.
-MODELS: Final[dict[str, Finder | None]] = {"parts": _parts, "oscillator": None, "swings": _swings, "energy": None}
+MODELS: Final[dict[str, Finder | None]] = {
+    "parts": _parts,
+    "oscillator": None,
+    "modal": _modal,
+    "swings": _swings,
+    "energy": None,
+}
 
 
 def find_models(
-    history: History, around: Span, flight: Span | None, doubtful: Callable[[], bool], memory: Memory
+    history: History,
+    around: Span,
+    flight: Span | None,
+    settled: Span | None,
+    doubtful: Callable[[], bool],
+    memory: Memory,
+    together: Together,
 ) -> dict[str, SignedModel]:
     """Look for models, best first, until one tells the sign; those behind the oscillator where that is ``doubtful``.
 
-    They are looked for ``around`` td, those behind the oscillator in the ``flight``, where one is known.
+    They are looked for ``around`` td, those behind the oscillator in the ``flight``, if one is known, and swings also
+    before it, from when the energy has ``settled``.
     """
     found: dict[str, SignedModel] = {}
     within = around
@@ -60,7 +97,9 @@ def find_models(
             if flight is None or not doubtful():
                 break
             within = flight
-        if find and (model := memory.once((basis, *within), partial(find, history, within))):
+        if basis == "swings" and settled is not None:
+            within = settled
+        if find and (model := memory.once((basis, *within), partial(find, history, within, together))):
             found[basis] = model
             if model.signed:
                 break

@@ -22,19 +22,27 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import Samples
+    from d2rpick.vibration.amplitudes import SignedAmplitudes
     from d2rpick.vibration.modes import Mode
 
     # Measures of n times by their names, in arrays of shape (n,); NaN where unknown.
     Columns = Mapping[str, Samples]
-    # Largest residual of each tr, from its residual, tr and td: with what a fit may have missed, at worst [-].
-    Bound = Callable[[Samples, Samples, Any], Samples]
+    # Residual of each tr as it is stated, the lowest and the highest that the record allows, from the residual that
+    # follows from the deformations, tr and td [-].
+    Band = Callable[[Samples, Samples, Any], tuple[Samples, Samples, Samples]]
 
 
 class Deformation(Protocol):
-    """What the measures need to know: deformations with signs, of modes or of parts, and the energy of all."""
+    """What the measures need to know: how deformations lie to each other, and the energy of the vibration."""
 
-    def amplitudes(self, t: Samples | float) -> Samples:
-        """Signed deformations, of the shape of ``t`` with an axis for modes or parts before it [sqrt(energy)]."""
+    def elastic_energy(self, t: Samples | float) -> Samples:
+        """Elastic energy of the deformation, of the shape of ``t`` [energy]."""
+
+    def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
+        """Product of the deformations at tr and td, of the shape of ``tr`` [energy]."""
+
+    def separation(self, tr: Samples | float, td: Samples | float) -> Samples:
+        """Elastic energy of the difference of the deformations at tr and td, of the shape of ``tr`` [energy]."""
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
         """T [energy]."""
@@ -46,31 +54,33 @@ class Deformation(Protocol):
 class Measured(Record):
     """Measures of one tr that only known deformations give, each None where it is unknown.
 
-    ``residual_high``: at worst, with what a fit may have missed.
+    ``residual_low`` and ``residual_high``: the band of the residual, with what the model may have missed.
     """
 
     sign_match: bool | None = None
     lock_in_error: float | None = None
     residual: float | None = None
+    residual_low: float | None = None
     residual_high: float | None = None
     timing_tolerance: float | None = None
     part_mismatch: float | None = None
 
 
 def measured(
-    vibration: Deformation, tr: Samples, td: Samples | float, tolerance: Samples, bound: Bound, *, of_parts: bool
+    vibration: Deformation, tr: Samples, td: Samples | float, tolerance: Samples, band: Band, *, of_parts: bool
 ) -> Columns:
     """Give a column for each field of `Measured` of each tr (n,), for one ``td`` or each for its own.
 
     ``of_parts``: the deformations are those of parts, whose energy at td the mismatch is held against.
     """
     lock_in = lock_in_error(vibration, tr, td)
-    error = residual(lock_in, kinetic_share(vibration, td))
+    error, lowest, highest = band(residual(lock_in, kinetic_share(vibration, td)), tr, td)
     return {
         "sign_match": sign_match(vibration, tr, td).astype(np.float64),
         "lock_in_error": lock_in,
         "residual": error,
-        "residual_high": bound(error, tr, td),
+        "residual_low": lowest,
+        "residual_high": highest,
         "timing_tolerance": tolerance,
         "part_mismatch": part_mismatch(vibration, tr, td) if of_parts else np.full(tr.shape, np.nan),
     }
@@ -129,19 +139,17 @@ def lock_in_error(vibration: Deformation, tr: Samples | float, td: Samples | flo
     several modes or parts the root of the sum of squares over them, since their energies add up.  ``td`` is one for all
     tr, or one for each.
     """
-    apart = np.linalg.norm(_apart(vibration, tr, td), axis=0)
-    return np.asarray(apart / np.sqrt(vibration.vibration_energy(td)))
+    return np.asarray(np.sqrt(vibration.separation(tr, td)) / np.sqrt(vibration.vibration_energy(td)))
 
 
 def part_mismatch(vibration: Deformation, tr: Samples | float, td: Samples | float) -> Samples:
     """D = L/sqrt(1 - K) [-]: the same error against the internal energy at td alone, of the shape of ``tr``."""
-    apart = np.linalg.norm(_apart(vibration, tr, td), axis=0)
-    return np.asarray(apart / np.linalg.norm(vibration.amplitudes(td), axis=0))
+    return np.asarray(np.sqrt(vibration.separation(tr, td)) / np.sqrt(vibration.elastic_energy(td)))
 
 
-def mismatch_shares(vibration: Deformation, tr: float, td: float) -> Samples:
+def mismatch_shares(vibration: SignedAmplitudes, tr: float, td: float) -> Samples:
     """Give the share of each mode or part in D^2, shape (k,) [-]; zero where nothing is off."""
-    square = _apart(vibration, tr, td) ** 2
+    square = vibration.differences(tr, td) ** 2
     total = square.sum()
     return square / total if total > 0 else square
 
@@ -152,13 +160,14 @@ def sign_match(vibration: Deformation, tr: Samples | float, td: Samples | float)
     For one mode or part: equal signs.  For several: the sum over q(tr) q(td) is not negative, so that a part which is
     hardly deformed does not decide.
     """
-    return np.asarray(np.einsum("k...,k...->...", vibration.amplitudes(td), vibration.amplitudes(tr)) >= 0)
+    return np.asarray(vibration.overlap(tr, td) >= 0)
 
 
-def _apart(vibration: Deformation, tr: Samples | float, td: Samples | float) -> Samples:
-    """q(tr) - q(td), of the shape of ``tr`` with an axis for modes or parts before it [sqrt(energy)]."""
-    at_tr = vibration.amplitudes(tr)
-    return np.asarray((at_tr.T - vibration.amplitudes(td).T).T)
+def band_up_to(
+    highest: Callable[[Samples, Samples, Any], Samples], stated: Samples, tr: Samples, td: Samples | float
+) -> tuple[Samples, Samples, Samples]:
+    """Give the band of a model whose stated residual is the least one, from what gives the ``highest``."""
+    return stated, stated, highest(stated, tr, td)
 
 
 def residual(lock_in: Samples | float, kinetic: Samples | float) -> Samples:

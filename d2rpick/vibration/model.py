@@ -26,13 +26,14 @@ from d2rpick.vibration.moments import ModalEnergy, Moments, SampledEnergy, momen
 from d2rpick.vibration.span import residual_bound
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration import SignedModel
-    from d2rpick.vibration.measures import Bound, Columns, Deformation
+    from d2rpick.vibration.measures import Band, Columns, Deformation
+    from d2rpick.vibration.modal import ModalVibration
     from d2rpick.vibration.part_signs import PartMatch, SignedParts
     from d2rpick.vibration.span import Span
 
@@ -43,6 +44,10 @@ _HIDDEN = 0.02
 _LEFT_OVER = "the oscillator leaves more over than the swings of the energy do, which were counted"
 # Of the fastest mode: what a parabola through three of them misses of a minimum is of the order of 1e-4 of a period.
 _POINTS_PER_PERIOD = 64
+# A release without any vibration has this residual: a switch that leaves more keeps nothing [-].
+NOTHING_KEPT: Final = 1.0
+# Of the time up to td: a tr in this last part of it saves little, and is like td only because it is near.
+NEAR_TD: Final = 0.25
 # Parts that a warning names of those that share a reason; the JSON document has all.
 _NAMED = 5
 
@@ -50,15 +55,15 @@ _NAMED = 5
 class Compared(NamedTuple):
     """Deformations that can be compared with those at td from ``first`` to ``last`` [time].
 
-    ``times`` before td at which their lock-in error is looked at, None of one mode, of which all has a closed form;
-    ``bound`` on a residual.
+    ``profile`` gives their lock-in error before a td, and is None of one mode, of which all has a closed form; ``band``
+    is that of a residual.
     """
 
     deformation: Deformation
     first: float
     last: float
-    times: Samples | None
-    bound: Bound
+    profile: Callable[[float], Profile] | None
+    band: Band
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -124,9 +129,34 @@ class Vibration:
     @cached_property
     def profile(self) -> Profile | None:
         """Lock-in error before td, whose minima are closest matches; None where there are none."""
-        if self.compared is None or self.compared.times is None:
+        if self.compared is None or self.compared.profile is None:
             return None
-        return Profile.of(self.compared.deformation, self.compared.times, self.td)
+        return self.compared.profile(self.td)
+
+    @cached_property
+    def least_residual(self) -> float | None:
+        """Least residual of all tr that save much, of a vibration of many modes; None for any other [-]."""
+        if self.basis != "modal" or self.profile is None or self.compared is None:
+            return None
+        last = self.td - NEAR_TD * (self.td - self.compared.first)
+        errors = self.profile.error[: np.searchsorted(self.profile.time, last)]
+        if not errors.size:
+            return None
+        return float(measures.residual(errors.min(), self.kinetic_share or 0.0))
+
+    @property
+    def keeps_nothing(self) -> bool:
+        """Whether no tr that saves much is better than a release without any vibration."""
+        return self.least_residual is not None and self.least_residual > NOTHING_KEPT
+
+    @property
+    def most_lock_in(self) -> float | None:
+        """Largest lock-in error of a tr that is worth having, of a vibration of many modes; None for any other [-]."""
+        if self.basis != "modal":
+            return None
+        least = self.least_residual or 0.0
+        most = NOTHING_KEPT if least <= NOTHING_KEPT else least + measures.TOLERATED_GROWTH
+        return float(np.sqrt(max(most**2 - (self.kinetic_share or 0.0), 0.0)))
 
     def moments(self, tolerance: float, since: float = -np.inf) -> Moments:
         """Times before td that may serve as tr: crossings, standstills within the tolerance, and closest matches.
@@ -140,8 +170,18 @@ class Vibration:
         else:
             turns = self.whole.turns_near(tolerance, since)
         matches = self.profile.minima() if self.profile else ()
+        if self.basis == "modal":  # the level of all modes together decides nothing
+            return Moments.of("match", [*matches, *self._least_deformed()])
         crossings = self.whole.crossings(since)
         return Moments.of_level(*crossings, Moments.of("extremum", turns), Moments.of("match", matches))
+
+    def _least_deformed(self) -> tuple[float, ...]:
+        """Time at which least vibration energy is elastic, if no tr keeps the vibration: that keeps the static part."""
+        if not self.keeps_nothing or self.compared is None or self.profile is None:
+            return ()
+        times = self.profile.time
+        times = times[: max(1, np.searchsorted(times, self.td - NEAR_TD * (self.td - self.compared.first)))]
+        return (float(times[np.argmin(self.compared.deformation.elastic_energy(times))]),)
 
     def measured(self, times: Samples) -> Columns:
         """Measures of each time as tr, as far as its deformation can be compared with that at td."""
@@ -150,13 +190,15 @@ class Vibration:
     def errors(self, times: Samples) -> Samples:
         """What a tolerance is held against, of the shape of ``times``; infinite where no tolerance would help [-].
 
-        The lock-in error where the signs match, the level error where no signs are known.
+        The lock-in error, of few modes if the signs match; the level error if no signs are known.
         """
         if self.compared is None:
             errors = measures.level_error(self.whole.energies(times), self.whole.energy(self.td))
             return np.where(np.isnan(errors), np.inf, errors)
         deformation = self.compared.deformation
-        comparable = self.comparable(times) & measures.sign_match(deformation, times, self.td)
+        comparable = self.comparable(times)
+        if self.basis != "modal":
+            comparable &= measures.sign_match(deformation, times, self.td)
         return np.where(comparable, measures.lock_in_error(deformation, times, self.td), np.inf)
 
     def knots(self) -> Samples:
@@ -193,7 +235,7 @@ class Vibration:
             assert self.profile is not None
             tolerance = self.profile.tolerances(tr, measures.lock_in_error(deformation, tr, td))
         of_parts = self.basis == "parts"
-        return measures.measured(deformation, tr, td, tolerance, self.compared.bound, of_parts=of_parts)
+        return measures.measured(deformation, tr, td, tolerance, self.compared.band, of_parts=of_parts)
 
 
 def moments_of(vibrations: Sequence[Vibration], tolerance: float, since: Sequence[float]) -> list[Moments]:
@@ -271,6 +313,12 @@ class Evidence(NamedTuple):
         return next((name for name, model in self.models.items() if model.signed), None)
 
     @property
+    def refusal(self) -> str | None:
+        """Why the modes of the structure could not be identified; None if they were, or were not looked for."""
+        modal = cast("ModalVibration | None", self.models.get("modal"))
+        return modal.doubts.refusal if modal else None
+
+    @property
     def has_model(self) -> bool:
         """Whether at some td more than the samples of the energy may be relied on."""
         fit = self.fit
@@ -306,15 +354,14 @@ def _best(whole: Vibration, evidence: Evidence) -> Vibration:
 def _with_signs(whole: Vibration, basis: str, model: SignedModel) -> Vibration:
     """Compare signed deformations, while levels and times are those of the whole energy."""
     first = model.comparable_since(whole.td)
-    times = model.time[np.searchsorted(model.time, first) :]  # a copy for each td would fill the memory
     return replace(
         whole,
         basis=basis,
-        compared=Compared(model, first, float(model.time[-1]), times, model.residual_bound),
+        compared=Compared(model, first, float(model.time[-1]), model.profile, model.residual_band),
         unknown=None,
         undescribed=model.undescribed,
         told=model.told,
-        estimated=whole.unknown and f"{model.kinetic}: {whole.unknown}",
+        estimated=f"{model.kinetic}: {whole.unknown}" if whole.unknown and model.kinetic else None,
     )
 
 
@@ -343,7 +390,9 @@ def energy_at(history: History, td: float, evidence: Evidence) -> Vibration:
         return samples(unknown="the oscillator does not describe the record at td", doubts=prescribed)
     if whole.sunk:
         return samples(unknown=whole.sunk, doubts=(SUNK, *prescribed))
-    compared = Compared(whole.mode, *whole.span, _times_before(whole), partial(residual_bound, fit))
+    times = _times_before(whole)
+    profile = None if times is None else partial(Profile.of, whole.mode, times)
+    compared = Compared(whole.mode, *whole.span, profile, partial(measures.band_up_to, partial(residual_bound, fit)))
     return Vibration("oscillator", whole, compared, undescribed="not described by the oscillator")
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, ClassVar, Final
 import numpy as np
 
 from d2rpick.histories.samples import narrow
+from d2rpick.vibration.amplitudes import SignedAmplitudes
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,7 +30,7 @@ _ZERO = 1e-9
 
 
 @dataclass(frozen=True, repr=False)
-class Mode:
+class Mode(SignedAmplitudes):
     r"""One under-damped vibration and the internal energy it makes.
 
     .. math::
@@ -258,7 +259,7 @@ _ROUNDING: Final = 1e-6  # of a radian: where an end of a window is itself an ex
 
 
 @dataclass(frozen=True, repr=False)
-class Modes:
+class Modes(SignedAmplitudes):
     r"""Two or more under-damped vibrations with one damping, and the internal energy they make together.
 
     .. math:: E(t) = \sum_i q_i(t)^2, \quad q_i = e^{-\alpha s/2} (a_i \cos\omega_i s + b_i \sin\omega_i s)

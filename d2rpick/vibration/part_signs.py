@@ -9,7 +9,9 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.histories.history import Memory
 from d2rpick.vibration import measures
+from d2rpick.vibration.amplitudes import SignedAmplitudes
 from d2rpick.vibration.identify import Identification, identify, identify_several
+from d2rpick.vibration.measures import Profile
 from d2rpick.vibration.span import SMALLEST, resolved
 from d2rpick.vibration.swings import SOLVER_FLOOR
 from d2rpick.vibration.waves import PartMotion, all_zeros, followed
@@ -69,7 +71,7 @@ class PartMatch(NamedTuple):
     reason: str | None = None
 
 
-class SignedParts:
+class SignedParts(SignedAmplitudes):
     """Signed deformations of parts, and what else of their vibration is known.
 
     Those that hold most are read first.  As soon as too much is known to have no sign, nothing rests on the others, and
@@ -191,6 +193,15 @@ class SignedParts:
     def known_at(self, td: float) -> bool:
         """Whether the energy of the vibration is above a solver's errors at td."""
         return bool(self.vibration_energy(td) >= SOLVER_FLOOR * np.max(self.vibration_energy(self.time)))
+
+    def profile(self, td: float) -> Profile:
+        """Lock-in errors at the times before ``td`` whose sign can be compared with that at td."""
+        since = np.searchsorted(self.time, self.comparable_since(td))
+        return Profile.of(self, self.time[since:], td)  # a copy for each td would fill the memory
+
+    def residual_band(self, stated: Samples, tr: Samples, td: float) -> tuple[Samples, Samples, Samples]:
+        """Residual of each tr (n,) as it is stated, which is the least one, and the largest [-]."""
+        return measures.band_up_to(self.residual_bound, stated, tr, td)
 
     def residual_bound(self, residual: Samples, tr: Samples, td: float) -> Samples:
         """Largest residual of each tr of shape (n,), if what may be hidden stood opposed at tr and td [-]."""

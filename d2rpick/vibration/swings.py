@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, ClassVar, Final, NamedTuple
 import numpy as np
 
 from d2rpick.histories.samples import find_turns
-from d2rpick.vibration.measures import vertices, wrong_sign
+from d2rpick.vibration import measures
+from d2rpick.vibration.amplitudes import SignedAmplitudes
+from d2rpick.vibration.measures import Profile, vertices, wrong_sign
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -38,7 +40,7 @@ _OF_THE_FLOOR: Final = 5.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Swings:
+class Swings(SignedAmplitudes):
     """The deformation that was counted, in the states of a flight.
 
     Parameters
@@ -85,6 +87,15 @@ class Swings:
         """Whether the swings before ``td`` were counted, two at least, and more than the error of a solver vibrates."""
         counted = np.count_nonzero((self.bottoms > self.comparable_since(td)) & (self.bottoms < td))
         return bool(counted > 1 and self.envelope.vibration_energy(td) >= self.envelope.floor)
+
+    def profile(self, td: float) -> Profile:
+        """Lock-in errors at the times before ``td`` whose sign can be compared with that at td."""
+        since = np.searchsorted(self.time, self.comparable_since(td))
+        return Profile.of(self, self.time[since:], td)  # a copy for each td would fill the memory
+
+    def residual_band(self, stated: Samples, tr: Samples, td: float) -> tuple[Samples, Samples, Samples]:
+        """Residual of each tr (n,) as it is stated, which is the least one, and the largest [-]."""
+        return measures.band_up_to(self.residual_bound, stated, tr, td)
 
     def residual_bound(self, residual: Samples, tr: Samples, td: float) -> Samples:
         """Largest residual of each tr (n,): of any spring, with what may hide in the floor at its worst [-]."""

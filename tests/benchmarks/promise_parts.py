@@ -9,7 +9,6 @@ modes mix in each; and a part that bends in two planes beside another one.  Damp
 
 from __future__ import annotations
 
-import sys
 from functools import partial
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -18,7 +17,7 @@ import numpy as np
 from d2rpick.choice.answers import suggest
 from d2rpick.choice.question import Settings
 from d2rpick.histories.history import History
-from tests.benchmarks.promise import Truth, table
+from tests.benchmarks.promise import Pair, Trial, run
 from tests.energies import suggest_in_window
 
 if TYPE_CHECKING:
@@ -144,7 +143,7 @@ def history(time: Samples, energies: Samples) -> History:
     )  # fmt: skip
 
 
-def stated(record: Record) -> Truth | None:
+def stated(record: Record) -> Pair | None:
     """Ask for a pair; None where none is recommended."""
     first, last = record.window
     ask = partial(suggest, td=first) if first == last else partial(suggest_in_window, window=record.window)
@@ -153,8 +152,22 @@ def stated(record: Record) -> Truth | None:
     if best is None or quality is None:
         return None
     true = record.residual(best.tr, answer.situation.td)
-    return Truth(true, best.residual, best.residual_high, quality.grade, answer.situation.basis)
+    return Pair(
+        best.tr,
+        answer.situation.td,
+        true,
+        best.residual,
+        getattr(best, "residual_low", best.residual),
+        best.residual_high,
+        quality.grade,
+        answer.situation.basis,
+    )
+
+
+def try_class(kind: str, count: int, seed: int) -> list[Trial]:
+    """Try so many records of a class, without an oracle."""
+    return [Trial(stated(record)) for record in records(kind, seed, count)]
 
 
 if __name__ == "__main__":
-    table(CLASSES, lambda kind, number, seed: [stated(record) for record in records(kind, seed, number)], *sys.argv[1:])
+    run(CLASSES, try_class, "What a good grade is worth on parts.")

@@ -8,7 +8,7 @@ import pytest
 
 import d2rpick
 from d2rpick.choice.question import Settings
-from tests.benchmarks.promise import BAD, CLASSES, tried
+from tests.benchmarks.promise import BAD, CLASSES, ask_for_pair
 from tests.benchmarks.promise_parts import CLASSES as CLASSES_OF_PARTS, Motion, Record, history, records, stated
 from tests.energies import sure
 from tests.vibration.test_identify import about_a_preload
@@ -27,7 +27,7 @@ from tests.vibration.test_identify import about_a_preload
 )
 def test_what_was_upside_down_has_the_sign_of_td(name: str, seed: int, number: int, tmp_path: Path) -> None:
     """The energy alone, or an oscillator about a preload, gave these pairs the other sign: residuals of 2."""
-    found = sure(tried(CLASSES[name](np.random.default_rng([seed, number])), tmp_path))
+    found = sure(ask_for_pair(CLASSES[name](np.random.default_rng([seed, number])), tmp_path))
     assert found.kept
     assert found.true < BAD
 

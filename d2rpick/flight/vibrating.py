@@ -1,0 +1,81 @@
+"""What vibrates together in a flight: parts beside the chosen ones, and the kinetic energy of all of them."""
+
+from __future__ import annotations
+
+from itertools import compress
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from d2rpick.base.tuples import NamedTuple
+
+if TYPE_CHECKING:
+    from d2rpick.flight.flight import Flight
+    from d2rpick.histories.history import History, Samples
+    from d2rpick.histories.names import Part
+
+# Of the range of the chosen parts' energy in the flight: other parts with less of it hardly vibrate with them.
+_HARDLY: Final = 0.02
+_FEWEST: Final = 16  # states that tell a fall from a vibration
+
+
+class Beside(NamedTuple):
+    """Parts that vibrate with the chosen ones and were not chosen; ``energy``: by how much theirs changes [energy]."""
+
+    parts: tuple[Part, ...] = ()
+    energy: float = 0.0
+
+
+def vibrating_beside(history: History, flight: Flight) -> Beside:
+    """Find the parts that vibrate with the chosen ones and were not chosen.
+
+    Parameters
+    ----------
+    history : History
+    flight : Flight
+        Whose parts fly together; none are known to if it has none.
+    """
+    if flight.parts is None or history.parts is None:
+        return Beside()
+    chosen = {part.id for part in history.parts}
+    others = tuple(part for part in flight.parts if part.id not in chosen)
+    energies = history.evidence.internal_energies(others) if others else None
+    if energies is None:
+        return Beside()
+    time, values = energies
+    inside = slice(*np.searchsorted(time, flight.within(history.time)).tolist())
+    own = history.between(*flight.within(history.time))[1]
+    if own.size == 0 or values[inside].size == 0:
+        return Beside()
+    ranges = np.ptp(values[inside], axis=0)
+    notable = ranges > _HARDLY * float(np.ptp(own))
+    return Beside(tuple(compress(others, notable)), float(ranges[notable].sum()))
+
+
+def kinetic_energy_of(history: History, flight: Flight) -> tuple[Samples, Samples] | None:
+    """Give the kinetic energy of all that vibrates together in the flight, without that of its fall.
+
+    Parameters
+    ----------
+    history : History
+    flight : Flight
+
+    Returns
+    -------
+    time, energy : array of shape (n,), or None
+        Within the flight [time], [energy]; None if no file holds it.
+
+    Notes
+    -----
+    The kinetic energy of the centre of mass is a quadratic function of time under a constant gravity, and what of it
+    is not, as under damping, is as slow: neither has any line.
+    """
+    kinetic = history.evidence.kinetic_energy(flight.parts)
+    if kinetic is None:
+        return None
+    inside = slice(*np.searchsorted(kinetic.time, flight.within(history.time)).tolist())
+    time, energy = kinetic.time[inside], kinetic.values[inside]
+    if time.size < _FEWEST:
+        return None
+    since = time - time[0]
+    return time, energy - np.polyval(np.polyfit(since, energy, 2), since)

@@ -1,0 +1,262 @@
+"""The lines of an energy: which decaying exponentials it consists of, found without a first guess.
+
+The internal energy of a linear structure in free flight has one line for each mode, at twice the rate and twice the
+decay of the mode, above a mean that falls slowly.  The rates come from the shift invariance of the signal space
+(ESPRIT: Roy and Kailath, IEEE Trans. ASSP 37, 1989), the weights from least squares on these rates.  How many
+exponentials there are is decided by prediction: the first part of the record is fitted, and the rest shows which
+number of them goes on as the record does.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from d2rpick.base.tuples import NamedTuple
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from d2rpick.histories.history import Samples
+
+    Complex = NDArray[np.complex128]
+
+# Numbers of exponentials that are tried: a line takes two of them, the mean one or a few.
+_ORDERS: Final = (3, 5, 7, 9, 11, 13, 17, 21, 27, 35, 45, 57, 71)
+# A further order must predict better by this factor to be taken, and below this error none is sought.
+_CLEARLY_BETTER, _PERFECT = 0.8, 2e-4
+# Share of the record that is fitted to predict the rest.
+FIRST_PART: Final = 0.7
+# Windows of the signal space have half the record, at most so many states: the work grows with its square.
+_MOST_LAGS: Final = 340
+# The even grid has so many states in a period of the fastest line that matters, and at most so many in all.
+_STATES_PER_PERIOD, _FEWEST_STATES, _MOST_STATES = 6.4, 64, 2000
+# Shares of the power of an energy about its trend: below the rate of the first lies all that matters, below that of the
+# second all that is strong.
+_ALL_POWER, _STRONG_POWER = 0.999, 0.95
+# A line swings once in the record at least, and decays by less than this share of its rate and within the record by
+# fewer than so many powers of e.
+_LEAST_TURNS, _MOST_DAMPED, _MOST_DECAY = 1.0, 0.35, 25.0
+# A free vibration does not grow; noise hides a growth of at most this over the record.
+_MOST_GROWTH: Final = 0.2
+# The mean is a constant and at most so many decays, which differ by this much over the record.
+_MOST_DECAYS, _SAME_DECAY = 4, 0.05
+
+
+class Grid(NamedTuple):
+    """Means of an energy over blocks of equidistant states: ``time`` and ``energy`` of shape (m,) [time], [energy].
+
+    A block has ``size`` states, ``spacing`` apart [time].  ``strong``: states of the grid in a period of the fastest
+    line that is strong [-].
+    """
+
+    time: Samples
+    energy: Samples
+    spacing: float
+    size: int
+    strong: float
+
+    @property
+    def step(self) -> float:
+        """Distance of two blocks [time]."""
+        return self.spacing * self.size
+
+    @property
+    def span(self) -> float:
+        """Time from the first block to the last [time]."""
+        return float(self.time[-1] - self.time[0])
+
+    def first(self, count: int) -> Grid:
+        """Give the first so many blocks."""
+        return self._replace(time=self.time[:count], energy=self.energy[:count])
+
+    def gain(self, poles: Complex) -> Complex:
+        """By what the mean over a block of ``exp(p t)`` exceeds its value in the middle of the block, of their shape."""
+        half = poles * self.spacing / 2
+        with np.errstate(invalid="ignore", divide="ignore"):
+            gain = np.sinh(half * self.size) / (self.size * np.sinh(half))
+        return np.where(np.abs(half) < 1e-12, 1.0, gain)
+
+
+def even_grid(time: Samples, energy: Samples) -> Grid:
+    """Bring an energy to an even grid that keeps every line that matters.
+
+    Parameters
+    ----------
+    time, energy : array of shape (n,)
+        Ascending, at least 4 of them [time], [energy].
+    """
+    even = np.linspace(time[0], time[-1], time.size)
+    values = energy
+    if not np.allclose(time, even, rtol=0.0, atol=1e-9 * (even[1] - even[0])):
+        from scipy.interpolate import CubicSpline  # not above: it costs start-up
+
+        values = CubicSpline(time, energy)(even)
+    reach = even - even[0]
+    trend = np.polyval(np.polyfit(reach, values, 2), reach)
+    power = np.abs(np.fft.rfft((values - trend) * np.hanning(time.size))) ** 2
+    running = np.cumsum(power)
+    fastest, strongest = np.searchsorted(running, np.array([_ALL_POWER, _STRONG_POWER]) * running[-1]).tolist()
+    wanted = np.clip(_STATES_PER_PERIOD * fastest, _FEWEST_STATES, _MOST_STATES)
+    size = max(1, int(time.size // wanted))
+    count = time.size // size
+    blocks = (column[: count * size].reshape(count, size).mean(axis=1) for column in (even, values))
+    return Grid(*blocks, spacing=float(even[1] - even[0]), size=size, strong=count / max(strongest, 1))
+
+
+class Exponentials(NamedTuple):
+    r"""A sum of decaying waves.
+
+    .. math:: f(t) = \mathrm{Re} \sum_k w_k e^{p_k (t - t_0)}
+
+    ``poles`` p and ``weights`` w of shape (k,), the imaginary parts of the poles not negative [1/time], [energy];
+    ``origin`` is t_0 [time].
+    """
+
+    poles: Complex
+    weights: Complex
+    origin: float
+
+    def at(self, t: Samples | float) -> Samples:
+        """Value at each time, of the shape of ``t`` [energy]."""
+        return np.asarray((self.waves(t) @ self.weights).real)
+
+    def waves(self, t: Samples | float) -> Complex:
+        """Each wave without its weight, of the shape of ``t`` with an axis for waves behind it [-]."""
+        return np.exp(np.multiply.outer(np.asarray(t, dtype=np.float64) - self.origin, self.poles))
+
+    def some(self, which: NDArray[np.bool_]) -> Exponentials:
+        """Give the waves where a mask holds."""
+        return Exponentials(self.poles[which], self.weights[which], self.origin)
+
+
+class Spectrum(NamedTuple):
+    """An energy as ``lines`` above a ``mean``, fitted to a grid; ``rest`` (m,) is what they leave over [energy]."""
+
+    lines: Exponentials
+    mean: Exponentials
+    rest: Samples
+
+    @property
+    def error(self) -> float:
+        """Root mean square of the rest [energy]."""
+        return float(np.sqrt(np.mean(self.rest**2)))
+
+    def turned(self) -> Spectrum:
+        """Give the same with lines, and what they leave over, of the opposite sign."""
+        return Spectrum(self.lines._replace(weights=-self.lines.weights), self.mean, -self.rest)
+
+    def at(self, t: Samples | float) -> Samples:
+        """Energy at each time, of the shape of ``t`` [energy]."""
+        return self.lines.at(t) + self.mean.at(t)
+
+
+class Prediction(NamedTuple):
+    """The ``spectrum`` of a whole grid, that of its first part, and how well this one predicts the rest.
+
+    ``missed``: root mean square of what the spectrum of the first part misses, in it and behind it, over the standard
+    deviation of the energy about its trend, ``swing`` [-], [energy].
+    """
+
+    spectrum: Spectrum
+    of_first_part: Spectrum
+    missed: float
+    swing: float
+
+    def turned(self) -> Prediction:
+        """Give the same with lines of the opposite sign."""
+        spectra = (self.spectrum.turned(), self.of_first_part.turned())
+        return Prediction(*spectra, self.missed, self.swing)
+
+
+def predict(grid: Grid) -> Prediction | None:
+    """Find the lines of an energy, as many as predict it best; None where it is too short or has no swing."""
+    reach = grid.time - grid.time[0]
+    if grid.time.size < _FEWEST_STATES // 2:
+        return None
+    swing = float(np.std(grid.energy - np.polyval(np.polyfit(reach, grid.energy, 2), reach)))
+    if not swing > 0:
+        return None
+    first = grid.first(int(FIRST_PART * grid.time.size))
+    behind = slice(first.time.size, None)
+    space, tried = _SignalSpace.of(first), []
+    for order in _ORDERS:
+        if order > first.time.size // 3 or order + 2 > space.size:
+            break
+        spectrum = fit_spectrum(first, space.poles(order), grid.span)
+        predicted = _block_means(spectrum, grid.time[behind], grid)
+        off = float(np.sqrt(np.mean((predicted - grid.energy[behind]) ** 2)))
+        missed = float(np.hypot(off, spectrum.error)) / swing
+        if not tried or missed < _CLEARLY_BETTER * tried[-1][0]:
+            tried.append((missed, order, spectrum))
+        if missed < _PERFECT:
+            break
+    if not tried:
+        return None
+    missed, order, of_first = tried[-1]
+    whole = fit_spectrum(grid, _SignalSpace.of(grid).poles(order), grid.span)
+    return Prediction(whole, of_first, missed, swing)
+
+
+class _SignalSpace:
+    """The space that windows of a record span, the directions with most of it first."""
+
+    def __init__(self, vectors: Samples, step: float) -> None:
+        self.vectors, self.step = vectors, step
+
+    @classmethod
+    def of(cls, grid: Grid) -> _SignalSpace:
+        lags = min(grid.time.size // 2, _MOST_LAGS)
+        windows = np.lib.stride_tricks.sliding_window_view(grid.energy, lags)
+        return cls(np.linalg.eigh(windows.T @ windows)[1][:, ::-1], grid.step)
+
+    @property
+    def size(self) -> int:
+        """How many directions there are."""
+        return int(self.vectors.shape[1])
+
+    def poles(self, order: int) -> Complex:
+        """Poles of so many exponentials [1/time]: shifting a window by a state multiplies each by exp(p step)."""
+        leading = self.vectors[:, :order]
+        factors = np.linalg.eigvals(np.linalg.lstsq(leading[:-1], leading[1:], rcond=None)[0])
+        kept = np.isfinite(factors) & (np.abs(factors) > 1e-6)
+        return np.asarray(np.log(factors[kept].astype(np.complex128)) / self.step)
+
+
+def fit_spectrum(grid: Grid, poles: Complex, span: float) -> Spectrum:
+    """Fit lines and mean with these poles to a grid; poles are told apart by what they do within ``span`` [time]."""
+    lines, mean = _split(poles, span)
+    every = np.concatenate([lines, mean])
+    waves = np.exp(np.multiply.outer(grid.time - grid.time[0], every)) * grid.gain(every)
+    swinging = every.imag > 0
+    design = np.hstack([waves.real, -waves.imag[:, swinging]])
+    found = np.linalg.lstsq(design, grid.energy, rcond=1e-9)[0]
+    weights = found[: every.size].astype(np.complex128)
+    weights[swinging] += 1j * found[every.size :]
+    origin, count = float(grid.time[0]), lines.size
+    rest = grid.energy - design @ found
+    return Spectrum(Exponentials(lines, weights[:count], origin), Exponentials(mean, weights[count:], origin), rest)
+
+
+def _block_means(spectrum: Spectrum, time: Samples, grid: Grid) -> Samples:
+    """Means of a spectrum over blocks with their middles at some times [energy]."""
+    both = (spectrum.lines, spectrum.mean)
+    return np.sum([(one.waves(time) @ (one.weights * grid.gain(one.poles))).real for one in both], axis=0)
+
+
+def _split(poles: Complex, span: float) -> tuple[Complex, Complex]:
+    """Tell the poles of lines from those of the mean: a constant, a few decays, and swings slower than the record."""
+    decay = np.maximum(-poles.real, -_MOST_GROWTH / span)
+    rate = poles.imag
+    turns = rate * span / (2 * np.pi)
+    lasting = decay * span < _MOST_DECAY
+    is_line = (turns > _LEAST_TURNS) & (decay < _MOST_DAMPED * rate) & lasting
+    is_slow = (rate >= 0) & ~is_line & (turns < _LEAST_TURNS) & lasting
+    decays = np.unique(np.round(np.concatenate([decay[is_line], decay[is_slow]]) * span, 1))
+    decays = decays[np.abs(decays) > _SAME_DECAY]
+    if decays.size > _MOST_DECAYS:
+        decays = np.quantile(decays, np.linspace(0.0, 1.0, _MOST_DECAYS))
+    slow = rate[is_slow & (rate * span > 0.5)]
+    mean = np.concatenate([[0.0], -decays / span, 1j * slow])
+    return -decay[is_line] + 1j * rate[is_line], mean.astype(np.complex128)

@@ -1,0 +1,120 @@
+r"""The error of any pair of times from the energy alone, for any number of modes: the value halfway between the two.
+
+A linear structure in free flight has modes :math:`q_k = a_k e^{-g_k t} \cos(w_k t + p_k)`, scaled so that the elastic
+energy of the vibration is :math:`V = \sum q_k^2`.  With m halfway between tr and td and :math:`\tau` from tr to td,
+
+.. math::
+    X = \sum q_k(t_r) q_k(t_d) = V(m) - H(m)/2 + C(m, \tau)/2
+
+    H(t) = \sum h_k e^{-2 g_k t}, \quad C(t, \tau) = \sum h_k e^{-2 g_k t} \cos(w_k \tau), \quad h_k = a_k^2
+
+    R^2 = 1 + [V(t_r) - 2 X] / U(t_d)
+
+exactly, whatever the damping of each mode, for the product of two cosines is half the sum of that of their sum, which
+is twice the angle halfway, and that of their difference.  V itself is the record.  The rest follows from its lines: a
+mode has one at twice its rate and twice its decay, with half of its h for an amplitude (docs/midpoint.md).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from d2rpick.base.caching import cached_property
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from d2rpick.histories.history import Samples
+    from d2rpick.vibration.lines import Complex, Exponentials, Spectrum
+
+    Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Reading:
+    """What a spectrum of an energy says of the vibration, once it is decided which lines are modes.
+
+    ``is_mode`` (k,): the other lines are those of a stretch, which is no vibration.  ``no_static``: all of the mean is
+    vibration; else half of what the modes hold is, and the rest is static.  ``rest`` is what of the record beside the
+    spectrum is believed, at ``times`` [energy], [time].
+    """
+
+    spectrum: Spectrum
+    is_mode: Mask
+    no_static: bool
+    times: Samples
+    rest: Samples
+    tiny: float
+
+    @cached_property
+    def modes(self) -> Exponentials:
+        """The lines that modes have."""
+        return self.spectrum.lines.some(self.is_mode)
+
+    @cached_property
+    def _peak_energies(self) -> Samples:
+        """The energy h of each mode at the origin [energy]."""
+        return 2 * np.abs(self.modes.weights)
+
+    def elastic_energy(self, t: Samples | float) -> Samples:
+        """V, the elastic energy of the vibration, of the shape of ``t``; noise makes it negative at times [energy]."""
+        t = np.asarray(t, dtype=np.float64)
+        energy = self.modes.at(t) + np.interp(t, self.times, self.rest)
+        if self.no_static:
+            return np.asarray(energy + self.spectrum.mean.at(t) + self.spectrum.lines.some(~self.is_mode).at(t))
+        return np.asarray(energy + self.level_of_modes(t) / 2)
+
+    def level_of_modes(self, t: Samples | float) -> Samples:
+        """Sum of the energies that the lines of the modes tell, of the shape of ``t`` [energy]."""
+        decays = self.modes._replace(poles=self.modes.poles.real.astype(np.complex128), weights=self._peak_energies)
+        return decays.at(t)
+
+    def level(self, t: Samples | float) -> Samples:
+        """H, the energy of all modes, without what damping makes of it within a period, of the shape of ``t`` [energy]."""
+        level = 2 * self.spectrum.mean.at(t) if self.no_static else self.level_of_modes(t)
+        return np.maximum(level, self.tiny)
+
+    def vibration_energy(self, t: Samples | float) -> Samples:
+        """U = V + T, the elastic and kinetic energy of the vibration, of the shape of ``t`` [energy]."""
+        poles = self.modes.poles
+        damping = -poles.real / np.abs(poles)
+        # z (z cos 2 theta + sqrt(1 - z^2) sin 2 theta), as the real part of a weight on each line
+        turned = damping * (damping - 1j * np.sqrt(1 - damping**2))
+        within_period = self.modes._replace(weights=2 * self.modes.weights * turned)
+        return np.maximum(self.level(t) + within_period.at(t), self.tiny)
+
+    def coherence(self, tr: Samples | float, td: Samples | float) -> Samples:
+        """C, how far the modes are in step after td - tr, for pairs of times whose shapes go together [energy]."""
+        return np.asarray(np.einsum("...k,...k->...", self.earlier(tr), self.later(td)).real)
+
+    def earlier(self, tr: Samples | float) -> Complex:
+        """What tr has in the coherence, of its shape with an axis for modes behind it [energy]."""
+        half = self.modes._replace(poles=self.modes.poles.conj() / 2)
+        return half.waves(tr) * self._peak_energies
+
+    def later(self, td: Samples | float) -> Complex:
+        """What td has in the coherence, of its shape with an axis for modes behind it [-]."""
+        return self.modes._replace(poles=self.modes.poles / 2).waves(td)
+
+    def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
+        """X, the product of the deformations at tr and td, within its bounds [energy]."""
+        bound = self.bound(tr, td)
+        return np.clip(self.free_overlap(tr, td), -bound, bound)
+
+    def free_overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
+        """The same as it comes out, which noise and a wrong model may drive beyond the bounds [energy]."""
+        middle = (np.asarray(tr) + td) / 2
+        return self.elastic_energy(middle) - self.level(middle) / 2 + self.coherence(tr, td) / 2
+
+    def bound(self, tr: Samples | float, td: Samples | float) -> Samples:
+        """Largest product that deformations with these energies have [energy]."""
+        energies = (np.maximum(self.elastic_energy(t), 0.0) for t in (tr, td))
+        return np.sqrt(np.prod(np.broadcast_arrays(*energies), axis=0))
+
+    def residual_squared(self, tr: Samples | float, td: Samples | float) -> Samples:
+        """R^2 of pairs of times [-]."""
+        lost = self.elastic_energy(tr) - 2 * self.overlap(tr, td)
+        return np.maximum(1 + lost / self.vibration_energy(td), 0.0)

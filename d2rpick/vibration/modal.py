@@ -1,0 +1,467 @@
+"""A vibration of any number of modes, identified from the lines of the energy, with what may be wrong with it.
+
+The lines can be read in more than one way: what of the mean is static, and which lines belong to a stretch instead of
+a mode.  The reading that fits is taken; what the others would say, and what the first part of the record says, widen
+the band of its residuals.  Where the record is none of a linear structure in free flight, the reason is given.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import TYPE_CHECKING, ClassVar, Final
+
+import numpy as np
+
+from d2rpick.base.caching import cached_property
+from d2rpick.base.tuples import NamedTuple
+from d2rpick.vibration.lines import FIRST_PART, even_grid, predict
+from d2rpick.vibration.measures import Profile
+from d2rpick.vibration.midpoint import Reading
+from d2rpick.vibration.swings import SOLVER_FLOOR
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+    from scipy.interpolate import CubicSpline
+
+    from d2rpick.histories.history import Samples
+    from d2rpick.vibration.lines import Complex, Exponentials, Grid, Prediction
+
+    Mask = NDArray[np.bool_]
+
+# Fewest states of a record that lines are looked for in.
+_FEWEST_STATES: Final = 32
+# Of the mean vibration energy: a static energy below this share is none, it is the scatter of the fit.
+_NO_STATIC: Final = 0.12
+# Nothing vibrates if the energy swings by less than this share of its highest value: single precision resolves less.
+_RESOLVED: Final = 2e-7
+# Least energy that anything is divided by, over the swing of the record.
+_TINY: Final = 1e-12
+# Pairs of times in which the overlap of the deformations is held against its bounds, in each direction.
+_CHECKED: Final = 90
+
+# A line counts beside the strongest one from this share of it on, and from so many times its own scatter.
+_NOTABLE, _NOTABLE_PARTNER, _ABOVE_SCATTER = 3e-3, 3e-4, 4.0
+# Two rates are one if they differ by less than this share of a turn over the record.
+_SAME_RATE: Final = 0.1
+# Two phases are one if they differ by less [rad]: of the line of a stretch, and of the harmonics of a spring.
+_SAME_PHASE, _SAME_PHASE_OF_HARMONICS = 0.15, 0.25
+# The strongest lines that harmonics are looked for of, and how many harmonics.
+_STRONGEST, _HARMONICS = 3, (2, 3, 4, 5)
+# A stretch that leaves the static energy within this share of the mean may be another mode at half of the rate.
+_AMBIGUOUS: Final = 0.08
+
+# What refuses a record, each a share of what its name says.
+_MOST_MISSED: Final = 0.5  # prediction error over the swing of the energy
+_MOST_MISFIT: Final = 0.3  # rest over the swing of the energy
+_MOST_NEGATIVE: Final = 0.5  # negative static energy over the mean vibration energy, beyond what noise makes
+_MOST_DRIFT: Final = 0.6  # change of the static energy over the mean vibration energy
+_MOST_BEYOND: Final = 0.12  # overlap beyond its bounds over the vibration energy, rms over all pairs
+_MOST_HARMONIC: Final = 0.05  # lines locked to a first one over it
+_MOST_UNSTRETCHED: Final = 0.6  # energy of a stretch that the static energy does not hold
+_FEWEST_PER_PERIOD: Final = 2.4  # states per period of the fastest strong line
+
+# Times in a period of the fastest notable line at which a deformation is looked at.
+_TIMES_PER_PERIOD: Final = 16
+
+# Of the swing of the energy: modes that leave less, and predict the rest within so much, show a flight.
+_LITTLE_LEFT, _LITTLE_MISSED = 0.03, 0.1
+
+# The half-width of R^2, before anything is known to be wrong.
+_LEAST_HALF: Final = 0.01
+_DRIFT_COUNTS, _NEGATIVE_COUNTS, _NOISE_COUNTS = 0.35, 1.2, 2.5
+_DRIFT_OF_NOISE: Final = 0.08
+_HIDDEN_LINES: Final = 12  # as many lines as may hide in what the fit leaves over
+
+
+class Doubts(NamedTuple):
+    """What speaks against a record as one of a linear structure in free flight, each zero if nothing does [-].
+
+    ``missed`` and ``misfit`` are over the swing of the energy, ``negative``, ``drift`` and ``unstretched`` over the mean
+    vibration energy, ``beyond`` over the vibration energy; ``harmonic`` is the size of lines that are locked to a first
+    one, over it; ``coarse``: states per period of the fastest strong line.
+    """
+
+    missed: float
+    misfit: float
+    negative: float
+    drift: float
+    beyond: float
+    harmonic: float
+    unstretched: float
+    coarse: float
+
+    @property
+    def refusal(self) -> str | None:
+        """Say what refuses the record; None if nothing does."""
+        reasons = (
+            (self.coarse < _FEWEST_PER_PERIOD, f"{self.coarse:.2g} states per period of the energy are too few"),
+            (self.missed > _MOST_MISSED, "the first part of the flight does not predict the rest"),
+            (self.misfit > _MOST_MISFIT, "lines do not describe the energy"),
+            (self.negative > _MOST_NEGATIVE, "the lines hold more energy than there is"),
+            (self.drift > _MOST_DRIFT, "the mean energy changes in the flight by as much as vibrates"),
+            (self.beyond > _MOST_BEYOND, "the energy halfway is beyond what any deformations allow"),
+            (
+                self.harmonic > _MOST_HARMONIC,
+                "the lines are harmonics of one another, as a nonlinear spring makes them",
+            ),
+            (self.unstretched > _MOST_UNSTRETCHED, "lines at half the rate of others hold more than the static energy"),
+        )
+        return next((reason for holds, reason in reasons if holds), None)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ModalVibration:
+    """The vibration of a structure of many modes in a window of free flight.
+
+    Parameters
+    ----------
+    time : array of shape (n,)
+        Times at which the deformation is looked at, close enough for every line [time].
+    reading : Reading
+        How the lines are read.
+    others : tuple of Reading
+        Other readings that the record allows.
+    of_first_part : Reading
+        What the first part of the record says.
+    doubts : Doubts
+        What speaks against it.
+    noise : float
+        Scatter of the record about its lines [energy].
+    systematic : float
+        Share of the scatter that neighbouring states share, and which is believed [-].
+    slack : float
+        Negative static energy that noise makes, over the mean vibration energy [-].
+    source : str
+        The energy that the lines were found in.
+    second : Reading or None
+        What the lines of the kinetic energy say, beside those of the internal energy.
+    """
+
+    time: Samples
+    reading: Reading
+    others: tuple[Reading, ...]
+    of_first_part: Reading
+    doubts: Doubts
+    noise: float
+    systematic: float
+    slack: float
+    source: str = "internal energy"
+    second: Reading | None = None
+    kinetic: ClassVar = ""
+    undescribed: ClassVar = "outside the part of the flight whose modes were identified"
+
+    @property
+    def signed(self) -> bool:
+        """Whether nothing refuses the record."""
+        return self.doubts.refusal is None
+
+    @property
+    def convinces(self) -> bool:
+        """Whether the modes go on by themselves so exactly that nothing else can act on them."""
+        white = 1 - self.systematic
+        structure = self.doubts.misfit * np.sqrt(self.systematic)
+        missed = self.doubts.missed**2 - 2 * white * self.doubts.misfit**2
+        return self.signed and structure < _LITTLE_LEFT and missed < _LITTLE_MISSED**2
+
+    @property
+    def told(self) -> str:
+        """Name what a choice rests on: the modes, by their rates."""
+        rates = np.sort(self.reading.modes.poles.imag / 2)
+        count = f"{rates.size} mode{'s' * (rates.size != 1)}"
+        span = f"omega {rates[0]:.4g}" if rates.size == 1 else f"omega {rates[0]:.4g} to {rates[-1]:.4g}"
+        return f"modal, {count} identified from the lines of the {self.source}, {span}"
+
+    def comparable_since(self, td: float) -> float:
+        """Earliest time whose deformation can be compared with that at any td [time]."""
+        return float(self.time[0])
+
+    def known_at(self, td: float) -> bool:
+        """Whether td lies where the modes were identified, and more than the error of a solver vibrates there."""
+        level = self.reading.level(np.append(self.time[[0, -1]], td))
+        return bool(self.time[0] <= td <= self.time[-1] and level[-1] >= SOLVER_FLOOR * level[:-1].max())
+
+    def elastic_energy(self, t: Samples | float) -> Samples:
+        """V, of the shape of ``t``, not negative [energy]."""
+        return np.maximum(self.reading.elastic_energy(t), 0.0)
+
+    def vibration_energy(self, t: Samples | float) -> Samples:
+        """U = V + T, of the shape of ``t`` [energy]."""
+        return self.reading.vibration_energy(t)
+
+    def kinetic_energy(self, t: Samples | float) -> Samples:
+        """T, of the shape of ``t``, not negative [energy]."""
+        return np.maximum(self.vibration_energy(t) - self.elastic_energy(t), 0.0)
+
+    def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
+        """X, the product of the deformations at tr and td, for times of one shape, or one of them [energy]."""
+        return self.reading.overlap(tr, td)
+
+    def separation(self, tr: Samples | float, td: Samples | float) -> Samples:
+        """Elastic energy of the difference of the deformations at tr and td [energy]."""
+        apart = self.elastic_energy(tr) - 2 * self.overlap(tr, td) + self.elastic_energy(td)
+        return np.maximum(apart, 0.0)
+
+    def profile(self, td: float) -> Profile:
+        """Lock-in errors at those of the ``time`` that come before ``td``, by what is worked out for all td once."""
+        last = int(np.searchsorted(self.time, td))
+        elastic, spline, earlier = self._at_all_times
+        middle = (self.time[:last] + td) / 2
+        at_td = float(self.elastic_energy(td))
+        coherence = (earlier[:last] @ self.reading.later(td)).real
+        overlap = spline(middle) - self.reading.level(middle) / 2 + coherence / 2
+        bound = np.sqrt(elastic[:last] * at_td)
+        separation = elastic[:last] - 2 * np.clip(overlap, -bound, bound) + at_td
+        return Profile(self.time[:last], np.sqrt(np.maximum(separation, 0.0) / self.vibration_energy(td)))
+
+    @cached_property
+    def _at_all_times(self) -> tuple[Samples, CubicSpline, Complex]:
+        """Elastic energy at the ``time``, what gives it between, and what tr has in the coherence."""
+        from scipy.interpolate import CubicSpline  # not above: it costs start-up
+
+        energy = self.reading.elastic_energy(self.time)
+        return np.maximum(energy, 0.0), CubicSpline(self.time, energy), self.reading.earlier(self.time)
+
+    def half_width(self, tr: Samples | float, td: Samples | float) -> Samples:
+        """Half-width of the band of R^2 of pairs of times [-]."""
+        reading, level = self.reading, self.reading.level(td)
+        squared = reading.residual_squared(tr, td)
+        lines = np.abs(reading.coherence(tr, td) - self.of_first_part.coherence(tr, td)) / level
+        scatter = self.noise / level * np.sqrt(5 * self.systematic + 0.5)
+        beside = 0.0 if self.second is None else np.abs(self.second.residual_squared(tr, td) - squared)
+        return np.asarray(
+            (_LEAST_HALF + min(self._wrong, 1.0)) * (1 + np.abs(squared - 1))
+            + np.minimum(lines, 1.0)
+            + _NOISE_COUNTS * scatter
+            + beside
+            + self._of_other_readings(tr, td, squared)
+        )
+
+    def residual_band(self, stated: Samples, tr: Samples, td: Samples | float) -> tuple[Samples, Samples, Samples]:
+        """Residual of each tr (n,), and the lowest and highest that the record allows [-].
+
+        No square is below zero: where the band reaches there, the middle of the rest is stated instead of ``stated``.
+        """
+        squared, half = np.square(stated), self.half_width(tr, td)
+        low, high = np.maximum(squared - half, 0.0), squared + half
+        return np.sqrt((low + high) / 2), np.sqrt(low), np.sqrt(high)
+
+    def unseen(self, tr: Samples | float, td: float) -> Samples:
+        """Share of the vibration energy at td that the band is worth, from each tr on [-].
+
+        A hidden mode that stands opposed at tr and td adds four times its share to R^2.
+        """
+        return self.half_width(tr, td) / 4
+
+    @cached_property
+    def _wrong(self) -> float:
+        """What widens the band of all pairs alike [-]."""
+        doubts = self.doubts
+        drifts = not self.reading.no_static or doubts.drift > _DRIFT_OF_NOISE
+        negative = max(doubts.negative - self.slack, 0.0)
+        return _DRIFT_COUNTS * doubts.drift * drifts + _NEGATIVE_COUNTS * (negative + doubts.unstretched) + doubts.harmonic
+
+    def _of_other_readings(self, tr: Samples | float, td: Samples | float, squared: Samples) -> Samples:
+        """How far R^2 may be off because the lines can be read in another way [-]."""
+        apart = [np.abs(other.residual_squared(tr, td) - squared) for other in self.others]
+        if self.reading.no_static or self.is_ambiguous:
+            return np.asarray(np.max(apart, axis=0)) if apart else np.zeros(squared.shape)
+        # lines that hide in the rest hold no more than this beside those that were found
+        hidden = 2 * np.sqrt(2 * _HIDDEN_LINES) * self.noise / self.reading.level(td) * np.abs(1.5 - squared)
+        return np.asarray(np.min([*apart, hidden], axis=0))
+
+    @property
+    def is_ambiguous(self) -> bool:
+        """Whether lines at half the rate of others are those of a stretch, or of modes."""
+        return not self.reading.is_mode.all() and bool(self.others)
+
+
+def identify_modal(time: Samples, energy: Samples, *, kinetic: bool = False) -> ModalVibration | None:
+    """Identify the modes of a structure from its energy in free flight; None if it has no lines.
+
+    The kinetic energy has the lines of the internal energy with the opposite sign, and whatever else it holds is slow:
+    elastic and kinetic energy of a mode add up to what falls without a swing.
+
+    Parameters
+    ----------
+    time, energy : array of shape (n,)
+        [time], [energy], of the whole structure that vibrates together.
+    kinetic : bool
+        Whether it is the kinetic energy, and not the internal one.
+
+    Returns
+    -------
+    ModalVibration or None
+        Its ``doubts`` say whether it can be relied on.
+
+    Examples
+    --------
+    >>> t = np.linspace(0.0, 6.0, 601)
+    >>> found = identify_modal(t, np.cos(9.0 * t) ** 2 + 0.5 * np.cos(14.0 * t + 1.0) ** 2 + 0.3 * np.cos(25.0 * t) ** 2)
+    >>> [f"{rate:.4f}" for rate in sorted(found.reading.modes.poles.imag / 2)], found.signed
+    (['9.0000', '14.0000', '25.0000'], True)
+    >>> apart = np.cos(9.0 * 1.0) - np.cos(9.0 * 4.0), np.cos(15.0) - np.cos(57.0), np.cos(25.0) - np.cos(100.0)
+    >>> bool(abs(float(found.separation(1.0, 4.0)) - np.dot([1.0, 0.5, 0.3], np.square(apart))) < 1e-6)
+    True
+    """
+    if time.size < _FEWEST_STATES:
+        return None
+    grid = even_grid(time, energy)
+    prediction = predict(grid)
+    if prediction is None or prediction.swing <= _RESOLVED * float(np.abs(energy).max()):
+        return None
+    if not prediction.spectrum.lines.poles.size:
+        return None
+    return _read(grid, prediction.turned(), kinetic=True) if kinetic else _read(grid, prediction)
+
+
+def confirm(internal: ModalVibration | None, kinetic: ModalVibration | None) -> ModalVibration | None:
+    """Give what the internal energy says, its band widened to what the kinetic energy says; else that alone."""
+    if kinetic is None or not kinetic.signed:
+        return internal
+    if internal is None or not internal.signed:
+        return kinetic
+    return replace(internal, second=kinetic.reading)
+
+
+def _read(grid: Grid, prediction: Prediction, *, kinetic: bool = False) -> ModalVibration:
+    """Read the lines in the way that fits, and in others; of a ``kinetic`` energy the mean says nothing."""
+    spectrum, tiny = prediction.spectrum, _TINY * prediction.swing
+    noise, rest = spectrum.error, spectrum.rest
+    scatter = noise * np.sqrt(2 / grid.time.size)
+    shared = float(np.sum(rest[1:] * rest[:-1]) / max(float(np.sum(rest**2)), 1e-300))
+    systematic = float(np.clip(shared, 0.0, 1.0))
+    stretches = stretches_of(spectrum.lines, grid.span, scatter)
+    is_mode = ~np.isin(np.arange(spectrum.lines.poles.size), [stretch.line for stretch in stretches])
+
+    plain = Reading(spectrum, np.ones(is_mode.shape, dtype=bool), True, grid.time, systematic * rest, tiny)
+    with_static = replace(plain, is_mode=is_mode, no_static=False)
+    half = with_static.level_of_modes(grid.time) / 2
+    static = spectrum.mean.at(grid.time) - half
+    mean = max(float(np.mean(half)), 1e-300)
+    share = float(np.mean(static)) / mean
+    half_of_all = plain.level_of_modes(grid.time) / 2
+    excess = abs(float(np.mean(spectrum.mean.at(grid.time) - half_of_all)))
+    ambiguous = bool(stretches) and not kinetic and excess < _AMBIGUOUS * float(np.mean(half_of_all))
+    no_static = abs(share) < _NO_STATIC and not stretches and not kinetic
+    reading = plain if no_static else with_static
+    others = (plain,) if ambiguous else () if stretches or kinetic else (with_static if no_static else plain,)
+
+    first = prediction.of_first_part
+    first_stretches = stretches_of(first.lines, FIRST_PART * grid.span, scatter) if stretches else ()
+    first_modes = ~np.isin(np.arange(first.lines.poles.size), [stretch.line for stretch in first_stretches])
+    of_first_part = replace(reading, spectrum=first, is_mode=first_modes, rest=np.zeros(grid.time.size))
+    held = sum(stretch.energy for stretch in stretches) / mean
+    doubts = Doubts(
+        missed=prediction.missed,
+        misfit=noise / prediction.swing,
+        negative=max(-share, 0.0),
+        drift=float(np.std(static)) / mean,
+        beyond=_beyond_bounds(reading, grid),
+        harmonic=harmonics_of(spectrum.lines, grid.span, scatter),
+        unstretched=max(held - share, 0.0) / (1 + max(share, 0.0)),
+        coarse=grid.strong,
+    )
+    if kinetic:
+        doubts = doubts._replace(negative=0.0, drift=0.0, unstretched=0.0)
+    slack = 0.02 + 2 * is_mode.size * scatter / mean
+    return ModalVibration(
+        _close_times(reading, grid),
+        reading,
+        others,
+        of_first_part,
+        doubts,
+        noise,
+        systematic,
+        slack,
+        "kinetic energy" if kinetic else "internal energy",
+    )
+
+
+def _close_times(reading: Reading, grid: Grid) -> Samples:
+    """Times over the grid, close enough for a parabola through three of them to find a minimum [time]."""
+    rates, sizes = reading.modes.poles.imag, np.abs(reading.modes.weights)
+    notable = rates[sizes > _NOTABLE * sizes.max(initial=0.0)]
+    periods = grid.span * float(notable.max(initial=0.0)) / (2 * np.pi)
+    return np.linspace(grid.time[0], grid.time[-1], int(max(grid.time.size, _TIMES_PER_PERIOD * periods)) + 1)
+
+
+def _beyond_bounds(reading: Reading, grid: Grid) -> float:
+    """By how much the overlap is beyond its bounds, over the vibration energy: rms over pairs of times [-]."""
+    even = np.linspace(grid.time[0], grid.time[-1], _CHECKED)
+    pairs = np.array([(tr, td) for tr, td in product(even, even) if tr < td])
+    tr, td = pairs.T
+    beyond = np.maximum(np.abs(reading.free_overlap(tr, td)) - reading.bound(tr, td), 0.0)
+    return float(np.sqrt(np.mean((beyond / reading.level((tr + td) / 2)) ** 2)))
+
+
+class Stretch(NamedTuple):
+    """A ``line`` that belongs to the stretch of a mode, which has its own ``of_mode``; ``energy`` of that stretch [energy]."""
+
+    line: int
+    of_mode: int
+    energy: float
+
+
+def stretches_of(lines: Exponentials, span: float, scatter: float) -> tuple[Stretch, ...]:
+    """Find the lines of modes that vibrate about a stretch, as in a body that spins.
+
+    A mode q about q0 has the energy q0^2 + 2 q0 q + q^2: a further line at half the rate and phase of its own.  In free
+    flight without spin the energy is stationary at rest, whatever residual stress there is, and has no such line.
+    """
+    size, rate = np.abs(lines.weights), lines.poles.imag
+    phase = _phases_in_middle(lines, span)
+    strongest = float(size.max(initial=0.0))
+    order = np.argsort(-size).tolist()
+    found: list[Stretch] = []
+    for line in order:
+        if size[line] < max(_NOTABLE * strongest, _ABOVE_SCATTER * scatter):
+            continue
+        for own in order:
+            if own == line or size[own] < max(_NOTABLE_PARTNER * strongest, _ABOVE_SCATTER * scatter):
+                continue
+            if abs(rate[own] - 2 * rate[line]) * span > 2 * np.pi * _SAME_RATE:
+                continue
+            unsure = 3 * min(scatter / size[own] + 2 * scatter / size[line], 0.1)
+            if abs(_wrapped(phase[own] - 2 * phase[line], 2 * np.pi)) < _SAME_PHASE + unsure:
+                found.append(Stretch(line, own, float(size[line] ** 2 / (8 * size[own]))))
+                break
+    return tuple(found)
+
+
+def harmonics_of(lines: Exponentials, span: float, scatter: float) -> float:
+    """How large the lines at three and more times a first one are whose phases are locked to it, over it [-].
+
+    A spring that is not linear has them; the modes of a linear structure are not locked to one another.
+    """
+    size, rate = np.abs(lines.weights), lines.poles.imag
+    phase = _phases_in_middle(lines, span)
+    if size.size < 3:
+        return 0.0
+    return max(_locked_to(int(first), size, rate, phase, span, scatter) for first in np.argsort(-size)[:_STRONGEST])
+
+
+def _locked_to(first: int, size: Samples, rate: Samples, phase: Samples, span: float, scatter: float) -> float:
+    """Size of the harmonics of a line beyond its second, over it [-]; the row ends at the first that is not locked."""
+    total = 0.0
+    for times in _HARMONICS:
+        line = int(np.argmin(np.abs(rate - times * rate[first])))
+        apart = abs(rate[line] - times * rate[first]) * span > 2 * np.pi * _SAME_RATE
+        if line == first or apart or size[line] < _ABOVE_SCATTER * scatter:
+            break
+        # a spring that stiffens and one that softens have them with opposite signs
+        if abs(_wrapped(phase[line] - times * phase[first], np.pi)) > _SAME_PHASE_OF_HARMONICS:
+            break
+        if times > 2:
+            total += float(size[line] / size[first])
+    return total
+
+
+def _phases_in_middle(lines: Exponentials, span: float) -> Samples:
+    """Phase of each line in the middle of the window, where it is known best [rad]."""
+    return np.asarray(np.angle(lines.weights) + lines.poles.imag * span / 2)
+
+
+def _wrapped(angle: float, turn: float) -> float:
+    """Give an angle within half a turn of zero [rad]."""
+    return (angle + turn / 2) % turn - turn / 2

@@ -1,0 +1,120 @@
+"""Where in a record the modes of one structure go on by themselves, if nothing else tells its flight."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from d2rpick.base.tuples import NamedTuple
+from d2rpick.vibration.modal import ModalVibration, identify_modal
+from d2rpick.vibration.span import Span
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from d2rpick.histories.history import History, Memory, Samples
+
+# Windows that are tried begin and end at these parts of the record.
+_PARTS: Final = 16
+# Shares of the record at which windows up to its end begin.
+_BEGINNINGS: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75)
+# Beyond its window the record stays with the modes while means over this share of the fastest period are off by less
+# than so much of the vibration energy, or so many times the scatter of such means.
+_MEANS_PER_PERIOD, _MOST_OFF, _SCATTERS_OFF = 8, 0.02, 5.0
+# A window that grows is identified anew so often.
+_MOST_REFITS: Final = 3
+
+
+class Described(NamedTuple):
+    """A ``vibration`` that describes the record in a ``span``."""
+
+    vibration: ModalVibration
+    span: Span
+
+
+def find_described(history: History, td: float, guess: Span | None, memory: Memory) -> Described | None:
+    """Find a window around td whose modes go on by themselves; None if none is found.
+
+    Parameters
+    ----------
+    history : History
+    td : float
+        [time]
+    guess : Span or None
+        Where the energy seems to keep its level [time].
+    memory : Memory
+        Of the record: what was identified in a window is looked for once.
+    """
+    known = memory.once("described by modes", list[Described])
+    for found in known:
+        if found.span.start <= td <= found.span.end:
+            return found
+    for window in _windows(history, td, guess):
+        vibration = _identified(history, window, memory)
+        if vibration is None or not vibration.convinces:
+            continue
+        found = _grown(history, Described(vibration, window), memory)
+        known.append(found)
+        return found
+    return None
+
+
+def _windows(history: History, td: float, guess: Span | None) -> Iterator[Span]:
+    """Windows to try: the one that was guessed, then later and later ones up to the end of the record."""
+    first, last = float(history.time[0]), float(history.time[-1])
+    part = (last - first) / _PARTS
+    if guess is not None:  # by whole parts, since each td has a guess of its own
+        inner = Span(
+            first + part * np.ceil((guess.start - first) / part),
+            last if guess.end >= last else first + part * np.floor((guess.end - first) / part),
+        )
+        if inner.start < td <= inner.end:
+            yield inner
+    yield from (Span(first + share * (last - first), last) for share in _BEGINNINGS if first + share * (last - first) < td)
+
+
+def _identified(history: History, window: Span, memory: Memory) -> ModalVibration | None:
+    return memory.once(("lines", *window), lambda: identify_modal(*history.between(*window)))
+
+
+def _grown(history: History, found: Described, memory: Memory) -> Described:
+    """Extend a window while the record stays with its modes, and identify them anew, until it stays."""
+    for _ in range(_MOST_REFITS):
+        span = _reach(history, found)
+        if span == found.span:
+            break
+        vibration = _identified(history, span, memory)
+        if vibration is None or not vibration.convinces:
+            break
+        found = Described(vibration, span)
+    return found
+
+
+def _reach(history: History, found: Described) -> Span:
+    """Give the window in which the record stays with the modes, at least that in which they were found."""
+    time, energy = history.time, history.energy
+    inside = slice(*np.searchsorted(time, found.span).tolist())
+    spacing = float(np.median(np.diff(time[inside])))
+    period = 2 * np.pi / max(float(found.vibration.reading.modes.poles.imag.max()), 1e-300)
+    width = max(3, round(period / _MEANS_PER_PERIOD / spacing))
+    before = _last_off(time[: inside.start], energy[: inside.start], found.vibration, width)
+    after = _last_off(time[inside.stop :][::-1], energy[inside.stop :][::-1], found.vibration, width)
+    return Span(
+        float(time[before]) if before < inside.start else found.span.start,
+        float(time[time.size - 1 - after]) if after < time.size - inside.stop else found.span.end,
+    )
+
+
+def _last_off(time: Samples, energy: Samples, vibration: ModalVibration, width: int) -> int:
+    """Number of the states, which come nearer and nearer to the window, up to the last that is off the modes."""
+    if time.size < width:
+        return int(time.size)
+    with np.errstate(over="ignore", invalid="ignore"):  # far off, damped modes grow beyond all numbers
+        off = energy - vibration.reading.spectrum.at(time)
+        means = np.abs(np.convolve(off, np.full(width, 1 / width), mode="valid"))
+        room = np.maximum(
+            _MOST_OFF * vibration.vibration_energy(time[width - 1 :]), _SCATTERS_OFF * vibration.noise / np.sqrt(width)
+        )
+        wrong = np.flatnonzero(~(means <= room))
+    return int(wrong[-1]) + width if wrong.size else 0
