@@ -18,7 +18,9 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+import d2rpick
 from d2rpick.base.caching import cached_property
+from d2rpick.histories.opening import Selection, open_run
 from validation import frame_deck
 from validation.frame_deck import Landing, write_deck
 from validation.landing import TOTAL, compare_landings, read_course
@@ -29,10 +31,14 @@ from validation.run import run
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    Pair = tuple[float, float]  # tr and td [s]
+
     from validation.landing import Course, LandingDifference
     from validation.nodes import Nodes, VibrationError
 
 _SMALLER_SCALE: Final = 0.85  # of the stable step: what this changes is the scatter of the model
+_HISTORY: Final = ("time", "internal_energy", "kinetic_energy", "x_momentum", "y_momentum", "z_momentum")
+_THINNED: Final = 4  # every so many states are written to a csv history
 _CLEAR: Final = 2e-4  # states so near to td and to the landing are not compared [s]
 
 
@@ -63,14 +69,6 @@ class WholeRollover(Model):
         return f"{before.replace(box, whole)}/TH/NODE/1\nnodes\n{variables}\n{watched}{after}".encode()
 
 
-class Pair(NamedTuple):
-    """Switch times [s] and the residual predicted from the reference alone, before the switched run [-]."""
-
-    tr: float
-    td: float
-    predicted: float
-
-
 class Case(NamedTuple):
     """A model, the parts that are switched, the pairs, and times [s].
 
@@ -86,19 +84,12 @@ class Case(NamedTuple):
 
 _ROLL: Final = MODELS["ROLL"]
 _ROLL_PAIRS: Final = (
-    Pair(0.15527, 0.37225, 0.577),
-    Pair(0.12851, 0.26421, 0.544),
-    Pair(0.0957549, 0.372553, 0.955),
-    Pair(0.10516, 0.37225, 1.792),
-)
-_LANDING, _REACH = 0.1155, 0.0975  # of the frame [s]; how far its lowest foot leads then [m]
-_FRAME_PAIRS: Final = tuple(
-    Pair(tr, 0.10025, predicted)
-    for tr, predicted in (
-        (0.019475, 0.266), (0.018775, 0.395), (0.01835, 0.599), (0.028825, 0.813), (0.0121, 1.000), (0.045325, 1.200),
-        (0.048425, 1.400), (0.014575, 1.597), (0.024125, 1.788),
-    )
+    (0.155716, 0.371906), (0.15527, 0.37225), (0.12851, 0.26421), (0.0957549, 0.372553), (0.10516, 0.37225),
 )  # fmt: skip
+_LANDING, _REACH = 0.1155, 0.0975  # of the frame [s]; how far its lowest foot leads then [m]
+_TD_FRAME: Final = 0.10025
+_FRAME_STARTS: Final = (0.019475, 0.018775, 0.01835, 0.028825, 0.0121, 0.045325, 0.048425, 0.014575, 0.024125)
+_FRAME_PAIRS: Final = tuple((tr, _TD_FRAME) for tr in _FRAME_STARTS)
 
 
 def _frame_case(speed: float, pairs: tuple[Pair, ...]) -> Case:
@@ -125,10 +116,12 @@ CASES: Final = {
 class Row(NamedTuple):
     """What came out of a pair, or of the smaller step, which has neither pair nor vibration.
 
+    ``predicted`` are the residual by the reference alone and its upper bound, None if d2rpick knows none [-].
     ``worth`` is R^2 H over the rise of the internal energy at the landing, with the residual R of the nodes [-].
     """
 
     pair: Pair | None
+    predicted: tuple[float | None, float | None]
     vibration: VibrationError | None
     worth: float
     landing: LandingDifference
@@ -141,6 +134,7 @@ class Reference:
     case: Case
     legs: list[Path]
     nodes: Nodes
+    history: Path
 
     def course(self, legs: Sequence[Path], td: float) -> Course:
         """Give a run from its landing on, the first contact after td [s]."""
@@ -149,44 +143,63 @@ class Reference:
 
     def compare_scatter(self, legs: Sequence[Path]) -> Row:
         """Compare a run that is not switched either."""
-        landing = self._compare_landings(legs, self.case.pairs[0].td)
-        return Row(None, None, 0.0, landing)
+        landing = self._compare_landings(legs, self.case.pairs[0][1])
+        return Row(None, (None, None), None, 0.0, landing)
 
     def compare_pair(self, legs: Sequence[Path], pair: Pair) -> Row:
         """Compare a switched run."""
-        landing = self._compare_landings(legs, pair.td)
-        start, end = pair.td + _CLEAR, self.course(self.legs, pair.td).landing - _CLEAR
+        landing = self._compare_landings(legs, pair[1])
+        start, end = pair[1] + _CLEAR, self.course(self.legs, pair[1]).landing - _CLEAR
         wanted, found = (read_motion(names, self.nodes, start, end) for names in (self.legs, legs))
         vibration = compare_vibration(wanted, found, self.nodes)
         worth = vibration.residual**2 * self.vibration_energy / landing.energies[TOTAL].rise
-        return Row(pair, vibration, worth, landing)
+        return Row(pair, predict(self.history, *pair), vibration, worth, landing)
 
     def _compare_landings(self, legs: Sequence[Path], td: float) -> LandingDifference:
         wanted, found = (self.course(names, td) for names in (self.legs, legs))
         return compare_landings(wanted, found, self.case.parts, self.nodes)
 
+    def write_history(self) -> None:
+        """Write energies and momenta of the switched parts as csv, every fourth state."""
+        (database,) = open_run([str(leg) for leg in self.legs], Selection()).databases
+        ids = [part.id for part in database.parts if part.title in self.case.parts]
+        columns = [database.time, *(database.part_channel(name, ids).sum(axis=1) for name in _HISTORY[1:])]
+        rows = np.stack(columns, axis=1)[::_THINNED]
+        np.savetxt(self.history, rows, fmt="%.6g", delimiter=",", header=",".join(_HISTORY), comments="")
+
     @cached_property
     def vibration_energy(self) -> float:
         """Mean energy of the vibration in the second half of the flight [J]."""
-        landing = self.course(self.legs, self.case.pairs[0].td).landing
+        landing = self.course(self.legs, self.case.pairs[0][1]).landing
         start = (self.case.flight_start + landing) / 2
         return vibration_energy(read_motion(self.legs, self.nodes, start, landing - _CLEAR), self.nodes)
 
 
 def study(case: Case, folder: Path, solver: Path) -> Iterator[Row]:
-    """Compute what is missing in a folder; give a row for the smaller step, then one for each pair."""
+    """Compute what is missing in a folder; give a row for the smaller step, then one for each pair.
+
+    The energies and momenta of the reference are written to ``reference.csv`` in the folder.
+    """
     model = case.model
     legs = compute(model, folder / "reference", [], solver)
-    reference = Reference(case, legs, read_nodes(folder / "reference" / f"{model.name}_0000.rad"))
+    nodes = read_nodes(folder / "reference" / f"{model.name}_0000.rad")
+    reference = Reference(case, legs, nodes, folder / "reference.csv")
+    reference.write_history()
     smaller = compute(replace(model, scale=_SMALLER_SCALE), folder / "smaller_step", [], solver)
     yield reference.compare_scatter(smaller)
     for pair in case.pairs:
-        name = f"tr_{1e3 * pair.tr:g}_td_{1e3 * pair.td:g}"
-        switched = compute(model, folder / name, [(pair.tr, pair.td)], solver)
+        name = f"tr_{1e3 * pair[0]:g}_td_{1e3 * pair[1]:g}"
+        switched = compute(model, folder / name, [pair], solver)
         yield reference.compare_pair(switched, pair)
 
 
-def compute(model: Model, folder: Path, windows: list[tuple[float, float]], solver: Path) -> list[Path]:
+def predict(history: Path, tr: float, td: float) -> tuple[float | None, float | None]:
+    """Give the residual of a pair and its upper bound, as d2rpick finds them in the history of the reference."""
+    verdict = d2rpick.verify(d2rpick.read(history), tr=tr, td=td).to_dict()
+    return verdict["residual"], verdict["residual_high"]
+
+
+def compute(model: Model, folder: Path, windows: list[Pair], solver: Path) -> list[Path]:
     """Run a model unless its folder has a finished run; give its time histories."""
     done = folder / "done"
     if not done.exists():
@@ -196,15 +209,15 @@ def compute(model: Model, folder: Path, windows: list[tuple[float, float]], solv
 
 
 _COLUMNS: Final = (
-    "case", "tr_s", "td_s", "R_predicted", "R_nodes", "correlation", "worth", "shift_s", "impulse", "place_m",
+    "case", "tr_s", "td_s", "R_predicted", "R_high", "R_nodes", "correlation", "worth", "shift_s", "impulse", "place_m",
     "turned_deg", "energy", "rise_J", "rms", "peak", "final",
 )  # fmt: skip
 
 
 def cells(name: str, row: Row) -> Iterator[tuple[object, ...]]:
     """Give the lines of a row in the table of results, one for each energy."""
-    pair, vibration = row.pair or (None, None, None), row.vibration or (None, None)
-    shared = (name, *pair, *vibration, row.worth, *row.landing[1:])
+    pair, vibration = row.pair or (None, None), row.vibration or (None, None)
+    shared = (name, *pair, *row.predicted, *vibration, row.worth, *row.landing[1:])
     for energy, difference in row.landing.energies.items():
         yield (*shared, energy, difference.rise, difference.rms, difference.peak, difference.final)
 
