@@ -1,7 +1,8 @@
 """What differs after the landing between a switched run and its reference.
 
-Both runs are aligned at the begin of their landing, the first contact after td.  Energies are in shares of the rise of
-the same energy in the reference, from before the landing to its peak; ``total`` is the sum over the parts.
+States are too far apart to tell when a contact begins.  So the runs are aligned near their first contacts after td,
+where the sums of their energies differ least.  Energies are in shares of the rise of the same energy in the reference,
+from before the landing to its peak; ``total`` is the sum over the parts.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 from d2rpick.histories.opening import Selection, open_run
 from validation.compare import read
 from validation.driven import angle
-from validation.nodes import read_motion
+from validation.nodes import interpolate, read_motion
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     Reals = NDArray[np.float64]
 
 _BEFORE: Final = 2e-4  # the landing has not begun so long before its first contact [s]
+_ALIGNED: Final = np.linspace(-2e-4, 2e-4, 81)  # shifts that are tried against the first contact [s]
 _END: Final = 0.2  # share of the time after the landing whose mean is the final energy
 TOTAL: Final = "total"
 
@@ -66,34 +68,46 @@ class Course(NamedTuple):
     places: Reals
 
 
-def read_course(legs: Sequence[Path], parts: Sequence[str], nodes: Nodes, td: float, since: Reals) -> Course:
-    """Read a run at the times ``since`` its first contact after td [time]."""
-    names = [str(leg) for leg in sorted(legs)]
-    landing = min(time for time in read(names).contacts() if time > td)
-    (database,) = open_run(names, Selection()).databases
-    numbers = {part.title: part.id for part in database.parts}
-    ids = [numbers[title] for title in parts]
+class Record:
+    """Histories of the switched parts of a run, and when its landing begins, the first contact after td [time]."""
 
-    def at(quantity: str, times: Reals | float) -> Reals:
-        values = database.part_channel(quantity, ids)
-        return np.stack([np.interp(times, database.time, column) for column in values.T], axis=-1)
+    def __init__(self, legs: Sequence[Path], parts: Sequence[str], td: float) -> None:
+        names = [str(leg) for leg in sorted(legs)]
+        (database,) = open_run(names, Selection()).databases
+        numbers = {part.title: part.id for part in database.parts}
+        self._database, self._legs = database, legs
+        self._ids = [numbers[title] for title in parts]
+        self._internal = database.part_channel("internal_energy", self._ids)
+        self.landing = min(time for time in read(names).contacts() if time > td)
 
-    def momentum(time: float) -> Reals:
-        return np.array([at(f"{axis}_momentum", time).sum() for axis in "xyz"])
+    def energies(self, times: Reals | float) -> Reals:
+        """Internal energies of the parts and their total at some times, shape (..., parts + 1) [energy]."""
+        energies = np.stack([np.interp(times, self._database.time, column) for column in self._internal.T], axis=-1)
+        return np.concatenate([energies, energies.sum(axis=-1, keepdims=True)], axis=-1)
 
-    end, start = landing + float(since[-1]), landing - _BEFORE
-    motion = read_motion(legs, nodes, end - _BEFORE, end)
-    return Course(
-        landing=landing,
-        energies=_with_total(at("internal_energy", landing + since)),
-        before=_with_total(at("internal_energy", start)),
-        impulse=momentum(end) - momentum(start),
-        places=motion.places[-1],
-    )
+    def align(self, reference: Course, since: Reals) -> None:
+        """Move the start of the landing to where the total energy differs least from that of a reference."""
+        off = [
+            np.mean((self.energies(self.landing + shift + since) - reference.energies)[:, -1] ** 2)
+            for shift in _ALIGNED
+        ]
+        self.landing += float(_ALIGNED[np.argmin(off)])
 
+    def course(self, nodes: Nodes, since: Reals) -> Course:
+        """Give the run at some times since its landing."""
+        end, start = self.landing + float(since[-1]), self.landing - _BEFORE
+        motion = interpolate(read_motion(self._legs, nodes, end - _BEFORE, end + _BEFORE), np.array([end]))
+        return Course(
+            landing=self.landing,
+            energies=self.energies(self.landing + since),
+            before=self.energies(start),
+            impulse=self._momentum(end) - self._momentum(start),
+            places=motion.places[0],
+        )
 
-def _with_total(energies: Reals) -> Reals:
-    return np.concatenate([energies, energies.sum(axis=-1, keepdims=True)], axis=-1)
+    def _momentum(self, time: float) -> Reals:
+        sums = (self._database.part_channel(f"{axis}_momentum", self._ids).sum(axis=1) for axis in "xyz")
+        return np.array([np.interp(time, self._database.time, momentum) for momentum in sums])
 
 
 def compare_landings(reference: Course, switched: Course, parts: Sequence[str], nodes: Nodes) -> LandingDifference:

@@ -107,7 +107,7 @@ def compare_vibration(reference: Motion, switched: Motion, nodes: Nodes) -> Vibr
     inside = (reference.time >= switched.time[0]) & (reference.time <= switched.time[-1])
     reference = Motion(*(values[inside] for values in reference))
     wanted = remove_rigid_motion(reference, nodes)
-    found = remove_rigid_motion(_at_times(switched, reference.time), nodes)
+    found = remove_rigid_motion(interpolate(switched, reference.time), nodes)
 
     def energy(first: Reals, second: Reals) -> float:
         return float(np.einsum("n,tnx,tnx->", nodes.masses, first, second))
@@ -117,7 +117,8 @@ def compare_vibration(reference: Motion, switched: Motion, nodes: Nodes) -> Vibr
     return VibrationError(float(residual), float(correlation))
 
 
-def _at_times(motion: Motion, times: Reals) -> Motion:
+def interpolate(motion: Motion, times: Reals) -> Motion:
+    """Give a motion at other times, which lie between its own."""
     after = np.clip(np.searchsorted(motion.time, times), 1, motion.time.size - 1)
     share = (times - motion.time[after - 1]) / (motion.time[after] - motion.time[after - 1])
     share = share[:, np.newaxis, np.newaxis]

@@ -22,8 +22,9 @@ import d2rpick
 from d2rpick.base.caching import cached_property
 from d2rpick.histories.opening import Selection, open_run
 from validation import frame_deck
+from validation.compare import compare, read
 from validation.frame_deck import Landing, write_deck
-from validation.landing import TOTAL, compare_landings, read_course
+from validation.landing import TOTAL, Record, compare_landings
 from validation.models import MODELS, Model
 from validation.nodes import compare_vibration, read_motion, read_nodes, vibration_energy
 from validation.run import run
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 
     Pair = tuple[float, float]  # tr and td [s]
 
-    from validation.landing import Course, LandingDifference
+    from validation.landing import LandingDifference
     from validation.nodes import Nodes, VibrationError
 
 _SMALLER_SCALE: Final = 0.85  # of the stable step: what this changes is the scatter of the model
@@ -107,22 +108,35 @@ CASES: Final = {
         0.0885,
         0.06,
     ),
-    "FRAME": _frame_case(5.0, _FRAME_PAIRS),
+    "FRAME": _frame_case(5.0, (*_FRAME_PAIRS, (_TD_FRAME - 3e-5, _TD_FRAME))),  # the last one only stops the vibration
     "FRAME-FAST": _frame_case(10.0, _FRAME_PAIRS[::2]),
     "FRAME-SLOW": _frame_case(2.5, _FRAME_PAIRS[::2]),
 }
 
 
+class Prediction(NamedTuple):
+    """What d2rpick says of a pair from the reference alone, None if it does not know [-].
+
+    ``residual`` and its upper bound, bounds of the mean energy from td to the landing over that of the reference.
+    """
+
+    residual: float | None = None
+    residual_high: float | None = None
+    mean_energy_low: float | None = None
+    mean_energy_high: float | None = None
+
+
 class Row(NamedTuple):
     """What came out of a pair, or of the smaller step, which has neither pair nor vibration.
 
-    ``predicted`` are the residual by the reference alone and its upper bound, None if d2rpick knows none [-].
+    ``mean_energy`` from td to the landing is over that of the reference [-].
     ``worth`` is R^2 H over the rise of the internal energy at the landing, with the residual R of the nodes [-].
     """
 
     pair: Pair | None
-    predicted: tuple[float | None, float | None]
+    predicted: Prediction
     vibration: VibrationError | None
+    mean_energy: float | None
     worth: float
     landing: LandingDifference
 
@@ -136,28 +150,32 @@ class Reference:
     nodes: Nodes
     history: Path
 
-    def course(self, legs: Sequence[Path], td: float) -> Course:
-        """Give a run from its landing on, the first contact after td [s]."""
-        since = np.arange(0.0, self.case.after_landing, self.case.model.interval)
-        return read_course(legs, self.case.parts, self.nodes, td, since)
-
     def compare_scatter(self, legs: Sequence[Path]) -> Row:
         """Compare a run that is not switched either."""
         landing = self._compare_landings(legs, self.case.pairs[0][1])
-        return Row(None, (None, None), None, 0.0, landing)
+        return Row(None, Prediction(), None, None, 0.0, landing)
 
     def compare_pair(self, legs: Sequence[Path], pair: Pair) -> Row:
         """Compare a switched run."""
         landing = self._compare_landings(legs, pair[1])
-        start, end = pair[1] + _CLEAR, self.course(self.legs, pair[1]).landing - _CLEAR
+        start, end = pair[1] + _CLEAR, self.record(pair[1]).landing - _CLEAR
         wanted, found = (read_motion(names, self.nodes, start, end) for names in (self.legs, legs))
         vibration = compare_vibration(wanted, found, self.nodes)
         worth = vibration.residual**2 * self.vibration_energy / landing.energies[TOTAL].rise
-        return Row(pair, predict(self.history, *pair), vibration, worth, landing)
+        theirs, ours = (read([str(leg) for leg in names]) for names in (self.legs, legs))
+        mean_energy = compare(theirs, ours, pair[1]).mean_ratio
+        return Row(pair, predict(self.history, *pair), vibration, mean_energy, worth, landing)
 
     def _compare_landings(self, legs: Sequence[Path], td: float) -> LandingDifference:
-        wanted, found = (self.course(names, td) for names in (self.legs, legs))
-        return compare_landings(wanted, found, self.case.parts, self.nodes)
+        since = np.arange(0.0, self.case.after_landing, self.case.model.interval)
+        wanted = self.record(td).course(self.nodes, since)
+        switched = Record(legs, self.case.parts, td)
+        switched.align(wanted, since)
+        return compare_landings(wanted, switched.course(self.nodes, since), self.case.parts, self.nodes)
+
+    def record(self, td: float) -> Record:
+        """Give the histories of the reference with its landing after td [s]."""
+        return Record(self.legs, self.case.parts, td)
 
     def write_history(self) -> None:
         """Write energies and momenta of the switched parts as csv, every fourth state."""
@@ -170,7 +188,7 @@ class Reference:
     @cached_property
     def vibration_energy(self) -> float:
         """Mean energy of the vibration in the second half of the flight [J]."""
-        landing = self.course(self.legs, self.case.pairs[0][1]).landing
+        landing = self.record(self.case.pairs[0][1]).landing
         start = (self.case.flight_start + landing) / 2
         return vibration_energy(read_motion(self.legs, self.nodes, start, landing - _CLEAR), self.nodes)
 
@@ -193,10 +211,10 @@ def study(case: Case, folder: Path, solver: Path) -> Iterator[Row]:
         yield reference.compare_pair(switched, pair)
 
 
-def predict(history: Path, tr: float, td: float) -> tuple[float | None, float | None]:
-    """Give the residual of a pair and its upper bound, as d2rpick finds them in the history of the reference."""
+def predict(history: Path, tr: float, td: float) -> Prediction:
+    """Give what d2rpick finds of a pair in the history of the reference."""
     verdict = d2rpick.verify(d2rpick.read(history), tr=tr, td=td).to_dict()
-    return verdict["residual"], verdict["residual_high"]
+    return Prediction(**{name: verdict[name] for name in Prediction._fields})
 
 
 def compute(model: Model, folder: Path, windows: list[Pair], solver: Path) -> list[Path]:
@@ -209,7 +227,8 @@ def compute(model: Model, folder: Path, windows: list[Pair], solver: Path) -> li
 
 
 _COLUMNS: Final = (
-    "case", "tr_s", "td_s", "R_predicted", "R_high", "R_nodes", "correlation", "worth", "shift_s", "impulse", "place_m",
+    "case", "tr_s", "td_s", "R_predicted", "R_high", "mean_energy_low", "mean_energy_high",
+    "R_nodes", "correlation", "mean_energy", "worth", "shift_s", "impulse", "place_m",
     "turned_deg", "energy", "rise_J", "rms", "peak", "final",
 )  # fmt: skip
 
@@ -217,7 +236,7 @@ _COLUMNS: Final = (
 def cells(name: str, row: Row) -> Iterator[tuple[object, ...]]:
     """Give the lines of a row in the table of results, one for each energy."""
     pair, vibration = row.pair or (None, None), row.vibration or (None, None)
-    shared = (name, *pair, *row.predicted, *vibration, row.worth, *row.landing[1:])
+    shared = (name, *pair, *row.predicted, *vibration, row.mean_energy, row.worth, *row.landing[1:])
     for energy, difference in row.landing.energies.items():
         yield (*shared, energy, difference.rise, difference.rms, difference.peak, difference.final)
 
