@@ -155,8 +155,8 @@ def suggest(
         Cost of an element by formulation, or the file that ``d2rpick calibrate`` wrote.
     **choosing
         How to choose: ``after``, ``landing``, ``margin``, ``tolerance``, ``max_kinetic_share``, ``max_residual``,
-        ``oscillator`` with ``v0``, ``fit_window``, ``replay``, ``strict``, ``keep_vibration``, ``cost_share``, ``step_ratio``; what they
-        mean stands in ``d2rpick.api.arguments.Choosing``.
+        ``oscillator`` with ``v0``, ``fit_window``, ``replay``, ``strict``, ``keep_vibration``, ``cost_share``,
+        ``step_ratio``; what they mean stands in ``d2rpick.api.arguments.Choosing``.
 
     Returns
     -------

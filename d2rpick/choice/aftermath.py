@@ -26,8 +26,10 @@ if TYPE_CHECKING:
 # Vibration energies are known within this share, once a model of the vibration is.
 _KNOWN_WITHIN: Final = 0.1
 # Of m alike modes that are out of step the energy has a standard deviation of 1/sqrt(8 m) of what they hold together:
-# so much more than it may be there, with so many modes.
-_MODES_OUT_OF_STEP: Final = 20
+# so much more than it may be there. In a computed car 100 such modes hold what its nodes show.
+_MODES_OUT_OF_STEP: Final = 110
+# Of e: about the largest double.
+_LARGEST_EXPONENT: Final = 700.0
 # Fewer states do not show what fluctuates.
 _FEWEST_STATES: Final = 8
 
@@ -70,9 +72,12 @@ def _vibration_energies(situation: Situation) -> list[tuple[float, float]]:
     bounds = vibration_energy_bounds(situation)
     if bounds is None:
         return []
-    mean = float(np.mean(_energies_in_flight(situation)[1]))
+    time, energy = _energies_in_flight(situation)
+    mean = float(np.mean(energy))
+    # what damping leaves at td of the mean over the flight
+    left = 1 / float(np.mean(np.exp(np.minimum(-situation.flight.damping * (time - situation.td), _LARGEST_EXPONENT))))
     # half of the whole is the mean above what is static
-    return [(max(situation.energy_td - (mean - whole / 2), 0.0), whole) for whole in bounds]
+    return [(max(situation.energy_td - (mean - whole / 2), 0.0), left * whole) for whole in bounds]
 
 
 def vibration_energy_bounds(situation: Situation) -> tuple[float, float] | None:

@@ -43,12 +43,12 @@ def candidates_at(situations: Sequence[Situation], *, in_flight: bool = False) -
 def ranked(judged: Judged) -> Iterator[Candidates]:
     """Order the candidates of each td, best first, number them, and recommend the first that keeps the limits, if any.
 
-    Acceptable ones first, of them those on the same swing as td, or near it, last: they save little.  Of each group first those
-    of like quality, the earliest first, but where it is much the same those that leave the body out of place behind the
-    others; then the rest by their error.
+    Acceptable ones first, of them those on the same swing as td, or near it, last: they save little.  Of each group
+    first those of like quality, the earliest first, but where it is much the same those that leave the body out of
+    place behind the others; then the rest by their error.
     """
     rigid = judged.td - judged.moments.tr
-    late = judged.columns["same_swing"] | judged.near_td
+    late = (judged.columns["same_swing"] != 0) | judged.near_td
     group = np.where(judged.acceptable, late, np.int8(2)) + 3 * judged.place
     room = np.repeat([like_quality(one) for one in judged.situations], 3)
     places = order(group, judged.error, rigid, judged.out_of_place, room)
@@ -220,7 +220,7 @@ def _is_loose(best: Candidate) -> bool:
 
 
 def _fair(best: Candidate) -> list[str]:
-    found = []
+    found: list[str] = []
     if best.residual is None:
         return found
     if best.residual > _MOST_GOOD:

@@ -24,6 +24,7 @@ from d2rpick.vibration.span import Fits
 if TYPE_CHECKING:
     from collections.abc import Container, Iterator, Sequence
 
+    from d2rpick.choice.aftermath import Kept
     from d2rpick.choice.candidates import Candidate, Candidates, Pair
     from d2rpick.choice.plan import Plan
     from d2rpick.choice.quality import Quality
@@ -92,6 +93,11 @@ class Offer(OfTd):
     def quality(self) -> Quality | None:
         """How good the recommended pair is."""
         return self.answer.quality
+
+    @property
+    def kept(self) -> Kept | None:
+        """Bounds of the mean energy after td, over that of the reference."""
+        return self.answer.kept
 
 
 def offers_of(situations: Sequence[Situation], peaks: Container[float]) -> Iterator[Offer]:

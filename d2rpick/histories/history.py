@@ -221,14 +221,12 @@ class Given:
     balance: Balance | None = None
     masses: Samples | None = None
 
-    def internal_energies(self, parts: Sequence[Part]) -> Track | None:
+    def internal_energies(self, parts: Sequence[Part]) -> Track | None:  # noqa: ARG002  what files hold is read below
         """Internal energies of some parts, ``values`` of shape (n, parts) [energy]; None if they are not written."""
         return None
 
     def kinetic_energy(self, parts: Sequence[Part] | None) -> Track | None:
-        """Kinetic energy of some parts together, or of the whole model, ``values`` of shape (n,) [energy]; None if it
-        is not written.
-        """
+        """Kinetic energy of some parts together, or of the model, ``values`` (n,) [energy]; None if not written."""
         balance = self.balance
         if parts is not None or balance is None or balance.kinetic is None:
             return None

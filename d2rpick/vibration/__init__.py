@@ -9,7 +9,7 @@ the kinetic share "is what ..." (``kinetic``), and why a tr has no measures (``u
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Final, Protocol, cast
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from d2rpick.vibration.part_signs import SignedParts
     from d2rpick.vibration.span import Span
     from d2rpick.vibration.swings import Swings
-
-    SignedModel: TypeAlias = SignedParts | ModalVibration | Swings
-    Finder: TypeAlias = Callable[[History, Span, Together], SignedModel | None]
 
 
 class Together(Protocol):
@@ -37,13 +34,17 @@ class Together(Protocol):
         """Its kinetic energy at times in the flight, without that of its fall, both (n,); None if not written."""
 
 
+if TYPE_CHECKING:
+    SignedModel: TypeAlias = SignedParts | ModalVibration | Swings
+    Finder: TypeAlias = Callable[[History, Span, Together], SignedModel | None]
+
+
 def _parts(history: History, within: Span, _: Together) -> SignedModel | None:
     """Read the signs of single parts, where their energies are written."""
-    time, _ = history.between(*within)
+    time = history.between(*within)[0]
     if history.part_energies is None or time.size < 3:
         return None
     from d2rpick.histories.samples import window
-    from d2rpick.vibration.modal import ModalVibration
     from d2rpick.vibration.part_signs import SignedParts
 
     return SignedParts(time, history.part_energies[window(history.time, *within)], history.part_names)
@@ -102,5 +103,11 @@ def find_models(
         if find and (model := memory.once((basis, *within), partial(find, history, within, together))):
             found[basis] = model
             if model.signed:
-                break
-    return found
+                return found
+    return _with_last_resort(found)
+
+
+def _with_last_resort(found: dict[str, SignedModel]) -> dict[str, SignedModel]:
+    """Rely on doubtful modes, with a wide band, if no model tells the sign."""
+    modal = cast("ModalVibration | None", found.get("modal"))
+    return found | {"modal": modal.as_last_resort()} if modal else found

@@ -32,6 +32,8 @@ FIRST_PART: Final = 0.7
 _MOST_LAGS: Final = 340
 # The even grid has so many states in a period of the fastest line that matters, and at most so many in all.
 _STATES_PER_PERIOD, _FEWEST_STATES, _MOST_STATES = 6.4, 64, 2000
+# Times are even if they are off by less than this share of a step, as single precision and printed digits leave it.
+_EVEN: Final = 1e-3
 # Shares of the power of an energy about its trend: below the rate of the first lies all that matters, below that of the
 # second all that is strong.
 _ALL_POWER, _STRONG_POWER = 0.999, 0.95
@@ -72,7 +74,7 @@ class Grid(NamedTuple):
         return self._replace(time=self.time[:count], energy=self.energy[:count])
 
     def gain(self, poles: Complex) -> Complex:
-        """By what the mean over a block of ``exp(p t)`` exceeds its value in the middle of the block, of their shape."""
+        """Mean of ``exp(p t)`` over a block, over its value in the middle of the block, of the shape of ``poles``."""
         half = poles * self.spacing / 2
         with np.errstate(invalid="ignore", divide="ignore"):
             gain = np.sinh(half * self.size) / (self.size * np.sinh(half))
@@ -89,7 +91,7 @@ def even_grid(time: Samples, energy: Samples) -> Grid:
     """
     even = np.linspace(time[0], time[-1], time.size)
     values = energy
-    if not np.allclose(time, even, rtol=0.0, atol=1e-9 * (even[1] - even[0])):
+    if np.abs(time - even).max() > _EVEN * (even[1] - even[0]):
         from scipy.interpolate import CubicSpline  # not above: it costs start-up
 
         values = CubicSpline(time, energy)(even)
@@ -101,8 +103,8 @@ def even_grid(time: Samples, energy: Samples) -> Grid:
     wanted = np.clip(_STATES_PER_PERIOD * fastest, _FEWEST_STATES, _MOST_STATES)
     size = max(1, int(time.size // wanted))
     count = time.size // size
-    blocks = (column[: count * size].reshape(count, size).mean(axis=1) for column in (even, values))
-    return Grid(*blocks, spacing=float(even[1] - even[0]), size=size, strong=count / max(strongest, 1))
+    middles, means = (column[: count * size].reshape(count, size).mean(axis=1) for column in (even, values))
+    return Grid(middles, means, spacing=float(even[1] - even[0]), size=size, strong=count / max(strongest, 1))
 
 
 class Exponentials(NamedTuple):
@@ -180,7 +182,8 @@ def predict(grid: Grid) -> Prediction | None:
         return None
     first = grid.first(int(FIRST_PART * grid.time.size))
     behind = slice(first.time.size, None)
-    space, tried = _SignalSpace.of(first), []
+    space = _SignalSpace.of(first)
+    tried: list[tuple[float, int, Spectrum]] = []
     for order in _ORDERS:
         if order > first.time.size // 3 or order + 2 > space.size:
             break
@@ -242,7 +245,8 @@ def fit_spectrum(grid: Grid, poles: Complex, span: float) -> Spectrum:
 def _block_means(spectrum: Spectrum, time: Samples, grid: Grid) -> Samples:
     """Means of a spectrum over blocks with their middles at some times [energy]."""
     both = (spectrum.lines, spectrum.mean)
-    return np.sum([(one.waves(time) @ (one.weights * grid.gain(one.poles))).real for one in both], axis=0)
+    means = [(one.waves(time) @ (one.weights * grid.gain(one.poles))).real for one in both]
+    return np.asarray(means[0] + means[1])
 
 
 def _split(poles: Complex, span: float) -> tuple[Complex, Complex]:
@@ -253,10 +257,10 @@ def _split(poles: Complex, span: float) -> tuple[Complex, Complex]:
     lasting = decay * span < _MOST_DECAY
     is_line = (turns > _LEAST_TURNS) & (decay < _MOST_DAMPED * rate) & lasting
     is_slow = (rate >= 0) & ~is_line & (turns < _LEAST_TURNS) & lasting
-    decays = np.unique(np.round(np.concatenate([decay[is_line], decay[is_slow]]) * span, 1))
-    decays = decays[np.abs(decays) > _SAME_DECAY]
+    every = np.round(np.concatenate([decay[is_line], decay[is_slow]]) * span, 1)
+    decays = np.array(sorted({one for one in every.tolist() if abs(one) > _SAME_DECAY}))
     if decays.size > _MOST_DECAYS:
-        decays = np.quantile(decays, np.linspace(0.0, 1.0, _MOST_DECAYS))
+        decays = decays[np.linspace(0, decays.size - 1, _MOST_DECAYS).round().astype(int)]
     slow = rate[is_slow & (rate * span > 0.5)]
     mean = np.concatenate([[0.0], -decays / span, 1j * slow])
     return -decay[is_line] + 1j * rate[is_line], mean.astype(np.complex128)

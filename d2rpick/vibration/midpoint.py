@@ -69,11 +69,13 @@ class Reading:
 
     def level_of_modes(self, t: Samples | float) -> Samples:
         """Sum of the energies that the lines of the modes tell, of the shape of ``t`` [energy]."""
-        decays = self.modes._replace(poles=self.modes.poles.real.astype(np.complex128), weights=self._peak_energies)
+        decays = self.modes._replace(
+            poles=self.modes.poles.real.astype(np.complex128), weights=self._peak_energies.astype(np.complex128)
+        )
         return decays.at(t)
 
     def level(self, t: Samples | float) -> Samples:
-        """H, the energy of all modes, without what damping makes of it within a period, of the shape of ``t`` [energy]."""
+        """H, the energy of all modes but for its changes within a period, of the shape of ``t`` [energy]."""
         level = 2 * self.spectrum.mean.at(t) if self.no_static else self.level_of_modes(t)
         return np.maximum(level, self.tiny)
 
@@ -112,7 +114,8 @@ class Reading:
     def bound(self, tr: Samples | float, td: Samples | float) -> Samples:
         """Largest product that deformations with these energies have [energy]."""
         energies = (np.maximum(self.elastic_energy(t), 0.0) for t in (tr, td))
-        return np.sqrt(np.prod(np.broadcast_arrays(*energies), axis=0))
+        at_tr, at_td = energies
+        return np.asarray(np.sqrt(at_tr * at_td))
 
     def residual_squared(self, tr: Samples | float, td: Samples | float) -> Samples:
         """R^2 of pairs of times [-]."""

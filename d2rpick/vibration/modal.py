@@ -22,7 +22,6 @@ from d2rpick.vibration.swings import SOLVER_FLOOR
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-    from scipy.interpolate import CubicSpline
 
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.lines import Complex, Exponentials, Grid, Prediction
@@ -54,15 +53,18 @@ _AMBIGUOUS: Final = 0.08
 # What refuses a record, each a share of what its name says.
 _MOST_MISSED: Final = 0.5  # prediction error over the swing of the energy
 _MOST_MISFIT: Final = 0.3  # rest over the swing of the energy
-_MOST_NEGATIVE: Final = 0.5  # negative static energy over the mean vibration energy, beyond what noise makes
+_MOST_NEGATIVE, _MOST_NEGATIVE_AT_ALL = 0.07, 0.5  # negative static energy over the mean vibration energy, beyond what noise makes
 _MOST_DRIFT: Final = 0.6  # change of the static energy over the mean vibration energy
 _MOST_BEYOND: Final = 0.12  # overlap beyond its bounds over the vibration energy, rms over all pairs
 _MOST_HARMONIC: Final = 0.05  # lines locked to a first one over it
-_MOST_UNSTRETCHED: Final = 0.6  # energy of a stretch that the static energy does not hold
+_MOST_UNSTRETCHED, _MOST_UNSTRETCHED_AT_ALL = 0.15, 0.6  # energy of a stretch that the static energy does not hold
 _FEWEST_PER_PERIOD: Final = 2.4  # states per period of the fastest strong line
 
 # Times in a period of the fastest notable line at which a deformation is looked at.
 _TIMES_PER_PERIOD: Final = 16
+
+# So many times as near to one another are times between which the energy is a straight line.
+_FINER: Final = 4
 
 # Of the swing of the energy: modes that leave less, and predict the rest within so much, show a flight.
 _LITTLE_LEFT, _LITTLE_MISSED = 0.03, 0.1
@@ -77,9 +79,9 @@ _HIDDEN_LINES: Final = 12  # as many lines as may hide in what the fit leaves ov
 class Doubts(NamedTuple):
     """What speaks against a record as one of a linear structure in free flight, each zero if nothing does [-].
 
-    ``missed`` and ``misfit`` are over the swing of the energy, ``negative``, ``drift`` and ``unstretched`` over the mean
-    vibration energy, ``beyond`` over the vibration energy; ``harmonic`` is the size of lines that are locked to a first
-    one, over it; ``coarse``: states per period of the fastest strong line.
+    ``missed`` and ``misfit`` are over the swing of the energy, ``negative``, ``drift`` and ``unstretched`` over the
+    mean vibration energy, ``beyond`` over the vibration energy; ``harmonic`` is the size of lines that are locked to a
+    first one, over it; ``coarse``: states per period of the fastest strong line.
     """
 
     missed: float
@@ -94,20 +96,32 @@ class Doubts(NamedTuple):
     @property
     def refusal(self) -> str | None:
         """Say what refuses the record; None if nothing does."""
+        return self._first_of(_MOST_NEGATIVE, _MOST_UNSTRETCHED)
+
+    @property
+    def refusal_at_all(self) -> str | None:
+        """Say what refuses the record even if nothing better is known; None if nothing does."""
+        return self._first_of(_MOST_NEGATIVE_AT_ALL, _MOST_UNSTRETCHED_AT_ALL)
+
+    def _first_of(self, most_negative: float, most_unstretched: float) -> str | None:
         reasons = (
             (self.coarse < _FEWEST_PER_PERIOD, f"{self.coarse:.2g} states per period of the energy are too few"),
             (self.missed > _MOST_MISSED, "the first part of the flight does not predict the rest"),
             (self.misfit > _MOST_MISFIT, "lines do not describe the energy"),
-            (self.negative > _MOST_NEGATIVE, "the lines hold more energy than there is"),
+            (self.negative > most_negative, "the lines hold more energy than there is"),
             (self.drift > _MOST_DRIFT, "the mean energy changes in the flight by as much as vibrates"),
             (self.beyond > _MOST_BEYOND, "the energy halfway is beyond what any deformations allow"),
-            (
-                self.harmonic > _MOST_HARMONIC,
-                "the lines are harmonics of one another, as a nonlinear spring makes them",
-            ),
-            (self.unstretched > _MOST_UNSTRETCHED, "lines at half the rate of others hold more than the static energy"),
+            (self.harmonic > _MOST_HARMONIC, "the lines are harmonics of one another, as those of a nonlinear spring"),
+            (self.unstretched > most_unstretched, "lines at half the rate of others hold more than the static energy"),
         )
         return next((reason for holds, reason in reasons if holds), None)
+
+
+class _Course(NamedTuple):
+    """Elastic energies at times so near to one another that it is a straight line between them [time], [energy]."""
+
+    time: Samples
+    energy: Samples
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -136,6 +150,8 @@ class ModalVibration:
         The energy that the lines were found in.
     second : Reading or None
         What the lines of the kinetic energy say, beside those of the internal energy.
+    last_resort : bool
+        Whether nothing better is known, so that more doubts are allowed.
     """
 
     time: Samples
@@ -148,13 +164,18 @@ class ModalVibration:
     slack: float
     source: str = "internal energy"
     second: Reading | None = None
+    last_resort: bool = False
     kinetic: ClassVar = ""
     undescribed: ClassVar = "outside the part of the flight whose modes were identified"
 
     @property
     def signed(self) -> bool:
         """Whether nothing refuses the record."""
-        return self.doubts.refusal is None
+        return (self.doubts.refusal_at_all if self.last_resort else self.doubts.refusal) is None
+
+    def as_last_resort(self) -> ModalVibration:
+        """Give the same, to be relied on since nothing better is known."""
+        return replace(self, last_resort=True)
 
     @property
     def convinces(self) -> bool:
@@ -173,8 +194,8 @@ class ModalVibration:
         return f"modal, {count} identified from the lines of the {self.source}, {span}"
 
     def comparable_since(self, td: float) -> float:
-        """Earliest time whose deformation can be compared with that at any td [time]."""
-        return float(self.time[0])
+        """Earliest time whose deformation can be compared with that at ``td`` [time]."""
+        return min(float(self.time[0]), td)
 
     def known_at(self, td: float) -> bool:
         """Whether td lies where the modes were identified, and more than the error of a solver vibrates there."""
@@ -205,22 +226,21 @@ class ModalVibration:
     def profile(self, td: float) -> Profile:
         """Lock-in errors at those of the ``time`` that come before ``td``, by what is worked out for all td once."""
         last = int(np.searchsorted(self.time, td))
-        elastic, spline, earlier = self._at_all_times
+        elastic, finer, earlier = self._at_all_times
         middle = (self.time[:last] + td) / 2
         at_td = float(self.elastic_energy(td))
         coherence = (earlier[:last] @ self.reading.later(td)).real
-        overlap = spline(middle) - self.reading.level(middle) / 2 + coherence / 2
+        overlap = np.interp(middle, finer.time, finer.energy) - self.reading.level(middle) / 2 + coherence / 2
         bound = np.sqrt(elastic[:last] * at_td)
         separation = elastic[:last] - 2 * np.clip(overlap, -bound, bound) + at_td
         return Profile(self.time[:last], np.sqrt(np.maximum(separation, 0.0) / self.vibration_energy(td)))
 
     @cached_property
-    def _at_all_times(self) -> tuple[Samples, CubicSpline, Complex]:
-        """Elastic energy at the ``time``, what gives it between, and what tr has in the coherence."""
-        from scipy.interpolate import CubicSpline  # not above: it costs start-up
-
-        energy = self.reading.elastic_energy(self.time)
-        return np.maximum(energy, 0.0), CubicSpline(self.time, energy), self.reading.earlier(self.time)
+    def _at_all_times(self) -> tuple[Samples, _Course, Complex]:
+        """Elastic energy at the ``time``, at times between, and what tr has in the coherence."""
+        finer = np.linspace(self.time[0], self.time[-1], _FINER * (self.time.size - 1) + 1)
+        course = _Course(finer, self.reading.elastic_energy(finer))
+        return np.maximum(course.energy[::_FINER], 0.0), course, self.reading.earlier(self.time)
 
     def half_width(self, tr: Samples | float, td: Samples | float) -> Samples:
         """Half-width of the band of R^2 of pairs of times [-]."""
@@ -259,7 +279,9 @@ class ModalVibration:
         doubts = self.doubts
         drifts = not self.reading.no_static or doubts.drift > _DRIFT_OF_NOISE
         negative = max(doubts.negative - self.slack, 0.0)
-        return _DRIFT_COUNTS * doubts.drift * drifts + _NEGATIVE_COUNTS * (negative + doubts.unstretched) + doubts.harmonic
+        return (
+            _DRIFT_COUNTS * doubts.drift * drifts + _NEGATIVE_COUNTS * (negative + doubts.unstretched) + doubts.harmonic
+        )
 
     def _of_other_readings(self, tr: Samples | float, td: Samples | float, squared: Samples) -> Samples:
         """How far R^2 may be off because the lines can be read in another way [-]."""
@@ -297,7 +319,8 @@ def identify_modal(time: Samples, energy: Samples, *, kinetic: bool = False) -> 
     Examples
     --------
     >>> t = np.linspace(0.0, 6.0, 601)
-    >>> found = identify_modal(t, np.cos(9.0 * t) ** 2 + 0.5 * np.cos(14.0 * t + 1.0) ** 2 + 0.3 * np.cos(25.0 * t) ** 2)
+    >>> modes = np.cos(9.0 * t), np.cos(14.0 * t + 1.0), np.cos(25.0 * t)
+    >>> found = identify_modal(t, np.dot([1.0, 0.5, 0.3], np.square(modes)))
     >>> [f"{rate:.4f}" for rate in sorted(found.reading.modes.poles.imag / 2)], found.signed
     (['9.0000', '14.0000', '25.0000'], True)
     >>> apart = np.cos(9.0 * 1.0) - np.cos(9.0 * 4.0), np.cos(15.0) - np.cos(57.0), np.cos(25.0) - np.cos(100.0)
@@ -332,7 +355,7 @@ def _read(grid: Grid, prediction: Prediction, *, kinetic: bool = False) -> Modal
     shared = float(np.sum(rest[1:] * rest[:-1]) / max(float(np.sum(rest**2)), 1e-300))
     systematic = float(np.clip(shared, 0.0, 1.0))
     stretches = stretches_of(spectrum.lines, grid.span, scatter)
-    is_mode = ~np.isin(np.arange(spectrum.lines.poles.size), [stretch.line for stretch in stretches])
+    is_mode = _without(spectrum.lines, stretches)
 
     plain = Reading(spectrum, np.ones(is_mode.shape, dtype=bool), True, grid.time, systematic * rest, tiny)
     with_static = replace(plain, is_mode=is_mode, no_static=False)
@@ -349,8 +372,9 @@ def _read(grid: Grid, prediction: Prediction, *, kinetic: bool = False) -> Modal
 
     first = prediction.of_first_part
     first_stretches = stretches_of(first.lines, FIRST_PART * grid.span, scatter) if stretches else ()
-    first_modes = ~np.isin(np.arange(first.lines.poles.size), [stretch.line for stretch in first_stretches])
-    of_first_part = replace(reading, spectrum=first, is_mode=first_modes, rest=np.zeros(grid.time.size))
+    of_first_part = replace(
+        reading, spectrum=first, is_mode=_without(first.lines, first_stretches), rest=np.zeros(grid.time.size)
+    )
     held = sum(stretch.energy for stretch in stretches) / mean
     doubts = Doubts(
         missed=prediction.missed,
@@ -378,6 +402,13 @@ def _read(grid: Grid, prediction: Prediction, *, kinetic: bool = False) -> Modal
     )
 
 
+def _without(lines: Exponentials, stretches: tuple[Stretch, ...]) -> Mask:
+    """Mark the lines that are none of a stretch."""
+    kept = np.ones(lines.poles.size, dtype=bool)
+    kept[[stretch.line for stretch in stretches]] = False
+    return kept
+
+
 def _close_times(reading: Reading, grid: Grid) -> Samples:
     """Times over the grid, close enough for a parabola through three of them to find a minimum [time]."""
     rates, sizes = reading.modes.poles.imag, np.abs(reading.modes.weights)
@@ -396,7 +427,7 @@ def _beyond_bounds(reading: Reading, grid: Grid) -> float:
 
 
 class Stretch(NamedTuple):
-    """A ``line`` that belongs to the stretch of a mode, which has its own ``of_mode``; ``energy`` of that stretch [energy]."""
+    """A ``line`` of the stretch of a mode whose own line is ``of_mode``; ``energy`` of that stretch [energy]."""
 
     line: int
     of_mode: int

@@ -11,7 +11,7 @@ from d2rpick.vibration.modal import ModalVibration, identify_modal
 from d2rpick.vibration.span import Span
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
 
     from d2rpick.histories.history import History, Memory, Samples
 
@@ -71,7 +71,9 @@ def _windows(history: History, td: float, guess: Span | None) -> Iterator[Span]:
         )
         if inner.start < td <= inner.end:
             yield inner
-    yield from (Span(first + share * (last - first), last) for share in _BEGINNINGS if first + share * (last - first) < td)
+    yield from (
+        Span(first + share * (last - first), last) for share in _BEGINNINGS if first + share * (last - first) < td
+    )
 
 
 def _identified(history: History, window: Span, memory: Memory) -> ModalVibration | None:

@@ -316,7 +316,7 @@ class Evidence(NamedTuple):
     def refusal(self) -> str | None:
         """Why the modes of the structure could not be identified; None if they were, or were not looked for."""
         modal = cast("ModalVibration | None", self.models.get("modal"))
-        return modal.doubts.refusal if modal else None
+        return modal.doubts.refusal if modal and not modal.signed else None
 
     @property
     def has_model(self) -> bool:

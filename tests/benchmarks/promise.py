@@ -34,6 +34,8 @@ DESERVES_GOOD, BAD, KEEPS_NOTHING = 0.2, 0.3, 1.0
 PROMISES: Final = 0.25
 # The oracle, free to choose td, keeps the parts rigid for this share of the recommended time, or of the flight.
 _SHARE_OF_RIGID, _SHARE_OF_FLIGHT = 0.5, 0.25
+# A tr is in the load if it lies before the flight by more than this share of it.
+_EARLY: Final = 0.01
 # Rounding of times in the file, and the search of the oracle.
 _ROUNDING: Final = 1e-3
 
@@ -61,17 +63,32 @@ class Pair(NamedTuple):
 class Trial(NamedTuple):
     """What became of a record: the pair, None if none was recommended, or the first words of the error.
 
-    ``td_asked``: the time that was asked for, None if it was free; ``oracle``: the least true residual, if known.
+    ``td_asked``: the time that was asked for, None if it was free; ``oracle``: the least true residual, and the start
+    and end of the flight, if known.
     """
 
     pair: Pair | None
     td_asked: float | None = None
     oracle: float | None = None
+    flight_start: float | None = None
+    flight_end: float | None = None
     error: str = ""
     seconds: float = 0.0
 
 
-_NUMBERS: Final = ("td_asked", "oracle", "seconds", "tr", "td", "true", "residual", "low", "high")
+_NUMBERS: Final = (
+    "td_asked",
+    "oracle",
+    "flight_start",
+    "flight_end",
+    "seconds",
+    "tr",
+    "td",
+    "true",
+    "residual",
+    "low",
+    "high",
+)
 
 
 def tabulate(name: str, trials: Sequence[Trial]) -> pd.DataFrame:
@@ -127,36 +144,38 @@ def try_record(record: Record, folder: Path) -> Trial:
     except D2RPickError as refusal:
         error = str(refusal).removeprefix(str(folder))[:80]
     seconds = time.perf_counter() - start
-    if pair is None:
-        start_of_flight, end_of_flight = record.truth.flight
-        shortest = _SHARE_OF_FLIGHT * (end_of_flight - start_of_flight) * record.truth.unit
-    else:
+    flight_start, flight_end = record.truth.flight_of_file
+    shortest = _SHARE_OF_FLIGHT * (flight_end - flight_start)
+    if pair is not None:
         shortest = _SHARE_OF_RIGID * (pair.td - pair.tr)
     oracle = record.truth.find_least_residual(td_asked, shortest)
-    return Trial(pair, td_asked, oracle, error, seconds)
+    return Trial(pair, td_asked, oracle, flight_start, flight_end, error, seconds)
 
 
 def count_group(rows: pd.DataFrame) -> dict[str, object]:
     """Count what became of some records, rows of `tabulate`, in the columns of the table."""
     pairs = rows[rows["true"].notna()]
     stated, unstated = pairs[pairs["residual"].notna()], pairs[pairs["residual"].isna()]
-    useful_by_word = stated[stated["residual"] < KEEPS_NOTHING]
-    sure_by_word = stated[stated["residual"] < PROMISES]
+    said_useful = stated[stated["residual"] < KEEPS_NOTHING]
+    said_sure = stated[stated["residual"] < PROMISES]
     possible = rows[rows["oracle"] < DESERVES_GOOD]
     good = pairs[pairs["grade"] == "good"]
     banded = pairs[pairs["high"].notna()]
     above = banded["true"] - banded["high"]
     off = above.combine(banded["low"] - banded["true"], max)
+    early = pairs["flight_start"] - pairs["tr"]
+    flight_time = pairs["flight_end"] - pairs["flight_start"]
     return {
         "records": len(rows),
         "pairs": len(pairs),
+        "tr in load": int((early > _EARLY * flight_time).sum()),
         "R>1": _count(pairs["true"] > KEEPS_NOTHING),
-        "R>1, said <1": _count(useful_by_word["true"] > KEEPS_NOTHING),
+        "R>1, said <1": _count(said_useful["true"] > KEEPS_NOTHING),
         "free R (oracle)": _compare(pairs[pairs["td_asked"].isna()]),
         "given R (oracle)": _compare(pairs[pairs["td_asked"].notna()]),
         "unstated: free": _compare(unstated[unstated["td_asked"].isna()]),
         "given": _compare(unstated[unstated["td_asked"].notna()]),
-        "R>0.3, said <0.25": _count(sure_by_word["true"] > BAD),
+        "R>0.3, said <0.25": _count(said_sure["true"] > BAD),
         "good of oracle<0.2": _count(possible["grade"] == "good"),
         "good, R>0.3": _count(good["true"] > BAD),
         "in band": _share(off <= _ROUNDING),
@@ -188,7 +207,7 @@ def print_tables(rows: pd.DataFrame) -> None:
         if key == "class":
             counts["all"] = count_group(rows)
         table = pd.DataFrame.from_dict(counts, orient="index").rename_axis(columns=key)
-        print(table.to_string(), end="\n\n", flush=True)
+        print(table.to_string(max_colwidth=None), end="\n\n", flush=True)
 
 
 TryClass = Callable[[str, int, int], list[Trial]]
@@ -201,7 +220,7 @@ def try_class(name: str, count: int, seed: int) -> list[Trial]:
         return [try_record(CLASSES[name](np.random.default_rng([seed, number])), Path(folder)) for number in numbers]
 
 
-def run(classes: Mapping[str, Any], try_records: TryClass, description: str) -> None:
+def run_benchmark(classes: Mapping[str, Any], try_records: TryClass, description: str) -> None:
     """Try the classes that the command line names, and print what became of them."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("records", nargs="?", type=int, default=100, help="number of records in a class [default: 100]")
@@ -217,7 +236,7 @@ def run(classes: Mapping[str, Any], try_records: TryClass, description: str) -> 
         trials = try_records(name, options.records, options.seed)
         taken, asking = time.perf_counter() - start, sum(trial.seconds for trial in trials)
         print(f"{name}: {taken:.0f} s, of these {asking:.0f} s asking", file=sys.stderr, flush=True)
-        tables.append(tabulate(name, trials))
+        tables.append(tabulate(name, trials).assign(seed=options.seed))
         if options.csv:  # after each class, since all take an hour
             pd.concat(tables, ignore_index=True).to_csv(options.csv, index=False)
     if tables:
@@ -227,4 +246,4 @@ def run(classes: Mapping[str, Any], try_records: TryClass, description: str) -> 
 
 
 if __name__ == "__main__":
-    run(CLASSES, try_class, "What a recommended pair, its stated residual and its grade are worth.")
+    run_benchmark(CLASSES, try_class, "What a recommended pair, its stated residual and its grade are worth.")

@@ -66,37 +66,47 @@ def make_linear(
     shape = shapes(random)
     period = draw_log(random, 0.005, 0.05)
     undamped = 2 * np.pi / period * shape.ratios
-    ratio = (damping or damp_by_mass)(random, shape.ratios)
-    rate, decay = undamped * np.sqrt(1 - ratio**2), undamped * ratio
-    modes = Modes(rate, decay, _draw_loads(random, shape, period, fading=fading), parts=_scale(shape.parts, period))
-    begin = modes.loaded_until
+    draw_damping = damping or damp_by_mass
+    ratio = draw_damping(random, shape.ratios)
+    modes = Modes(
+        rate=undamped * np.sqrt(1 - ratio**2),
+        decay=undamped * ratio,
+        loads=_draw_loads(random, shape, period, fading=fading),
+        parts=_scale(shape.parts, period),
+    )
+    flight_start = modes.loaded_until
     if stretch is not None:
-        first_periods = np.linspace(begin, begin + period, 400)
-        swings = np.abs(modes.compute_states(first_periods)[0]).max(axis=0)
-        modes = modes._replace(stretch=stretch(random, Surroundings(period, begin, swings)))
-    end = begin + random.uniform(4, 15) * period
-    time = _draw_times(random, modes.fastest_period / 2, end, irregular=irregular, coarse=coarse)
+        first_period = np.linspace(flight_start, flight_start + period, 400)
+        swings = np.abs(modes.compute_states(first_period)[0]).max(axis=0)
+        modes = modes._replace(stretch=stretch(random, Surroundings(period, flight_start, swings)))
+    flight_end = flight_start + random.uniform(4, 15) * period
+    time = _draw_times(random, modes.fastest_period / 2, flight_end, irregular=irregular, coarse=coarse)
+
     elastic, kinetic = modes.compute_energies(time)
-    whole = elastic.sum(axis=1)
-    flying = whole[time >= begin]
-    swing = float(np.ptp(flying))
-    unit = draw_log(random, 10.0, 1e4) / float(flying.max())
-    work = np.clip(time / begin, 0, 1) ** 2 * swing * (draw_log(random, 0.1, 50.0) if plastic else 0.0)
-    scatter = noise * swing * random.standard_normal(elastic.shape) / np.sqrt(elastic.shape[1])
-    energies = unit * (elastic + scatter + work[:, np.newaxis] / elastic.shape[1])
-    names = ["internal_energy"] if energies.shape[1] == 1 else [*PART_COLUMNS[: energies.shape[1]]]
-    columns = {"time": time} | dict(zip(names, energies.T, strict=True))
-    columns |= add_evidence(random, time, partial(_push, modes.loads), unit * kinetic)
-    suggest = ask_for_times(random, begin, end)
+    part_count = elastic.shape[1]
+    flight_energy = elastic.sum(axis=1)[time >= flight_start]
+    swing = float(np.ptp(flight_energy))
+    unit = draw_log(random, 10.0, 1e4) / float(flight_energy.max())
+    work = draw_log(random, 0.1, 50.0) * swing if plastic else 0.0
+    worked = work * np.clip(time / flight_start, 0, 1) ** 2
+    scatter = noise * swing * random.standard_normal(elastic.shape)
+    # The parts share the work, and the noise of their sum is that of one record.
+    energies = elastic + worked[:, np.newaxis] / part_count + scatter / np.sqrt(part_count)
+
+    names = list(PART_COLUMNS) if part_count > 1 else ["internal_energy"]
+    columns = {"time": time}
+    columns |= dict(zip(names, unit * energies.T, strict=True))
+    columns |= add_evidence(random, time, _add_impulses(modes.loads, time), unit * kinetic)
+    suggest = ask_for_times(random, flight_start, flight_end)
     if random.random() < 1 / 4:
-        suggest["after"] = begin
-    read = {"energy": names} if len(names) > 1 else {}
-    return Record(columns, Truth(modes, (begin, end)), read=read, suggest=suggest)
+        suggest["after"] = flight_start
+    read = {"energy": names} if part_count > 1 else {}
+    return Record(columns, Truth(modes, (flight_start, flight_end)), read=read, suggest=suggest)
 
 
-def _push(loads: Sequence[Load], time: Samples) -> Samples:
-    """Return the forces at times (n,), shape (n, k)."""
-    return np.asarray(sum(np.outer(load.evaluate(time), load.heights) for load in loads))
+def _add_impulses(loads: Sequence[Load], time: Samples) -> Samples:
+    """Return what the loads have given until the times, shape (n,); a short kick may lie between two of them."""
+    return np.asarray(sum(np.abs(load.heights).max() * load.integrate(time) for load in loads))
 
 
 def _draw_loads(random: np.random.Generator, shape: Shapes, period: float, *, fading: bool) -> list[Load]:
@@ -113,14 +123,15 @@ def _draw_loads(random: np.random.Generator, shape: Shapes, period: float, *, fa
         start += random.uniform(0, 1.0) * period
         height = 0.4 if kicked else 1.0  # slow modes are not to drown what a kick leaves of the fast ones
         loads.append(Load(start, draw_log(random, 0.1, 1.5) * period, height * draw_heights()))
-    behind = max((load.end for load in loads), default=0.0) + random.uniform(0.1, 0.8) * period
-    fastest = period / shape.ratios.max()
+    pushed_until = max((load.end for load in loads), default=0.0)
+    take_off = pushed_until + random.uniform(0.1, 0.8) * period
+    fastest_period = period / shape.ratios.max()
     if fading:
-        loads.append(Load(behind, draw_log(random, 0.05, 0.6) * period, 2 * draw_heights(), fades=True))
+        loads.append(Load(take_off, draw_log(random, 0.05, 0.6) * period, 2 * draw_heights(), fades=True))
     elif kicked:
-        duration = random.uniform(0.2, 0.8) * fastest
+        duration = random.uniform(0.2, 0.8) * fastest_period
         impulse = 1 / (4 * shape.ratios * duration / period)  # a short push: speed over undamped frequency
-        loads.append(Load(behind, duration, impulse * draw_heights()))
+        loads.append(Load(take_off, duration, impulse * draw_heights()))
     return loads
 
 
@@ -133,7 +144,7 @@ def _draw_times(
     step = fastest_period / min(density, most)
     if not irregular:
         return np.arange(0.0, end, step)
-    steps = step * random.uniform(0.4, 1.6, int(2 * end / step) + 2)
+    steps = step * random.uniform(0.4, 1.6, int(3 * end / step) + 2)
     if random.random() < 0.5:
         restart = random.integers(0, int(end / step))  # a restart with another interval of output
         steps[restart:] *= random.choice([0.5, 2.0])
@@ -213,8 +224,8 @@ def draw_leak(random: np.random.Generator) -> Shapes:
     springs: list[tuple[int, int, float]] = []
     for place, frequency in enumerate(recorded):
         for _ in range(int(random.integers(2, 6))):
-            springs.append((place, len(places), draw_log(random, 0.002, 0.03) * frequency**2))
-            places.append(frequency * (1 + random.uniform(-0.03, 0.03)))
+            springs.append((place, len(places), draw_log(random, 0.0005, 0.01) * frequency**2))
+            places.append(frequency * (1 + random.uniform(-0.05, 0.05)))
     is_recorded = np.arange(len(places)) < recorded.size
     return _couple(np.array(places), springs, np.zeros(recorded.size, dtype=int), is_recorded)
 
@@ -229,15 +240,17 @@ def _couple(
 
     ``owners`` are the parts of the recorded springs: those of recorded masses, then, if all are, those between them.
     """
-    stretches = [frequency * row for frequency, row in zip(places, np.eye(places.size), strict=True)]
-    between = [np.sqrt(size) * (np.eye(places.size)[one] - np.eye(places.size)[other]) for one, other, size in springs]
-    rows = np.array([*stretches, *between])
-    squares, vectors = np.linalg.eigh(rows.T @ rows)
+    identity = np.eye(places.size)
+    rows = list(places[:, np.newaxis] * identity)
+    for start, end, stiffness in springs:
+        rows.append(np.sqrt(stiffness) * (identity[start] - identity[end]))
+    stretches = np.array(rows)
+    squares, vectors = np.linalg.eigh(stretches.T @ stretches)
     frequencies = np.sqrt(squares)
     unit = frequencies[0]
     in_modes = vectors / frequencies  # of the masses, so that the elastic energy is the sum of q^2
-    recorded_rows = rows if is_recorded.all() else rows[: places.size][is_recorded]
-    parts = Parts(recorded_rows @ in_modes, in_modes[is_recorded] * unit, owners)
+    recorded = stretches if is_recorded.all() else stretches[: places.size][is_recorded]
+    parts = Parts(recorded @ in_modes, in_modes[is_recorded] * unit, owners)
     return Shapes(frequencies / unit, in_modes.T * places, is_recorded.astype(float), parts)
 
 
@@ -275,7 +288,7 @@ def draw_hinge(random: np.random.Generator, around: Surroundings) -> Stretch:
         sine, cosine, delta, _ = ellipj(slow * time + shift, depth**2)
         return np.asarray(-12 * depth**2 * slow * sine * cosine * delta)
 
-    heights = draw_log(random, 0.05, 1.0) * around.swings * random.normal(size=around.swings.size)
+    heights = draw_log(random, 0.003, 0.3) / (1 + 4 * depth**2) * around.swings * random.normal(size=around.swings.size)
     return Stretch(heights, course, rate)
 
 

@@ -35,6 +35,13 @@ class Load(NamedTuple):
         phase = np.pi * np.clip((time - self.start) / self.duration, 0.0, 1.0)
         return (1 + np.cos(phase)) / 2 if self.fades else np.sin(phase)
 
+    def integrate(self, time: Samples) -> Samples:
+        """Return the impulse from the start of the record to these times [time], shape (n,)."""
+        phase = np.pi * np.clip((time - self.start) / self.duration, 0.0, 1.0)
+        if self.fades:
+            return np.minimum(time, self.start) + self.duration / (2 * np.pi) * (phase + np.sin(phase))
+        return self.duration / np.pi * (1 - np.cos(phase))
+
 
 class Stretch(NamedTuple):
     """A slow deformation about which the modes vibrate: ``courses`` maps times (n,) to shape (n,), and its rate."""

@@ -17,7 +17,7 @@ import numpy as np
 from d2rpick.choice.answers import suggest
 from d2rpick.choice.question import Settings
 from d2rpick.histories.history import History
-from tests.benchmarks.promise import Pair, Trial, run
+from tests.benchmarks.promise import Pair, Trial, run_benchmark
 from tests.energies import suggest_in_window
 
 if TYPE_CHECKING:
@@ -170,4 +170,4 @@ def try_class(kind: str, count: int, seed: int) -> list[Trial]:
 
 
 if __name__ == "__main__":
-    run(CLASSES, try_class, "What a good grade is worth on parts.")
+    run_benchmark(CLASSES, try_class, "What a good grade is worth on parts.")

@@ -89,7 +89,8 @@ def make_integrated(
     energy = unit * (elastic + worked + heat * lost + drifted + scatter)
     by_time, by_energy = units
     columns = {"time": time * by_time, "internal_energy": energy * by_energy}
-    columns |= add_evidence(random, time, structure.compute_push, unit * kinetic, units)
+    impulse = np.cumsum(np.abs(structure.compute_push(time)).max(axis=1) * np.gradient(time))
+    columns |= add_evidence(random, time, impulse, unit * kinetic, units)
     truth = Truth(IntegratedRun(structure, motion), (begin, end), by_time)
     return Record(columns, truth, digits, suggest=ask_for_times(random, begin * by_time, end * by_time))
 
@@ -102,18 +103,17 @@ def ask_for_times(random: np.random.Generator, begin: float, end: float) -> dict
 def add_evidence(
     random: np.random.Generator,
     time: Samples,
-    push: Callable[[Samples], Samples],
+    impulse: Samples,
     kinetic: Samples,
     units: tuple[float, float] = (1.0, 1.0),
 ) -> dict[str, Samples]:
     """Give nothing, momenta that do not fall, or falling ones with the kinetic energy of the whole.
 
-    ``push`` gives the forces at times (n,), shape (n, k); ``kinetic`` is the energy of the vibration, shape (n,).
+    ``impulse`` that the loads have given so far, in any unit, and ``kinetic``, the energy of the vibration: shape (n,).
     """
     kind = random.integers(0, 4)
     if kind < 2:
         return {}
-    impulse = np.cumsum(np.abs(push(time)).max(axis=1) * np.gradient(time))
     speed = np.zeros((time.size, 3)) + random.normal(size=3) * 5
     speed[:, 0] += random.uniform(1, 5) * impulse / max(impulse[-1], 1e-300)
     speed[:, 2] -= GRAVITY * time * (kind == 3)

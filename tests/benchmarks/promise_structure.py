@@ -137,7 +137,9 @@ class Structure(NamedTuple):
 
     def _slope(self, t: float, state: Samples) -> Samples:
         """Return the time derivative of one state or of many, raveled from shape (2 k, n)."""
-        q, speed = np.split(state.reshape(2 * self.omega.size, -1), 2)
+        count = self.omega.size
+        states = state.reshape(2 * count, -1)
+        q, speed = states[:count], states[count:]  # np.split would take a fifth of the time
         square = self.omega[:, np.newaxis] ** 2
         force = -square * (q + self.stiffening[:, np.newaxis] * q**3) - self.alpha * speed
         if self.joint is not None:
@@ -155,8 +157,8 @@ class IntegratedRun(NamedTuple):
 
     @property
     def most_times(self) -> int:
-        """Number of times that a search can afford, each of which has to be integrated."""
-        return 300
+        """Number of times that a search can afford: unless the structure is linear, each has to be integrated."""
+        return 900 if self.structure.is_linear else 300
 
     @property
     def fastest_period(self) -> float:

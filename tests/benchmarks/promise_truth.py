@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 
 import numpy as np
+from scipy.ndimage import minimum_filter
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
@@ -16,8 +17,10 @@ if TYPE_CHECKING:
 # Times of the search per period of the fastest mode, and their least number.
 _DENSITY: Final = 24
 _FEWEST: Final = 100
-# Times between two neighbours of the search at which the least error is refined.
-_FINER: Final = 20
+# Times between two neighbours of the search at which a minimum is refined.
+_FINER: Final = 10
+# The deepest of the local minima, any of which may hold the least error.
+_VALLEYS: Final = 12
 
 
 class Vibration(Protocol):
@@ -52,6 +55,12 @@ class Truth(NamedTuple):
     flight: tuple[float, float]
     unit: float = 1.0
 
+    @property
+    def flight_of_file(self) -> tuple[float, float]:
+        """Start and end of the flight [time of the file]."""
+        start, end = self.flight
+        return start * self.unit, end * self.unit
+
     def compute_residual(self, tr: float, td: float) -> float:
         """Return the true R of one pair, whose times are those of the file."""
         errors = self._compute_errors(np.array([tr]) / self.unit, np.array([td]) / self.unit)
@@ -67,18 +76,22 @@ class Truth(NamedTuple):
         count = int(np.clip(wanted, _FEWEST, self.vibration.most_times))
         grid = np.linspace(start, end, count)
         ends = grid if td is None else np.array([td]) / self.unit
-        rigid_time = ends - grid[:, np.newaxis]
         least_time = min(shortest / self.unit, end - start) if td is None else 0.0
-        allowed = rigid_time >= least_time
-        if not allowed.any():
-            return float("nan")
-        errors = np.where(allowed, self._compute_errors(grid, ends), np.inf)
-        best_tr, best_td = np.unravel_index(np.argmin(errors), errors.shape)
-        step = grid[1] - grid[0]
-        nearby = grid[best_tr] + np.linspace(-step, step, 2 * _FINER + 1)
-        latest = ends[best_td] - least_time
-        nearby = np.clip(nearby, start, latest)
-        return float(self._compute_errors(nearby, ends[[best_td]]).min())
+        errors = self._compute_allowed(grid, ends, least_time)
+        valleys = np.argwhere((errors == minimum_filter(errors, size=3)) & np.isfinite(errors))
+        depths = errors[tuple(valleys.T)]
+        deepest = valleys[np.argsort(depths)[:_VALLEYS]]
+        nearby = (grid[1] - grid[0]) * np.linspace(-1, 1, 2 * _FINER + 1)
+        finer_tr = _surround(grid[deepest[:, 0]], nearby, self.flight)
+        finer_td = ends if td is not None else _surround(grid[deepest[:, 1]], nearby, self.flight)
+        finer = self._compute_allowed(finer_tr, finer_td, least_time)
+        least = min(errors.min(), finer.min(initial=np.inf))
+        return float(least) if np.isfinite(least) else float("nan")
+
+    def _compute_allowed(self, tr: Samples, td: Samples, least_time: float) -> Samples:
+        """Return R of all pairs of times of shapes (m,) and (n,), infinite for those that are rigid too short."""
+        is_allowed = td - tr[:, np.newaxis] >= least_time
+        return np.where(is_allowed, self._compute_errors(tr, td), np.inf)
 
     def _compute_errors(self, tr: Samples, td: Samples) -> Samples:
         """Return R of all pairs of times of shapes (m,) and (n,), shape (m, n)."""
@@ -87,3 +100,8 @@ class Truth(NamedTuple):
         squares = np.sum(released**2, axis=1)[:, np.newaxis] + np.sum(followed**2, axis=1)
         distances = np.sqrt(np.maximum(squares - 2 * released @ followed.T, 0.0))
         return np.asarray(np.divide(distances, sizes, out=np.zeros_like(distances), where=sizes > 0))
+
+
+def _surround(times: Samples, nearby: Samples, flight: tuple[float, float]) -> Samples:
+    """Return the times and those that are so near to each, within the flight."""
+    return np.clip(np.add.outer(times, nearby).ravel(), *flight)

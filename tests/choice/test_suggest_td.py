@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from d2rpick.choice.aftermath import kept_mean_energy
 from d2rpick.choice.answers import suggest, suggest_at
+from d2rpick.choice.candidates import judge
 from d2rpick.choice.quality import candidates_at
 from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import Situation, examine
@@ -206,9 +208,13 @@ def test_what_many_modes_give_back_is_expected(alpha: float) -> None:
     after = (time > td) & (time < td + 0.2)
     released = deformations(np.array([tr])) * np.cos(rates[:, None] * (time[after] - td))
     switched = rest + np.mean(np.sum(released**2, axis=0) * np.exp(-alpha * (time[after] - td)))
-    expected = sure(expectation(suggest(history, td, PLAIN).situation, float(locked)))
+    alone = suggest(history, td, Settings(replay=False)).situation
+    expected = sure(expectation(alone, float(locked)))
     assert sure(expected.ratio_low) < switched / energy[after].mean() < sure(expected.ratio)
     assert expected.resting_energy == pytest.approx(energy[time <= td].min())
+    for situation in (alone, suggest(history, td, PLAIN).situation):
+        kept = sure(kept_mean_energy(situation, judge(situation, [tr])[0]))
+        assert kept.low - 0.02 < switched / energy[after].mean() < kept.high + 0.02
 
 
 # ---- the command line

@@ -31,7 +31,9 @@ def test_measures_by_formula_are_those_of_the_motion(mode: Mode, tr: float, wind
 
 def test_each_measure_has_a_column() -> None:
     mode, tr = to_mode(paper.OSCILLATOR, 6.0), np.array([0.01, 0.02])
-    found = measures.measured(mode, tr, paper.TD, tr, lambda error, *_: error, of_parts=True)
+    found = measures.measured(
+        mode, tr, paper.TD, tr, lambda error, *_: (error, error - 0.1, error + 0.1), of_parts=True
+    )
     assert (*found,) == measures.Measured._fields
     assert {column.shape for column in found.values()} == {tr.shape}
     spread = measures.spread(5, [(np.array([3, 1]), found)])

@@ -1,5 +1,8 @@
 """Counting the swings of an energy: the signs of a motion that was integrated, or none where a mode hides."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
@@ -7,6 +10,8 @@ from scipy.integrate import solve_ivp
 
 from d2rpick.choice.answers import suggest
 from d2rpick.choice.question import Settings
+from d2rpick.choice.situation import Together
+from d2rpick.flight.flight import Flight
 from d2rpick.histories.history import Memory, Samples
 from d2rpick.report.situation import heading
 from d2rpick.vibration import find_models
@@ -82,12 +87,17 @@ def test_the_pair_of_a_spring_that_stiffens_has_the_sign_of_td(lifted: Samples) 
 
 def test_swings_are_looked_for_in_a_flight_alone_and_where_an_oscillator_is_doubtful() -> None:
     record, memory = table(TIME, stiffening(1.0, 0.02)[1]), Memory()
-    around, flight = Span(0.0, 30.0), Span(2.0, 28.0)
-    assert not find_models(record, around, None, lambda: True, memory)
-    assert not find_models(record, around, flight, lambda: False, memory)
-    found, again = (find_models(record, around, flight, lambda: True, memory)["swings"] for _ in range(2))
+    around, flight, settled = Span(0.0, 30.0), Span(2.0, 28.0), Span(1.0, 28.0)
+    together = Together(record, Flight())
+
+    def find(flight: Span | None, *, doubtful: bool) -> Mapping[str, Any]:
+        return find_models(record, around, flight, settled, lambda: doubtful, memory, together)
+
+    assert not find(None, doubtful=True)
+    assert not find(flight, doubtful=False)
+    found, again = (find(flight, doubtful=True)["swings"] for _ in range(2))
     assert found is again
-    assert (found.time[0], found.time[-1]) == (2.0, 28.0)
+    assert (found.time[0], found.time[-1]) == (1.0, 28.0)
 
 
 @pytest.mark.parametrize(
