@@ -11,20 +11,20 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from d2rpick.deck import read_inventory
-from d2rpick.deck.geometry import sizes_and_lengths
+from d2rpick.deck.geometry import masses_and_steps, sizes_and_lengths
+from d2rpick.deck.model import SPRING
 from d2rpick.histories.formats.radioss_th import TimeHistory
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
 
-    from d2rpick.deck.model import PartData
-
     Reals = NDArray[np.float64]
 
 _COLUMNS = 6
+_LINES = ("beam", SPRING)  # a third node orients them
 _NUMBER = 4  # bytes
 
 
@@ -60,27 +60,25 @@ class VibrationError(NamedTuple):
 
 
 def read_nodes(deck: Path) -> Nodes:
-    """Read the nodes that a starter deck writes; an element gives each of its nodes the same share of its mass."""
+    """Read the nodes that a starter deck writes.
+
+    The mass of a part is shared by its elements as their sizes are, alike if these are springs, and the mass of an
+    element by its nodes.
+    """
     inventory = read_inventory(str(deck))
+    of_parts = masses_and_steps(inventory)
     masses = np.zeros(len(inventory.coordinates))
     for elements in inventory.elements:
-        ends = elements.nodes[:, :2] if elements.kind == "beam" else elements.nodes
+        ends = elements.nodes[:, :2] if elements.kind in _LINES else elements.nodes
         sizes, _ = sizes_and_lengths(elements.kind, elements.nodes, inventory.coordinates)
-        shares = sizes * _mass_per_size(inventory.parts, elements.kind, elements.part) / ends.shape[1]
-        np.add.at(masses, ends, shares[:, np.newaxis])
+        for part in np.unique(elements.part).tolist():
+            own = elements.part == part
+            shares = np.ones(own.sum()) if elements.kind == SPRING else sizes[own]
+            mass = of_parts[part][0]
+            if mass is None:
+                raise ValueError(f"{deck}: the mass of part {part} is unknown; give its density and size")
+            np.add.at(masses, ends[own], (mass / ends.shape[1] * shares / shares.sum())[:, np.newaxis])
     return Nodes(inventory.coordinates[inventory.watched], masses[inventory.watched])
-
-
-def _mass_per_size(parts: Mapping[int, PartData], kind: str, numbers: NDArray[np.int64]) -> Reals:
-    """Mass per area of shells, or per length of beams, of the part of each element (n,)."""
-    found = {}
-    for number in np.unique(numbers).tolist():
-        part = parts[number]
-        depth = part.section.area if kind == "beam" else part.section.thickness
-        if depth is None or part.material is None or part.material.density is None:
-            raise ValueError(f"part {number}: the deck gives no density, or no thickness or area")
-        found[number] = depth * part.material.density
-    return np.array([found[number] for number in numbers.tolist()])
 
 
 def read_motion(legs: Sequence[Path], nodes: Nodes, start: float, end: float) -> Motion:

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 _SMALLER_SCALE: Final = 0.85  # of the stable step: what this changes is the scatter of the model
 _HISTORY: Final = ("time", "internal_energy", "kinetic_energy", "x_momentum", "y_momentum", "z_momentum")
 _THINNED: Final = 4  # every so many states are written to a csv history
+_GROUP_OF_BODY: Final = (60, 70)  # columns of the group in the card of a rigid body
 _CLEAR: Final = 2e-4  # states so near to td and to the landing are not compared [s]
 
 
@@ -55,19 +56,27 @@ class Frame(Model):
 
 
 @dataclass(frozen=True)
-class WholeRollover(Model):
-    """The box of `ROLL` whose rigid body holds the step too, and whose histories hold the motion of all its nodes."""
+class AllNodes(Model):
+    """A stored deck whose rigid body holds the nodes of a ``group``; its histories hold the motion of them all."""
+
+    group: int = 0
 
     def deck(self) -> bytes:
         """Give the starter deck."""
         text = super().deck().decode()
-        box, whole = (f"/RBODY/1\nbox\n{self.main:10d}{0:10d}{0:10d}{0:10d}{0:20d}{group:10d}" for group in (1, 2))
         before, rest = text.split("/TH/NODE/1\n")
         after = rest[rest.index("/TH/PART/") :]
-        nodes = text.partition("/GRNOD/NODE/2\n")[2].partition("\n/")[0].split("\n", 1)[1].split()
-        watched = "".join(f"{int(node):10d}{0:10d}node {node}\n" for node in nodes)
+        nodes = text.partition(f"/GRNOD/NODE/{self.group}\n")[2].partition("\n/")[0].split("\n", 1)[1].split()
+        watched = "".join(f"{int(node):10d}{0:10d}node {node}\n" for node in nodes if int(node) != self.main)
         variables = "DX        DY        DZ        VX        VY        VZ"
-        return f"{before.replace(box, whole)}/TH/NODE/1\nnodes\n{variables}\n{watched}{after}".encode()
+        return f"{self._switch_group(before)}/TH/NODE/1\nnodes\n{variables}\n{watched}{after}".encode()
+
+    def _switch_group(self, text: str) -> str:
+        """Let the first rigid body hold the group."""
+        head, body = text.split("/RBODY/1\n")
+        title, card, further = body.split("\n", 2)
+        start, end = _GROUP_OF_BODY
+        return f"{head}/RBODY/1\n{title}\n{card[:start]}{self.group:10d}{card[end:]}\n{further}"
 
 
 class Case(NamedTuple):
@@ -83,7 +92,12 @@ class Case(NamedTuple):
     after_landing: float
 
 
-_ROLL: Final = MODELS["ROLL"]
+def watch_all_nodes(name: str, group: int, interval: float) -> AllNodes:
+    """Give a stored model that switches a group of nodes and writes their motion each ``interval`` [s]."""
+    model = MODELS[name]
+    return AllNodes(name, model.what, model.main, model.t_end, interval, model.cap, group=group)
+
+
 _ROLL_PAIRS: Final = (
     (0.155716, 0.371906), (0.15527, 0.37225), (0.12851, 0.26421), (0.0957549, 0.372553), (0.10516, 0.37225),
 )  # fmt: skip
@@ -102,11 +116,11 @@ def _frame_case(speed: float, pairs: tuple[Pair, ...]) -> Case:
 
 CASES: Final = {
     "ROLL": Case(
-        WholeRollover(_ROLL.name, _ROLL.what, _ROLL.main, _ROLL.t_end, 1e-4, _ROLL.cap),
+        watch_all_nodes("ROLL", group=2, interval=1e-4),
         ("box", "step"),
         _ROLL_PAIRS,
-        0.0885,
-        0.06,
+        flight_start=0.0885,
+        after_landing=0.06,
     ),
     "FRAME": _frame_case(5.0, (*_FRAME_PAIRS, (_TD_FRAME - 3e-5, _TD_FRAME))),  # the last one only stops the vibration
     "FRAME-FAST": _frame_case(10.0, _FRAME_PAIRS[::2]),

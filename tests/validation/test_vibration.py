@@ -107,6 +107,17 @@ def test_the_rollover_is_switched_whole_and_writes_all_its_nodes(tmp_path: Path)
     np.testing.assert_array_equal(np.sort(whole.watched), own)
 
 
+@pytest.mark.parametrize(("name", "group", "mass"), [("CAR", 4, 856.32075), ("ROLL", 2, 409.77001)])
+def test_the_nodes_have_the_mass_that_the_solver_gives_the_switched_parts(
+    tmp_path: Path, name: str, group: int, mass: float
+) -> None:
+    deck = tmp_path / f"{name}_0000.rad"
+    deck.write_bytes(vibration.watch_all_nodes(name, group, 1e-4).deck())
+    nodes = read_nodes(deck)
+    assert nodes.masses.sum() == pytest.approx(mass, rel=1e-6)
+    assert (nodes.masses > 0).all()
+
+
 def test_without_the_solver_the_study_is_skipped(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
