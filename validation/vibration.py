@@ -101,6 +101,11 @@ def watch_all_nodes(name: str, group: int, interval: float) -> AllNodes:
 _ROLL_PAIRS: Final = (
     (0.155716, 0.371906), (0.15527, 0.37225), (0.12851, 0.26421), (0.0957549, 0.372553), (0.10516, 0.37225),
 )  # fmt: skip
+_CAR_PAIRS: Final = ((0.0386669, 0.146717), (0.0496, 0.1464), (0.1, 0.1464))
+_CAR_PARTS: Final = (
+    "floor", "rail_p", "rail_m", "side_p", "side_m", "roof", "bulkheads", "glass", "hood", "bumper", "bows", "engine",
+    "battery", "wheels",
+)  # fmt: skip
 _LANDING, _REACH = 0.1155, 0.0975  # of the frame [s]; how far its lowest foot leads then [m]
 _TD_FRAME: Final = 0.10025
 _FRAME_STARTS: Final = (0.019475, 0.018775, 0.01835, 0.028825, 0.0121, 0.045325, 0.048425, 0.014575, 0.024125)
@@ -125,6 +130,9 @@ CASES: Final = {
     "FRAME": _frame_case(5.0, (*_FRAME_PAIRS, (_TD_FRAME - 3e-5, _TD_FRAME))),  # the last one only stops the vibration
     "FRAME-FAST": _frame_case(10.0, _FRAME_PAIRS[::2]),
     "FRAME-SLOW": _frame_case(2.5, _FRAME_PAIRS[::2]),
+    "CAR": Case(
+        watch_all_nodes("CAR", group=4, interval=1e-4), _CAR_PARTS, _CAR_PAIRS, flight_start=0.0386, after_landing=0.08
+    ),
 }
 
 
