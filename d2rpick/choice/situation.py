@@ -293,6 +293,11 @@ def examine(
     if flight.start is not None:
         within = Span(flight.start, flight.end or last)
         settled = within if flight.settled is None else within._replace(start=flight.settled)
+    if within is not None and flight.source == "energy":
+        from d2rpick.vibration.modal_span import inner_window  # not above: better evidence does without it
+
+        inner = inner_window(history, within)
+        within = inner if inner.start < td <= inner.end else within
     models = find_models(history, around, within, settled, lambda: doubtful(situation.whole), fits, situation.together)
     return replace(situation, evidence=evidence._replace(models=models)) if models else situation
 

@@ -34,6 +34,8 @@ _MOST_LAGS: Final = 340
 _STATES_PER_PERIOD, _FEWEST_STATES, _MOST_STATES = 6.4, 64, 2000
 # Times are even if they are off by less than this share of a step, as single precision and printed digits leave it.
 _EVEN: Final = 1e-3
+# So many times its median, the power of white noise hardly exceeds.
+_ABOVE_NOISE: Final = 10.0
 # Shares of the power of an energy about its trend: below the rate of the first lies all that matters, below that of the
 # second all that is strong.
 _ALL_POWER, _STRONG_POWER = 0.999, 0.95
@@ -98,7 +100,9 @@ def even_grid(time: Samples, energy: Samples) -> Grid:
     reach = even - even[0]
     trend = np.polyval(np.polyfit(reach, values, 2), reach)
     power = np.abs(np.fft.rfft((values - trend) * np.hanning(time.size))) ** 2
-    running = np.cumsum(power)
+    # white noise holds as much at the highest rates as anywhere
+    noise = _ABOVE_NOISE * float(np.median(power[power.size // 2 :]))
+    running = np.cumsum(np.maximum(power - noise, 0.0))
     fastest, strongest = np.searchsorted(running, np.array([_ALL_POWER, _STRONG_POWER]) * running[-1]).tolist()
     wanted = np.clip(_STATES_PER_PERIOD * fastest, _FEWEST_STATES, _MOST_STATES)
     size = max(1, int(time.size // wanted))

@@ -53,7 +53,10 @@ _AMBIGUOUS: Final = 0.08
 # What refuses a record, each a share of what its name says.
 _MOST_MISSED: Final = 0.5  # prediction error over the swing of the energy
 _MOST_MISFIT: Final = 0.3  # rest over the swing of the energy
-_MOST_NEGATIVE, _MOST_NEGATIVE_AT_ALL = 0.07, 0.5  # negative static energy over the mean vibration energy, beyond what noise makes
+_MOST_NEGATIVE, _MOST_NEGATIVE_AT_ALL = (
+    0.07,
+    0.5,
+)  # negative static energy over the mean vibration energy, beyond what noise makes
 _MOST_DRIFT: Final = 0.6  # change of the static energy over the mean vibration energy
 _MOST_BEYOND: Final = 0.12  # overlap beyond its bounds over the vibration energy, rms over all pairs
 _MOST_HARMONIC: Final = 0.05  # lines locked to a first one over it
@@ -67,7 +70,7 @@ _TIMES_PER_PERIOD: Final = 16
 _FINER: Final = 4
 
 # Of the swing of the energy: modes that leave less, and predict the rest within so much, show a flight.
-_LITTLE_LEFT, _LITTLE_MISSED = 0.03, 0.1
+_LITTLE_LEFT, _LITTLE_MISSED = 0.05, 0.2
 
 # The half-width of R^2, before anything is known to be wrong.
 _LEAST_HALF: Final = 0.01

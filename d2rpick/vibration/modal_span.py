@@ -60,17 +60,22 @@ def find_described(history: History, td: float, guess: Span | None, memory: Memo
     return None
 
 
-def _windows(history: History, td: float, guess: Span | None) -> Iterator[Span]:
-    """Windows to try: the one that was guessed, then later and later ones up to the end of the record."""
+def inner_window(history: History, guess: Span) -> Span:
+    """Give the whole parts of a record in a window that was guessed: guesses of many td then share few windows."""
     first, last = float(history.time[0]), float(history.time[-1])
     part = (last - first) / _PARTS
-    if guess is not None:  # by whole parts, since each td has a guess of its own
-        inner = Span(
-            first + part * np.ceil((guess.start - first) / part),
-            last if guess.end >= last else first + part * np.floor((guess.end - first) / part),
-        )
+    start = first + part * np.ceil((guess.start - first) / part)
+    end = last if guess.end >= last else first + part * np.floor((guess.end - first) / part)
+    return Span(float(start), float(end))
+
+
+def _windows(history: History, td: float, guess: Span | None) -> Iterator[Span]:
+    """Windows to try: the one that was guessed, then later and later ones up to the end of the record."""
+    if guess is not None:
+        inner = inner_window(history, guess)
         if inner.start < td <= inner.end:
             yield inner
+    first, last = float(history.time[0]), float(history.time[-1])
     yield from (
         Span(first + share * (last - first), last) for share in _BEGINNINGS if first + share * (last - first) < td
     )
