@@ -132,7 +132,8 @@ def vibration() -> Figure:
     for (case, name), colour in zip(_VIBRATING.items(), (REFERENCE, FLIGHT, SWITCHED, "#cc79a7", GOOD), strict=True):
         own = switched[switched["case"] == case]
         whole = own[own["energy"] == "total"]
-        left.plot(whole["R_predicted"], whole["R_nodes"], "o", color=colour, markersize=4, label=name)
+        if not np.isnan(whole["R_predicted"]).all():
+            left.plot(whole["R_predicted"], whole["R_nodes"], "o", color=colour, markersize=4, label=name)
         right.plot(whole["worth"], whole["rms"], "o", color=colour, markersize=4, label=name)
         parts = switched[absorbing & (switched["case"] == case)]
         right.plot(parts["worth"], parts["rms"], "x", color=colour, markersize=4, label="_")
