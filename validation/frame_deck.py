@@ -9,7 +9,7 @@ deactivated until the switch.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from itertools import pairwise, product
+from itertools import count, pairwise, product
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -126,11 +126,11 @@ ground fixed
    111 111         0         2
 /RBODY/1
 frame
-     90001         0         0         0                   0         1         0         0         0
+{main:10d}         0         0         0                   0         1         0         0         0
                    0                   0                   0
                    0                   0                   0
          0         0         0"""
-_CONTACT: Final = """/SURF/PART/1
+_CONTACT: Final = f"""/SURF/PART/1
 ground
          5
 /INTER/TYPE7/1
@@ -138,7 +138,7 @@ frame to ground
          1         1         4         0         0                   0         0         0         0
                    0                   0                   0
                 1000                   0                   0                   0         0         0
-                   1                 0.2               0.001                   0                   0
+                   1                 0.2{_GAP:20.3g}                   0                   0
        000                             6                   0                   0                   0
          0         0                   0         2         0         0                   0         0"""
 
@@ -220,7 +220,7 @@ def write_deck(landing: Landing) -> str:
         _HEAD, _MATERIALS, _PROPERTIES, _node_cards(mesh), _part_cards(mesh),
         _group(1, "frame", frame), _group(2, "ground", ground), _group(3, "pushed corner", [pushed]),
         _group(4, "frame and main node", [*frame, MAIN_NODE]),
-        _push_cards(), _START.format(speed=-landing.speed), _CONTACT, _history_cards(frame), "/END",
+        _push_cards(), _START.format(speed=-landing.speed, main=MAIN_NODE), _CONTACT, _history_cards(frame), "/END",
     )  # fmt: skip
     return "\n".join(cards) + "\n"
 
@@ -232,11 +232,10 @@ def _node_cards(mesh: Mesh) -> str:
 
 
 def _part_cards(mesh: Mesh) -> str:
-    lines, number = [], 0
+    lines, numbers = [], count(1)
     for part, (card, elements) in enumerate(zip(_PARTS, mesh.elements, strict=True), start=1):
         lines += [f"/PART/{part}", card.title, f"{card.property:10d}{card.material:10d}", f"/{card.kind}/{part}"]
-        for number, nodes in enumerate(elements, start=number + 1):  # noqa: B020
-            lines.append(_integers([number, *nodes]))
+        lines += [_integers([next(numbers), *nodes]) for nodes in elements]
     return "\n".join(lines)
 
 

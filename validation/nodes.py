@@ -12,6 +12,7 @@ import numpy as np
 
 from d2rpick.deck import read_inventory
 from d2rpick.deck.geometry import masses_and_steps, sizes_and_lengths
+from d2rpick.deck.mesh import NO_NODE
 from d2rpick.deck.model import SPRING
 from d2rpick.histories.formats.radioss_th import TimeHistory
 
@@ -77,7 +78,9 @@ def read_nodes(deck: Path) -> Nodes:
             mass = of_parts[part][0]
             if mass is None:
                 raise ValueError(f"{deck}: the mass of part {part} is unknown; give its density and size")
-            np.add.at(masses, ends[own], (mass / ends.shape[1] * shares / shares.sum())[:, np.newaxis])
+            given = ends[own] != NO_NODE  # a triangle has no fourth node
+            of_nodes = given * (mass * shares / shares.sum() / given.sum(axis=1))[:, np.newaxis]
+            np.add.at(masses, ends[own][given], of_nodes[given])
     return Nodes(inventory.coordinates[inventory.watched], masses[inventory.watched])
 
 
