@@ -2,9 +2,8 @@
 
 import gc
 import os
+import signal
 import sys
-
-INTERRUPTED = 130  # what a shell reports for a program that SIGINT ended
 
 
 def main() -> None:
@@ -12,10 +11,22 @@ def main() -> None:
 
     One thread for linear algebra, unless the environment says otherwise: the systems solved here are small, and
     starting the others costs a quarter of numpy's import.  Garbage is looked for less often, and not at the end: of
-    what imports make none is garbage, and looking for it costs a seventh of a run on an ordinary file.  An interrupt
-    before anything was begun, during the imports, ends the program without a word.
+    what imports make none is garbage, and looking for it costs a seventh of a run on an ordinary file.
+
+    An interrupt leaves as KeyboardInterrupt, without a traceback: Python then ends itself by SIGINT, and the shell ends
+    its loop.  A shell goes on with its loop after a program that caught the signal and ended with any exit code.
     """
+    interrupts: list[int] = []
+
+    def interrupt(number: int, _: object) -> None:
+        """Raise KeyboardInterrupt, and remember the signal, since the code of a library may swallow the error."""
+        interrupts.append(number)
+        sys.unraisablehook = lambda _: None  # what is swallowed in the end of an object would print a traceback
+        raise KeyboardInterrupt
+
     try:
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a job in the background ignores it
+            signal.signal(signal.SIGINT, interrupt)
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         gc.set_threshold(100_000)
         _fill_closed_streams()
@@ -23,9 +34,14 @@ def main() -> None:
 
         d2rpick()
     except KeyboardInterrupt:
-        os._exit(INTERRUPTED)
+        interrupts.append(signal.SIGINT)
     finally:
+        if signal.getsignal(signal.SIGINT) is interrupt:
+            signal.signal(signal.SIGINT, signal.SIG_DFL)  # the next one ends the program at once
         gc.freeze()  # the system takes back what is left
+        if interrupts:
+            sys.excepthook = lambda *_: None
+            raise KeyboardInterrupt
 
 
 def _fill_closed_streams() -> None:

@@ -3,6 +3,9 @@
 Each input is made from the seed and its number alone.  Whatever the damage, a reader gives the numbers that stand in
 the file or an error of d2rpick in one line; anything else, a warning and the death of the process among them, is a
 fault.  Counts are printed for each format; exit code 1 when there is a fault.  ``--only FORMAT NUMBER`` repeats one.
+
+``--relations`` compares answers instead: a history is changed in a way that must not matter, or must matter in a known
+way (`tests.relations`).  A fault is an answer that does not follow.
 """
 
 import argparse
@@ -29,8 +32,10 @@ from tests.faults import Fault, damage
 from tests.hdf5_files import plain, written
 from tests.histories.formats import test_curves, test_faults_text
 from tests.reading import run_of, states_of
+from tests.relations import RELATIONS, check_relation
 
 _CHUNK: Final = 200  # inputs of one task
+_FEW: Final = 20  # histories of one task of a relation, each of which is chosen from twice
 _SHOWN: Final = 5  # faults of a format that are printed
 _KINDS: Final = ("flip", "cut", "drop", "double", "swap", "insert", "blank")
 _LIKELY: Final = b"\n 0123456789.,;E+-*eND\"'\x00\x1b\xff"
@@ -118,9 +123,15 @@ FORMATS: Final[dict[str, Callable[[Random], bool]]] = {
 }  # fmt: skip
 
 
+CHECKS: Final[dict[str, Callable[[Random], bool]]] = {
+    **FORMATS,
+    **{name: partial(check_relation, name) for name in RELATIONS},
+}
+
+
 def case(form: str, seed: int, number: int) -> str:
-    """What became of one input: ``read``, ``refused``, or the fault."""
-    return outcome(FORMATS[form], Random(f"{form} {seed} {number}"), number)
+    """What became of one input, or of one history and a relation: ``read``, ``refused``, or the fault."""
+    return outcome(CHECKS[form], Random(f"{form} {seed} {number}"), number)
 
 
 def outcome(read: Callable[[Random], bool], random: Random, number: int) -> str:
@@ -145,21 +156,27 @@ def main() -> int:
     parser.add_argument("--inputs", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", nargs=2, metavar=("FORMAT", "NUMBER"))
+    parser.add_argument("--relations", action="store_true")
     options = parser.parse_args()
     if options.only:
         print(case(options.only[0], options.seed, int(options.only[1])))
         return 0
-    each = -(-options.inputs // len(FORMATS))
-    tasks = [(form, range(at, min(at + _CHUNK, each))) for at in range(0, each, _CHUNK) for form in FORMATS]
-    found: dict[str, Counter[str]] = {form: Counter() for form in FORMATS}
+    forms = [*(RELATIONS if options.relations else FORMATS)]
+    each = -(-options.inputs // len(forms))
+    size = _FEW if options.relations else _CHUNK
+    tasks = [(form, range(at, min(at + size, each))) for at in range(0, each, size) for form in forms]
+    found: dict[str, Counter[str]] = {form: Counter() for form in forms}
     with on_cores(cores(), "tests.faults") as farm:
         for answer in farm.answers(partial(chunk, options.seed), tasks):
             form, numbers = tasks[answer.number]
             found[form] += Counter({f"{numbers}: {answer.error}": 1}) if answer.error else answer.result[1]
-    print(f"{'format':<12} {'inputs':>9} {'read':>9} {'refused':>9} {'faults':>9}")
+    heads = (
+        ("relation", "histories", "chosen", "none") if options.relations else ("format", "inputs", "read", "refused")
+    )
+    print(f"{heads[0]:<22} {heads[1]:>9} {heads[2]:>9} {heads[3]:>9} {'faults':>9}")
     for form, counts in found.items():
         wrong = [what for what in counts if what not in ("read", "refused")]
-        print(f"{form:<12} {each:>9} {counts['read']:>9} {counts['refused']:>9} {len(wrong):>9}")
+        print(f"{form:<22} {each:>9} {counts['read']:>9} {counts['refused']:>9} {len(wrong):>9}")
         print(*(f"  {what}" for what in wrong[:_SHOWN]), sep="\n", end="\n" if wrong else "")
     return int(any(counts.keys() - {"read", "refused"} for counts in found.values()))
 

@@ -29,7 +29,7 @@ BOX = str(ROOT / "sample_data" / "rolloverT01.gz")
 OSCILLATOR = tuple(shlex.split("--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6"))
 _TEMPORARY = Path(tempfile.gettempdir())
 _ANSWERED: dict[Hashable, Result] = {}
-_INTERRUPTIBLE = (
+INTERRUPTIBLE = (
     "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\nfrom d2rpick.__main__ import main; main()"
 )
 # No colour variables and no options that the tester's own environment may set.
@@ -90,7 +90,7 @@ def started(*args: str, **options: Any) -> Iterator[subprocess.Popen[Any]]:
 
     It can be interrupted also where this process cannot, as in the background of a shell.
     """
-    command = [sys.executable, "-c", _INTERRUPTIBLE, *args]
+    command = [sys.executable, "-c", INTERRUPTIBLE, *args]
     given = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "cwd": ROOT, **options}
     with subprocess.Popen(command, start_new_session=True, **given) as process:
         watch = Timer(TIME_LIMIT, _end, [process.pid])

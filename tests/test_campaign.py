@@ -1,4 +1,4 @@
-"""Damaged inputs of all formats are read or refused: a few, a million with ``D2RPICK_THOROUGH=20``."""
+"""Damaged inputs of all formats are read or refused: a few, a million with ``D2RPICK_THOROUGH=20``; answers follow."""
 
 from collections import Counter
 
@@ -6,6 +6,7 @@ import pytest
 
 from tests.campaign import FORMATS, case
 from tests.faults import inputs
+from tests.relations import RELATIONS
 
 
 @pytest.mark.slow
@@ -13,5 +14,13 @@ from tests.faults import inputs
 def test_whatever_the_damage_an_input_is_read_or_refused(form: str) -> None:
     found = Counter(case(form, 0, number) for number in range(inputs(1_000_000) // len(FORMATS) + 1))
     print(f"{form}: {found['read']} read, {found['refused']} refused")  # shown by pytest -rP
+    assert found.keys() <= {"read", "refused"}
+    assert found["read"] > 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("relation", [name for name, relation in RELATIONS.items() if relation.exact])
+def test_an_answer_does_not_change_with_what_must_not_matter(relation: str) -> None:
+    found = Counter(case(relation, 0, number) for number in range(3))
     assert found.keys() <= {"read", "refused"}
     assert found["read"] > 0

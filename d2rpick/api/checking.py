@@ -38,7 +38,8 @@ class Findings(Answer, Checks):
     """Answer of `check`; nothing of it changes.
 
     ``findings`` have ``rule``, ``severity``, ``message``, ``file``, ``line`` and ``column``; ``windows`` are those in
-    which parts are rigid; ``notes`` say what the readers of the history left out or assumed.
+    which parts are rigid; ``notes`` say what the readers of the history left out or assumed, and which settings are
+    not used.
     """
 
     command: tuple[str, ...] = ()
@@ -159,12 +160,13 @@ def findings_of(
     found = list(_each(decks, rules, judge))
     results = tuple(one for one in found if isinstance(one, Checked))
     remarks = dict.fromkeys(remark for result in results for remark in result.remarks)
+    unused_settings = dict.fromkeys(note for result in results for note in result.notes)
     return Findings(
         results=results,
         failed=tuple(one for one in found if isinstance(one, Unreadable)),
         cautions=(*(judge.cautions if judge else ()), *(Caution("unknown-rule", remark) for remark in remarks)),
         history=run.sources if run else None,
-        notes=judge.notes if judge else (),
+        notes=(*(judge.notes if judge else ()), *unused_settings),
         fail_on=Severity(fail_on),
         command=command,
     )
@@ -209,7 +211,7 @@ def _found(
         if judge and content is None:
             judge.beside(name)
         found = check_deck(name, configuration, judge, content)
-        return found._replace(files=(source, *found.files))
+        return found._replace(files=(source, *found.files), notes=configuration.notes)
     except Exception as error:
         if isinstance(error, D2RPickError) and not isinstance(error, ConfigurationError | DeckError):
             raise  # about the history, by which all are judged

@@ -174,7 +174,8 @@ def at_rest(name: str, file: FileIO, error: type[D2RPickError], *, may_grow: boo
 def write_whole(path: Path, content: bytes) -> None:
     """Write a file whole or not at all: into a temporary file beside it, which then takes its name.
 
-    A link stays, and the file it points to is replaced; a device or a named pipe is written to.
+    A file that is replaced keeps its mode, and its owner and group as far as the user may set them.  A link stays, and
+    the file it points to is replaced; a device or a named pipe is written to.
     """
     import tempfile
 
@@ -187,18 +188,32 @@ def write_whole(path: Path, content: bytes) -> None:
         path = path.absolute()
     if path.is_symlink():  # what is left of it
         raise OSError(ELOOP, os.strerror(ELOOP), str(path))
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    # The name of the file may be as long as the file system allows: a longer one cannot be made of it.
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".d2rpick-")
     scratch = path.parent / temporary
     try:
         with os.fdopen(handle, "wb") as file:
             file.write(content)
-        mask = os.umask(0)
-        os.umask(mask)
-        scratch.chmod(0o666 & ~mask)  # mkstemp gives the owner alone access
+        _copy_access(path, scratch)
         scratch.replace(path)
     except BaseException:
         scratch.unlink(missing_ok=True)
         raise
+
+
+def _copy_access(replaced: Path, scratch: Path) -> None:
+    """Give a new file the owner, group and mode of the one that it will replace; else the mode of any new file."""
+    try:
+        status = replaced.stat()
+    except FileNotFoundError:
+        mask = os.umask(0)
+        os.umask(mask)
+        scratch.chmod(0o666 & ~mask)  # mkstemp gives the owner alone access
+        return
+    if hasattr(os, "chown"):
+        with suppress(PermissionError):
+            os.chown(scratch, status.st_uid, status.st_gid)
+    scratch.chmod(stat.S_IMODE(status.st_mode))  # after the owner, whose change takes away the bits of set-user-id
 
 
 def append_whole(path: Path, content: bytes, *, durable: bool = False) -> None:

@@ -1,5 +1,8 @@
-"""The file of settings nearest to a folder: ``d2rpick.toml``, or ``[tool.d2rpick]`` of pyproject.toml."""
-# ruff: noqa: PTH100, PTH113, PTH118, PTH120, PTH123
+"""The settings nearest to a folder: ``d2rpick.toml``, or ``[tool.d2rpick]`` of pyproject.toml.
+
+The search ends at the root of a repository or at the user's home, and uses only files that the user owns.
+"""
+# ruff: noqa: PTH100, PTH110, PTH111, PTH113, PTH116, PTH118, PTH120, PTH121, PTH123
 # Every command looks for settings, and pathlib takes longer to import than that.
 
 from __future__ import annotations
@@ -9,40 +12,99 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import ConfigurationError
+from d2rpick.base.tuples import NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable
+    from collections.abc import Collection, Iterable, Iterator
 
 _OWN, _SHARED = "d2rpick.toml", "pyproject.toml"
+_OF_REPOSITORIES: Final = (".git", ".hg")  # the root of a repository contains one of these
 RULE_KEYS: Final = ("select", "ignore", "severity")  # of the deck check, which takes them from beside each deck
+_UNIMPORTANT: Final = dict.fromkeys(map(ord, " \t\"'"))  # signs around the pieces of a dotted key
+_LONGEST_VALUE: Final = 60  # characters of a value in a message
 
 
-def nearest_settings(folder: str) -> tuple[Mapping[str, object], str]:
+class NearestSettings(NamedTuple):
+    """The settings that apply to a folder.
+
+    ``table`` is empty if there are none.  ``source`` names their file, or is empty.  ``notes`` name nearer files that
+    are not used because another user owns them.
+    """
+
+    table: Mapping[str, object]
+    source: str
+    notes: tuple[str, ...]
+
+
+def nearest_settings(folder: str) -> NearestSettings:
     """Find the settings for a folder there or above; in a folder, d2rpick.toml counts before pyproject.toml.
-
-    Returns
-    -------
-    table : Mapping
-        The settings; empty where there are none.
-    source : str
-        Their file, or nothing.
 
     Raises
     ------
     ConfigurationError
-        If the file is no TOML, or holds no table of settings.
+        If the file is not TOML, or contains no table of settings.
     """
-    place, above = "", os.path.abspath(folder)
-    while place != above:
-        place, above = above, os.path.dirname(above)
+    notes: list[str] = []
+    for place in _searched_folders(os.path.abspath(folder)):
         for name in (_OWN, _SHARED):
             source = os.path.join(place, name)
-            found = _table(source, shared=name == _SHARED) if os.path.isfile(source) else None
-            if isinstance(found, Mapping):
-                return found, source
-            if found is not None:
-                raise ConfigurationError(f"{source}: the configuration is {found!r}, a table was expected")
-    return {}, ""
+            if not os.path.isfile(source):
+                continue
+            if not _is_owned_by_user(source):
+                if name == _OWN or _has_settings(source):
+                    notes.append(f"{source}: not used, since another user owns it; copy it to use its settings")
+                continue
+            table = _read_table(source, shared=name == _SHARED)
+            if isinstance(table, Mapping):
+                return NearestSettings(table, source, tuple(notes))
+            if table is not None:
+                raise ConfigurationError(f"{source}: the configuration is {toml_text(table)}, a table was expected")
+    return NearestSettings({}, "", tuple(notes))
+
+
+def _searched_folders(folder: str) -> Iterator[str]:
+    """Give a folder and those above it, up to the root of its repository or the user's home.
+
+    Outside of both, the search ends below the first folder that another user owns, and below the root of the system.
+    """
+    home = os.path.expanduser("~")
+    while True:
+        yield folder
+        above = os.path.dirname(folder)
+        is_top = os.path.dirname(above) == above or not _is_owned_by_user(above)
+        is_home = os.path.exists(home) and os.path.exists(folder) and os.path.samefile(folder, home)
+        if is_top or is_home or any(os.path.exists(os.path.join(folder, name)) for name in _OF_REPOSITORIES):
+            return
+        folder = above
+
+
+def _is_owned_by_user(path: str) -> bool:
+    """Return whether the user owns a file or folder, and the link that leads to it; True on Windows."""
+    if not hasattr(os, "geteuid"):
+        return True
+    user = os.geteuid()
+    try:
+        return os.stat(path).st_uid == user == os.lstat(path).st_uid
+    except OSError:
+        return False
+
+
+def toml_text(value: object) -> str:
+    """Write a value from a TOML file for a message, cut if it is long.
+
+    Examples
+    --------
+    >>> from datetime import date
+    >>> toml_text(True), toml_text(date(1979, 5, 27)), toml_text("x"), toml_text("x" * 99)[-5:]
+    ('true', '1979-05-27', "'x'", 'x ...')
+    """
+    if isinstance(value, bool):
+        text = str(value).lower()
+    elif hasattr(value, "isoformat"):
+        text = str(value.isoformat())
+    else:
+        text = repr(value)
+    return text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]} ..."
 
 
 def refuse_unknown(names: Iterable[str], known: Collection[str], source: str) -> None:
@@ -56,13 +118,26 @@ def refuse_unknown(names: Iterable[str], known: Collection[str], source: str) ->
             raise ConfigurationError(f"{source}: unknown key {name!r}, one of {', '.join(known)} was expected{hint}")
 
 
-def _table(path: str, *, shared: bool) -> object:
-    """Read the settings of a file of TOML; None where one that is ``shared`` with other tools has none."""
+def _has_settings(path: str) -> bool:
+    """Return whether a pyproject.toml that is not used has settings of ours; False if it cannot be read."""
     try:
-        with open(path, encoding="utf-8") as file:
+        return _read_table(path, shared=True) is not None
+    except ConfigurationError:
+        return False
+
+
+def _may_have_settings(text: str) -> bool:
+    """Return False if a pyproject.toml cannot define ``tool.d2rpick``, which saves the import of a parser."""
+    solid = text.translate(_UNIMPORTANT)
+    return any(start in solid for start in ("tool.d2rpick", "[tool]", "tool={"))
+
+
+def _read_table(path: str, *, shared: bool) -> object:
+    """Read the settings of a TOML file; None if one that is ``shared`` with other tools has none."""
+    try:
+        with open(path, encoding="utf-8-sig") as file:  # editors on Windows begin a text with a byte order mark
             text = file.read()
-        solid = text.replace(" ", "")
-        if shared and "tool.d2rpick" not in solid and "[tool]" not in solid:
+        if shared and not _may_have_settings(text):
             return None
         import tomllib
 
@@ -70,5 +145,7 @@ def _table(path: str, *, shared: bool) -> object:
         repr(table)  # as a message may show it: Python refuses to write numbers of thousands of digits, or to read them
     except (ValueError, OSError, RecursionError) as error:
         raise ConfigurationError(f"{path}: {error}; valid TOML was expected") from None
+    if not shared:
+        return table
     tools = table.get("tool")
-    return table if not shared else tools.get("d2rpick") if isinstance(tools, Mapping) else None
+    return tools.get("d2rpick") if isinstance(tools, Mapping) else None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from itertools import islice
@@ -26,6 +27,11 @@ _METHOD = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
 _WAITING = 2
 # On a cluster, whose workers may come and go.
 _LEAST_ON_CLUSTER = 64
+# Tries to make a pool: after the first the process is started anew that others are forked from, if that was killed.
+_STARTS = 3
+_DYING = 0.1  # [s] between two tries: a process that was killed counts as alive until the system has ended it
+# What the start of a process raises if the one that it is forked from was killed.
+_NOT_STARTED = (BrokenProcessPool, EOFError, OSError)
 # [s] until a scheduler has to answer.
 _PATIENCE = 10
 
@@ -84,7 +90,7 @@ class Cores(Farm):
         """Compute up to ``room`` calls at a time.
 
         A call whose process died is repeated once, alone: the death breaks a whole pool, and not all of its calls are
-        to blame.
+        to blame.  The process that the others are forked from may die as well: it is started anew.
         """
         queue = iter(enumerate(items))
         running: dict[Future[Result], tuple[int, Item]] = {}
@@ -101,17 +107,38 @@ class Cores(Farm):
                 else:
                     yield _answer(number, future)
             for number, item in suspects:
-                with self._new(1) as pool:
-                    yield _answer(number, pool.submit(function, item))
+                yield self._answer_alone(number, function, item)
 
     def _submit(self, function: Callable[[Item], Result], item: Item) -> Future[Result]:
-        """Hand the call to the pool; to a new one when the last is broken."""
+        """Hand the call to the pool; to a new one if the last is broken."""
         try:
             return self._pool.submit(function, item)
-        except BrokenProcessPool:
+        except _NOT_STARTED:
             self._pool.shutdown(wait=False)
-            self._pool = self._new(self.processes)
-            return self._pool.submit(function, item)
+            self._pool, future = self._begin_pool(self.processes, function, item)
+            return future
+
+    def _answer_alone(self, number: int, function: Callable[[Item], Result], item: Item) -> Finished:
+        """Compute a call in a pool of its own, so that no other call ends with its process."""
+        pool, future = self._begin_pool(1, function, item)
+        try:
+            return _answer(number, future)
+        finally:
+            pool.shutdown(wait=False)  # an interrupt does not wait for the call
+
+    def _begin_pool(
+        self, processes: int, function: Callable[[Item], Result], item: Item
+    ) -> tuple[ProcessPoolExecutor, Future[Result]]:
+        """Make a pool that begins with a call; D2RPickError if none of its processes can be started."""
+        for _ in range(_STARTS):
+            pool = self._new(processes)
+            try:
+                return pool, pool.submit(function, item)
+            except _NOT_STARTED as error:
+                pool.shutdown(wait=False)
+                time.sleep(_DYING)
+                reason = " ".join(str(error).split())
+        raise D2RPickError(f"no process can be started ({reason}); is there a limit on their number?")
 
     def _new(self, processes: int) -> ProcessPoolExecutor:
         return ProcessPoolExecutor(processes, get_context(_METHOD), _begin_work, (self._held,))
@@ -126,9 +153,8 @@ def _answer(number: int, future: Future[Any]) -> Finished:
 
 def _begin_work(held: Connection) -> None:
     """End this process, whatever it does, when the other end of ``held`` is closed; without a word on interrupts."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-    if _METHOD == "forkserver":  # from which the block was inherited
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a spawned process; a forked one has no such
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
 
     def follow() -> None:
         held.poll(None)  # nothing is ever sent
@@ -150,10 +176,10 @@ def begin(processes: int, module: str) -> None:
 
 
 def _start_server(module: str) -> None:
-    """Start the process that others are forked from; it never hears of interrupts, not even while it imports."""
+    """Start the process that others are forked from; an interrupt ends it without a word, even while it imports."""
     from multiprocessing import forkserver, resource_tracker  # not on every system
 
-    set_forkserver_preload([module])
+    set_forkserver_preload(["d2rpick.base.interruptible", module])
     resource_tracker.ensure_running()  # its start would lift what is blocked here
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:

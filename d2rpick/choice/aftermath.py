@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.situation import Situation
     from d2rpick.histories.history import Samples
 
-# Vibration energies are known within this share, once a model of the vibration is.
+# Vibration energies are known within this share from lines, swings or signs of parts.
 _KNOWN_WITHIN: Final = 0.1
 # Of m alike modes that are out of step the energy has a standard deviation of 1/sqrt(8 m) of what they hold together:
 # so much more than it may be there. In a computed car 100 such modes hold what its nodes show.
@@ -68,7 +68,8 @@ def _vibration_energies(situation: Situation) -> list[tuple[float, float]]:
     if compared is not None:
         elastic = float(compared.deformation.elastic_energy(situation.td))
         whole = float(compared.deformation.vibration_energy(situation.td))
-        return [(scale * elastic, scale * whole) for scale in (1 - _KNOWN_WITHIN, 1 + _KNOWN_WITHIN)]
+        scales = (1.0,) if situation.basis == "oscillator" else (1 - _KNOWN_WITHIN, 1 + _KNOWN_WITHIN)
+        return [(scale * elastic, scale * whole) for scale in scales]
     bounds = vibration_energy_bounds(situation)
     if bounds is None:
         return []

@@ -122,6 +122,8 @@ class _Group(Documented, click.Group):
         except (click.ClickException, click.exceptions.Exit, click.Abort):
             raise
         except Exception as error:  # a user gets a line, whatever it is
+            if _is_interrupt(error):
+                raise click.Abort from None
             from d2rpick.cli.output import explained
 
             raise click.ClickException(explained(error, ctx.meta.get("d2rpick.history", ()))) from error
@@ -137,8 +139,9 @@ class _Group(Documented, click.Group):
             _fail(error.format_message())
         except OSError as error:  # from a help or a version that cannot be written
             _fail(one_line(error))
-        except click.Abort:
-            _fail("interrupted")
+        except click.Abort:  # which click makes of an interrupt
+            _tell_error("interrupted")
+            raise KeyboardInterrupt from None
         except _PipeClosed:
             # python must not complain when it closes the stream at exit
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -146,11 +149,22 @@ class _Group(Documented, click.Group):
         sys.exit(code if isinstance(code, int) else 0)
 
 
+def _is_interrupt(error: BaseException | None) -> bool:
+    """Return whether an error was raised because of an interrupt, as Python does while it makes a class."""
+    while error and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
+
+
 def _fail(message: str) -> NoReturn:
+    _tell_error(message)
+    sys.exit(COULD_NOT_RUN)
+
+
+def _tell_error(message: str) -> None:
     from d2rpick.cli.output import tell
 
     tell(f"d2rpick: {message}")
-    sys.exit(COULD_NOT_RUN)
 
 
 _VERSIONS: Final = "Show the version, and those of the libraries it stands on, and exit."

@@ -113,7 +113,8 @@ def check(
     output = output.beside(*deck, *(run.sources if run else ()))
     found = findings_of(deck, run, request, _ids(select), _ids(ignore), fail_on)
     output.spare(file for many in (found.results, found.failed) for one in many for file in one.files)
-    output.notes(found.notes, found.cautions)
+    notes_before = click.get_current_context().meta["d2rpick.unused"]
+    output.notes([note for note in found.notes if note not in notes_before], found.cautions)
     for one in found.failed:
         tell(f"d2rpick: {explained(one.error, [one.deck])}")
     form = output.output_format

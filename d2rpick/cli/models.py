@@ -133,7 +133,7 @@ _ABSENT = (
 
 
 @options.command
-@options.file("--output-dir", "Folder for figures and tables; created if missing.", "DIR", required=True)
+@options.file("--output-dir", "Folder for figures and tables; created if missing.", "DIR", kind="output", required=True)
 @click.option(
     "--section", type=click.Choice(SECTIONS), multiple=True,
     help="Only the figures of this section of the paper; repeatable.  1: the setting, early switches of the box; 2: "

@@ -279,7 +279,10 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
     *("HISTORY",), many=True,
 )  # fmt: skip
 @options.file(
-    "--write-deck", "Write a copy of --deck with the cards of the windows into this folder, and check it.", "DIR"
+    "--write-deck",
+    "Write a copy of --deck with the cards of the windows into this folder, and check it.",
+    "DIR",
+    kind="output",
 )
 @options.takes(
     *("deck", "weights", HISTORY, *READING, *CHOOSING, "plot", "report", *CARDS, *RESULT),

@@ -62,7 +62,9 @@ class Command(Documented):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Read the command line; what neither it nor the environment gives, the settings may."""
-        table, source = ({}, "") if ctx.resilient_parsing else nearest_settings(os.curdir)
+        if ctx.resilient_parsing:
+            return super().parse_args(ctx, args)
+        table, source, ctx.meta["d2rpick.unused"] = nearest_settings(os.curdir)
         ctx.meta["d2rpick.settings"] = source
         if table:
             without = click.Context(self, ctx.parent, ctx.info_name, resilient_parsing=True)
@@ -85,6 +87,9 @@ class Command(Documented):
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; UsageError for what makes no sense together."""
+        if not ctx.params.get("quiet"):
+            for note in ctx.meta["d2rpick.unused"]:
+                tell(f"note: {note}")
         if ctx.meta.get("d2rpick.show-settings"):
             return click.echo(text_bytes("\n".join(_settings(ctx))))
         if (words := words_of(ctx)) and not ctx.params.get("quiet"):
@@ -216,9 +221,12 @@ def time(name: str, text: str, **more: Any) -> Callable[[Decorated], Decorated]:
 
 
 def file(name: str, text: str, metavar: str = "FILE", **more: Any) -> Callable[[Decorated], Decorated]:
-    """Make an option of one command that names a file, or ``many`` of them, one each time."""
-    required = more.pop("required", False)
-    return option(name[2:].replace("-", "_"), Option(text, "file", metavar, **more), required=required)
+    """Make an option of one command that names a file, or ``many`` of them, one each time.
+
+    Its ``kind`` is "file", or "output" if the command writes it.
+    """
+    required, kind = more.pop("required", False), more.pop("kind", "file")
+    return option(name[2:].replace("-", "_"), Option(text, kind, metavar, **more), required=required)
 
 
 def windows_in(file: str) -> Sequence[tuple[float, float]]:

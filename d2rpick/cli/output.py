@@ -53,13 +53,13 @@ IN_WORDS: Final = {"table", "markdown"}  # forms in which the answer says itself
 class Output:
     """Results to stdout or a file, everything else to stderr unless ``quiet``; ``inputs`` are never written to."""
 
-    plot: str | None = option("Draw energy and motion to FILE (png, svg, pdf).", "file", "FILE")
-    report: str | None = option("Write everything to one HTML page to read, print and sign.", "file", "FILE")
+    plot: str | None = option("Draw energy and motion to FILE (png, svg, pdf).", "output", "FILE")
+    report: str | None = option("Write everything to one HTML page to read, print and sign.", "output", "FILE")
     min_quality: str | None = option("Exit with 1 where the pair is worse than that.", ("good", "fair"))
     output_format: str = option("Format of the result.", default="table", short=("-f",))
     exit_zero: bool = option("Exit with 0 instead of 1 when the answer is an objection.", "flag", default=False)
     output_file: str | None = option(
-        "Write the result to FILE, completely or not at all.", "file", "FILE", short=("-o",)
+        "Write the result to FILE, completely or not at all.", "output", "FILE", short=("-o",)
     )
     overwrite: bool = option("Replace existing files.", "flag", default=False)
     quiet: bool = option("Print no notes and warnings to stderr.", "flag", default=False, short=("-q",))

@@ -19,14 +19,15 @@ if TYPE_CHECKING:
     from d2rpick.api.drives import Driving
 
 
-CMD = ("text", "CMD")
+CMD = ("program", "CMD")
 
 
 @options.command
 @click.argument("deck", type=click_type("file"))
 @click.option(
-    "-o", "folder", metavar="RUNDIR", required=True, type=click_type("file"), help="Folder of the run; made if missing."
-)
+    "-o", "folder", metavar="RUNDIR", required=True, type=click_type("output"),
+    help="Folder of the run; made if missing.",
+)  # fmt: skip
 @options.option(
     "part", Option("Parts to switch.  [default: those of the bodies that the deck puts off]", "text", "IDS", many=True)
 )
@@ -135,17 +136,14 @@ def follow(run: str, wait: float | None, once: bool, lasting: float | None, requ
         raise click.UsageError("--once and --for exclude each other")
     seconds = 0.0 if once else lasting
     failed, since = False, None
-    try:
-        for one in events(run, parts=request.part or None, wait=wait, deck=request.deck, lasting=seconds):
-            failed, since = failed or one.event == "failed", one.time
-            if output.output_format == "ndjson":
-                text = json.dumps(one._asdict(), allow_nan=False)
-            else:
-                seen = "-" if one.seen is None else f"{one.seen:.6g}"
-                text = f"{seen:>10}  {one.event:<10}  {one.message}"
-            click.echo(text_bytes(f"{in_words(text, output.output_format, output.columns)}\n"), nl=False)
-    except KeyboardInterrupt:
-        return
+    for one in events(run, parts=request.part or None, wait=wait, deck=request.deck, lasting=seconds):
+        failed, since = failed or one.event == "failed", one.time
+        if output.output_format == "ndjson":
+            text = json.dumps(one._asdict(), allow_nan=False)
+        else:
+            seen = "-" if one.seen is None else f"{one.seen:.6g}"
+            text = f"{seen:>10}  {one.event:<10}  {one.message}"
+        click.echo(text_bytes(f"{in_words(text, output.output_format, output.columns)}\n"), nl=False)
     output.finish(objection=failed or (seconds is not None and since is None))
 
 
@@ -161,7 +159,9 @@ def follow(run: str, wait: float | None, once: bool, lasting: float | None, requ
 @options.option("wait", Option("Time without force that counts as flight.  [default: by the deck]", POSITIVE, "T"))
 @options.option("after", Option("Nothing becomes rigid before.", NOT_NEGATIVE, "T"))
 @options.option(
-    "output_dir", Option("Folder for the copy, made where there is none.", "file", "DIR", short=("-o",)), required=True
+    "output_dir",
+    Option("Folder for the copy, made where there is none.", "output", "DIR", short=("-o",)),
+    required=True,
 )
 @options.takes("overwrite", "quiet")
 def first(

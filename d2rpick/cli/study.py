@@ -37,12 +37,12 @@ if TYPE_CHECKING:
     "--from", "listed", envvar="D2RPICK_STUDY_FROM", metavar="LIST", type=click_type("file"),
     help="File with more names of runs, one per line; - is stdin.",
 )  # fmt: skip
-@options.file("--resume", "Keep finished runs in FILE, and skip those that are in it and unchanged.")
+@options.file("--resume", "Keep finished runs in FILE, and skip those that are in it and unchanged.", kind="output")
 @options.option("jobs", Option(
     "Number of processes.  [default: one per core]", range(1, UNLIMITED), "N", instead_of=("scheduler",)
 ))  # fmt: skip
 @options.option("scheduler", Option(
-    "Use a running Dask cluster, which must see the same files.", metavar="ADDRESS", instead_of=("jobs",)
+    "Use a running Dask cluster, which must see the same files.", "program", "ADDRESS", instead_of=("jobs",)
 ))  # fmt: skip
 @options.takes(
     *(*READING, *LIMITS, "plot", "report", *RESULT),

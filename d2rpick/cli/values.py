@@ -13,7 +13,7 @@ from click.core import ParameterSource
 from d2rpick.api.cards import SETTINGS, Cards, solvers
 from d2rpick.api.request import JUDGING, UNLIMITED, Number, options_of, typed
 from d2rpick.base.errors import ConfigurationError
-from d2rpick.base.settings import RULE_KEYS, refuse_unknown
+from d2rpick.base.settings import RULE_KEYS, refuse_unknown, toml_text
 from d2rpick.cli import COMMANDS
 
 if TYPE_CHECKING:
@@ -66,6 +66,14 @@ class File(click.types.StringParamType):
         from click.shell_completion import CompletionItem
 
         return [CompletionItem(incomplete, type="file")]
+
+
+class OutputFile(File):
+    """Name of a file or folder to write, which no settings file may choose."""
+
+
+class Program(click.types.StringParamType):
+    """Command that is started, or the address of a cluster that computes: no settings file may choose either."""
 
 
 class Names(click.types.StringParamType):
@@ -153,6 +161,8 @@ class SolverName(click.types.StringParamType):
 _NAMED: Final = {
     "text": click.STRING,
     "file": File(),
+    "output": OutputFile(),
+    "program": Program(),
     "names": Names(),
     "parts": PartNames(),
     "channels": ChannelNames(),
@@ -202,6 +212,9 @@ def _given(
     """Options of a command that the settings name, with what stands there and where; unknown keys are refused."""
     tables = {name: one for name, one in table.items() if isinstance(one, Mapping)}
     shared = {name: one for name, one in table.items() if name not in (*tables, *RULE_KEYS)}
+    for name in COMMANDS:
+        if name in shared:
+            raise ConfigurationError(f"{source}: {name} is {toml_text(shared[name])}, a table was expected")
     refuse_unknown(shared, (*RULE_KEYS, *SETTINGS), source)
     refuse_unknown(tables, (*COMMANDS, "severity"), source)
     options = {spelled(one): one for one in command.params if isinstance(one, click.Option)}
@@ -214,12 +227,14 @@ def _given(
 
 def _value(ctx: click.Context, option: click.Option, value: Any, place: str) -> Any:
     """Read the value of an option; files lie where the settings do."""
-    several = option.multiple or option.nargs > 1
-    if isinstance(value, bool) != option.is_flag or isinstance(value, Mapping) or isinstance(value, list) > several:
-        kind = "true or false" if option.is_flag else "a list" if option.nargs > 1 else "a number or a text"
-        raise ConfigurationError(f"{place} is {value!r}, {kind} was expected")
+    _refuse_dangerous(option, place)
+    has_list = option.multiple or option.nargs > 1
+    values = value if has_list and isinstance(value, list) else [value]
+    if (option.nargs > 1 and not isinstance(value, list)) or not all(_fits(option, single) for single in values):
+        expected = "a list" if option.nargs > 1 else _expected_kind(option)
+        raise ConfigurationError(f"{place} is {toml_text(value)}, {expected} was expected")
     try:
-        found = option.type_cast_value(ctx, [value] if option.multiple and not isinstance(value, list) else value)
+        found = option.type_cast_value(ctx, values if has_list else value)
     except click.BadParameter as error:
         raise ConfigurationError(f"{place}: {error.message}") from None
     if not isinstance(option.type, File):
@@ -227,7 +242,38 @@ def _value(ctx: click.Context, option: click.Option, value: Any, place: str) -> 
     from pathlib import Path  # mostly no file is among the settings
 
     folder = os.path.relpath(Path(place.partition(": ")[0]).parent)
-    return [str(Path(folder, name)) for name in found] if several else str(Path(folder, found))
+    return [str(Path(folder, name)) for name in found] if has_list else str(Path(folder, found))
+
+
+def _refuse_dangerous(option: click.Option, place: str) -> None:
+    """Refuse what would start a program, write a file or replace one: the settings may be those of somebody else."""
+    if isinstance(option.type, OutputFile | Program) or option.name == "overwrite":
+        what = "programs, output files and overwrite are never taken from a file"
+    elif not option.expose_value:  # --help, --debug and others that are about one call
+        what = "this is never taken from a file"
+    else:
+        return
+    raise ConfigurationError(f"{place}: {what}; remove the key, and give the option on the command line")
+
+
+def _fits(option: click.Option, value: object) -> bool:
+    """Return whether a single value from a TOML file is of the kind that an option takes."""
+    if option.is_flag or isinstance(value, bool):
+        return option.is_flag and isinstance(value, bool)
+    if isinstance(option.type, File):
+        return isinstance(value, str)
+    if isinstance(value, int):
+        return abs(value) < UNLIMITED
+    return isinstance(value, str) or (isinstance(value, float) and not isinstance(option.type, click.IntRange))
+
+
+def _expected_kind(option: click.Option) -> str:
+    """Say which kind of value an option takes."""
+    if option.is_flag:
+        return "true or false"
+    if isinstance(option.type, File):
+        return "a text"
+    return "a whole number" if isinstance(option.type, click.IntRange) else "a number or a text"
 
 
 def _counts(ctx: click.Context, option: click.Option, given: Mapping[str, Any], asked: Mapping[Any, Any]) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 
 from d2rpick.histories.samples import outline
 from d2rpick.report.page import Explorer, Markup, join, resource, tag
-from d2rpick.report.suggestion import acceptable
+from d2rpick.report.suggestion import acceptable, mean_energy
 from d2rpick.report.tables import filled, measure, shell_line, short, shown
 from d2rpick.report.view import View, locked_in, response, scale_in, view_of
 
@@ -239,7 +239,7 @@ def _of_best(offer: Offer, best: Candidate, unit: str) -> dict[str, str | None]:
     kept, windows = offer.answer.kept, offer.answer.windows
     return {
         "residual": shown(best.residual, ".3f"),
-        "after": None if kept is None else f"{kept.low:.0%} to {kept.high:.0%} of what the reference has",
+        "after": None if kept is None else f"{mean_energy(kept)} of what the reference has",
         "level_error": shown(best.level_error if best.residual is None else None, ".3f"),
         "rigid": f"for {short(best.rigid_time)}{unit}, {best.rigid_fraction:.1%} of the record",
         "run_time": None if best.run_time_share is None else f"about {best.run_time_share:.0%} of the reference's",

@@ -11,6 +11,7 @@ from d2rpick.choice.study import Study, StudyRow, outliers, runs_of
 from d2rpick.histories.samples import outline
 from d2rpick.report import figures
 from d2rpick.report.figures import BETTER, FLIGHT, GOOD, REFERENCE, STRETCHES, SWITCHED, Figure, plain, shade, with_unit
+from d2rpick.report.figures_modal import draw_halfway, draw_residuals
 from d2rpick.report.situation import energy_name
 from d2rpick.report.study import short_names
 from d2rpick.report.view import Motion, View, merged, replayed_motion, scale_in, scale_of, view_of
@@ -67,10 +68,15 @@ def _draw(
     page: bool = False,
 ) -> Figure:
     motion = None if tr is None else replayed_motion(situation, tr)
-    figure, panels = figures.begin(2 if motion else 1, _HEIGHTS[bool(motion)], page=page)
+    modal = situation.basis == "modal" and tr is not None
+    below = modal or motion is not None
+    figure, panels = figures.begin(2 if below else 1, _HEIGHTS[below], page=page)
     seen = view_of(situation, *(() if tr is None else (tr,)), *(better[:2] if better else ()))
     _draw_energy(panels[0], situation, seen, candidates, bands)
-    if motion:
+    if modal and tr is not None:
+        draw_halfway(panels[0], situation, tr)
+        draw_residuals(panels[1], situation)
+    elif motion:
         _draw_motion(panels[1], motion)
     if better:
         _draw_better(panels, situation.at(better.td), better.tr)
@@ -81,7 +87,7 @@ def _draw(
     scale = scale_in(situation, seen, [situation.energy_td])
     figures.show_span(panels[0], (seen.start, seen.end), scale, seen.above)
     if page:
-        figures.arrange(figure, panels, _PANELS[bool(motion)])
+        figures.arrange(figure, panels, _PANELS[below])
     figures.mark_times(panels, tr, situation.td, page=page)
     return figure
 

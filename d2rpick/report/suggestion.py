@@ -14,6 +14,7 @@ from d2rpick.report.situation import heading
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from d2rpick.choice.aftermath import Kept
     from d2rpick.choice.answers import AcceptableWindow, Suggestion
     from d2rpick.choice.candidates import Pair
     from d2rpick.choice.quality import Grade, Quality
@@ -155,12 +156,18 @@ def _kept(answer: Suggestion, best: Candidate) -> str:
         return "everything: nothing vibrates in the flight up to td"
     kept, found = answer.kept, []
     if kept is not None:
-        found.append(f"{kept.low:.0%} to {kept.high:.0%} of the mean energy after td")
+        found.append(f"{mean_energy(kept)} of the mean energy after td")
     if best.residual is not None:
         found.append(f"the vibration is off by {_off(best)}")
     if answer.situation.vibration.keeps_nothing:
         found.append("no switch keeps this vibration")
     return "; ".join(found) or "unknown"
+
+
+def mean_energy(kept: Kept) -> str:
+    """Give the bounds of the mean energy after td, one number if they read alike."""
+    low, high = f"{kept.low:.0%}", f"{kept.high:.0%}"
+    return low if low == high else f"{low} to {high}"
 
 
 def _off(best: Candidate) -> str:

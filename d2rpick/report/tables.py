@@ -19,6 +19,10 @@ Rows = "Iterable[Sequence[Cell]]"
 # where that is not enough: no number is as long.
 _WORD: Final = 32
 _LEAST: Final = 12
+# Before these signs, which spreadsheets of some languages also know in full width, a formula begins: in a cell, and
+# behind a semicolon, which separates cells in languages that write decimals with a comma.  A number is none.
+_NUMBER: Final = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_FORMULA: Final = rf"(?:^|;)\s*(?=[=+\-@＝＋－＠])(?!{_NUMBER}\s*(?:;|$))"
 # A cell of more letters is text, which may go on in a further line before a column is left out.
 _TEXT: Final = 20
 
@@ -240,10 +244,14 @@ def in_markdown(text: str) -> str:
 def as_csv(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
     r"""Comma-separated at full precision, empty cells for what is not known, lines ending in a line feed.
 
+    A text that a spreadsheet would compute as a formula gets an apostrophe before it: names and titles come from files.
+
     Examples
     --------
     >>> as_csv(["tr", "sign_match", "residual"], [[0.1, True, None]])
     'tr,sign_match,residual\n0.1,true,\n'
+    >>> as_csv(["part", "energy"], [["=1+1", -2.5]])
+    "part,energy\n'=1+1,-2.5\n"
     """
     import csv
     import io
@@ -258,7 +266,9 @@ def as_csv(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
 def _exact(value: Cell) -> Cell:
     if isinstance(value, bool):
         return str(value).lower()
-    return printable(value) if isinstance(value, str) else value
+    if not isinstance(value, str):
+        return value
+    return re.sub(_FORMULA, r"\g<0>'", printable(value))
 
 
 def as_json(result: Any, indent: int | None = 2) -> str:

@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import ConfigurationError
-from d2rpick.base.settings import RULE_KEYS, nearest_settings, refuse_unknown
+from d2rpick.base.settings import RULE_KEYS, nearest_settings, refuse_unknown, toml_text
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.radioss_files import HEAD, recognises
 from d2rpick.deck.reader import Deck, read_deck
@@ -52,7 +52,8 @@ def find_rules(name: str) -> tuple[Rule, ...]:
 class Configuration(NamedTuple):
     """Which rules count, by id or its beginning (``D2R1``), and what weight single rules have.
 
-    ``ignore`` is stronger than ``select``; an empty ``select`` means all.  ``source`` names their file.
+    ``ignore`` is stronger than ``select``; an empty ``select`` means all.  ``source`` names their file, and ``notes``
+    those that are not used because another user owns them.
 
     Examples
     --------
@@ -65,6 +66,7 @@ class Configuration(NamedTuple):
     ignore: tuple[str, ...] = ()
     severity: Mapping[str, str] = MappingProxyType({})
     source: str = ""
+    notes: tuple[str, ...] = ()
 
     def selects(self, rule: str) -> bool:
         """Whether a rule counts."""
@@ -98,11 +100,11 @@ def read_configuration(table: Mapping[str, object], source: str = "", others: Co
     refuse_unknown(single, (*RULE_KEYS, *others), source)
     severity = table.get("severity", {})
     if not isinstance(severity, Mapping):
-        found = f"{source}: severity is {severity!r}"
+        found = f"{source}: severity is {toml_text(severity)}"
         raise ConfigurationError(f"{found}, a table like {{D2R104 = 'warning'}} was expected")
     for rule, value in severity.items():
         if value not in [*Severity]:
-            found = f"{source}: severity of {rule} is {value!r}"
+            found = f"{source}: severity of {rule} is {toml_text(value)}"
             raise ConfigurationError(f"{found}, one of {', '.join(Severity)} expected")
     return Configuration(_names(table, "select", source), _names(table, "ignore", source), dict(severity), source)
 
@@ -110,7 +112,7 @@ def read_configuration(table: Mapping[str, object], source: str = "", others: Co
 def _names(table: Mapping[str, object], key: str, source: str) -> tuple[str, ...]:
     value = table.get(key, [])
     if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
-        raise ConfigurationError(f"{source}: {key} is {value!r}, a list of rule ids was expected")
+        raise ConfigurationError(f"{source}: {key} is {toml_text(value)}, a list of rule ids was expected")
     return tuple(value)
 
 
@@ -135,7 +137,7 @@ class CheckedWindow(NamedTuple):
 class Checked(NamedTuple):
     """What was found in one deck; ``cards`` is the number of its switching cards, ``files`` all that were read.
 
-    ``remarks`` tell of comments in the deck that silence nothing.
+    ``remarks`` tell of comments in the deck that silence nothing, ``notes`` of settings that are not used.
     """
 
     deck: str
@@ -144,6 +146,7 @@ class Checked(NamedTuple):
     cards: int = 0
     files: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     solver: str = LS_DYNA
 
 
@@ -155,9 +158,11 @@ def configuration_for(deck: str, asked: Configuration, others: Collection[str] =
     ConfigurationError
         If it cannot be read, or names a rule that does not exist.
     """
-    found = read_configuration(*nearest_settings(os.path.dirname(deck)), others)  # noqa: PTH120  a name with a NUL byte has none
+    nearest = nearest_settings(os.path.dirname(deck))  # noqa: PTH120  a name with a NUL byte has none
+    found = read_configuration(nearest.table, nearest.source, others)
     found.verify(RULES)
-    return found._replace(select=asked.select or found.select, ignore=asked.ignore or found.ignore)
+    select, ignore = asked.select or found.select, asked.ignore or found.ignore
+    return found._replace(select=select, ignore=ignore, notes=nearest.notes)
 
 
 def check_deck(
@@ -200,7 +205,7 @@ def check_deck(
         order.setdefault(finding.file, len(order))
     findings.sort(key=lambda finding: (order[finding.file], finding.line, finding.column, finding.rule))
     windows, remarks = tuple(_told(case.windows.windows)), tuple(_remarks(case.deck))
-    return Checked(path, windows, tuple(findings), len(case.sets), tuple(case.deck.files), remarks, case.solver)
+    return Checked(path, windows, tuple(findings), len(case.sets), tuple(case.deck.files), remarks, solver=case.solver)
 
 
 def _told(windows: Iterable[Window]) -> Iterator[CheckedWindow]:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.histories.samples import median
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -101,7 +102,7 @@ def even_grid(time: Samples, energy: Samples) -> Grid:
     trend = np.polyval(np.polyfit(reach, values, 2), reach)
     power = np.abs(np.fft.rfft((values - trend) * np.hanning(time.size))) ** 2
     # white noise holds as much at the highest rates as anywhere
-    noise = _ABOVE_NOISE * float(np.median(power[power.size // 2 :]))
+    noise = _ABOVE_NOISE * float(median(power[power.size // 2 :]))
     running = np.cumsum(np.maximum(power - noise, 0.0))
     fastest, strongest = np.searchsorted(running, np.array([_ALL_POWER, _STRONG_POWER]) * running[-1]).tolist()
     wanted = np.clip(_STATES_PER_PERIOD * fastest, _FEWEST_STATES, _MOST_STATES)
@@ -150,8 +151,13 @@ class Spectrum(NamedTuple):
         return float(np.sqrt(np.mean(self.rest**2)))
 
     def turned(self) -> Spectrum:
-        """Give the same with lines, and what they leave over, of the opposite sign."""
-        return Spectrum(self.lines._replace(weights=-self.lines.weights), self.mean, -self.rest)
+        """Give the lines of the internal energy from those of the kinetic energy.
+
+        With the damping ratio z and s = sqrt(1 - z^2) the weight of a line of T is -(s + i z)^2 times that of V.
+        """
+        damping = -self.lines.poles.real / np.abs(self.lines.poles)
+        turn = (np.sqrt(1 - damping**2) + 1j * damping) ** 2
+        return Spectrum(self.lines._replace(weights=-self.lines.weights / turn), self.mean, -self.rest)
 
     def at(self, t: Samples | float) -> Samples:
         """Energy at each time, of the shape of ``t`` [energy]."""
@@ -171,7 +177,7 @@ class Prediction(NamedTuple):
     swing: float
 
     def turned(self) -> Prediction:
-        """Give the same with lines of the opposite sign."""
+        """Give what the lines of the kinetic energy say of those of the internal energy."""
         spectra = (self.spectrum.turned(), self.of_first_part.turned())
         return Prediction(*spectra, self.missed, self.swing)
 

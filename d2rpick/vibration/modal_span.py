@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.histories.samples import median
 from d2rpick.vibration.modal import ModalVibration, identify_modal
 from d2rpick.vibration.span import Span
 
@@ -102,7 +103,7 @@ def _reach(history: History, found: Described) -> Span:
     """Give the window in which the record stays with the modes, at least that in which they were found."""
     time, energy = history.time, history.energy
     inside = slice(*np.searchsorted(time, found.span).tolist())
-    spacing = float(np.median(np.diff(time[inside])))
+    spacing = float(median(np.diff(time[inside])))
     period = 2 * np.pi / max(float(found.vibration.reading.modes.poles.imag.max()), 1e-300)
     width = max(3, round(period / _MEANS_PER_PERIOD / spacing))
     before = _last_off(time[: inside.start], energy[: inside.start], found.vibration, width)

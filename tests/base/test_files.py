@@ -1,13 +1,14 @@
 """When a file is at rest: so long after its last change that no write is under way and a later one would show."""
 
 import os
+import stat
 import time
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from d2rpick.base.files import settled_state
+from d2rpick.base.files import settled_state, write_whole
 
 NOW = 1_700_000_000_123_456_789
 MOMENT, HOUR = 10**6, 3600 * 10**9
@@ -43,3 +44,56 @@ def test_a_file_is_waited_for_as_long_as_it_may_change_unseen(
     assert found
     assert found.size == size
     assert pauses == ([] if pause is None else [pytest.approx(pause)])
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o644, 0o664, 0o755, 0o444])
+def test_a_file_that_is_replaced_keeps_its_mode(tmp_path: Path, mode: int) -> None:
+    file = tmp_path / "report.html"
+    file.touch()
+    file.chmod(mode)
+    write_whole(file, b"new")
+    assert (file.read_bytes(), stat.S_IMODE(file.stat().st_mode)) == (b"new", mode)
+
+
+def test_a_file_behind_a_link_keeps_its_mode(tmp_path: Path) -> None:
+    file, link = tmp_path / "a", tmp_path / "b"
+    file.touch(mode=0o600)
+    link.symlink_to(file)
+    write_whole(link, b"new")
+    assert link.is_symlink()
+    assert stat.S_IMODE(file.stat().st_mode) == 0o600
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root gives files away")
+def test_a_file_that_is_replaced_keeps_its_owner(tmp_path: Path) -> None:
+    file = tmp_path / "a"
+    file.touch(mode=0o600)
+    os.chown(file, 12345, 23456)
+    write_whole(file, b"new")
+    found = file.stat()
+    assert (found.st_uid, found.st_gid, stat.S_IMODE(found.st_mode)) == (12345, 23456, 0o600)
+
+
+def test_a_new_file_has_the_mode_of_any_new_file(tmp_path: Path) -> None:
+    write_whole(tmp_path / "a", b"")
+    (tmp_path / "b").touch()
+    assert (tmp_path / "a").stat().st_mode == (tmp_path / "b").stat().st_mode
+
+
+@pytest.mark.parametrize("letter", ["x", "é", "\udcff"])
+def test_a_name_may_be_as_long_as_the_file_system_allows(tmp_path: Path, letter: str) -> None:
+    most = os.pathconf(tmp_path, "PC_NAME_MAX")
+    file = tmp_path / (letter * (most // len(os.fsencode(letter))))
+    for content in (b"old", b"new"):
+        write_whole(file, content)
+    assert [one.read_bytes() for one in tmp_path.iterdir()] == [b"new"]
+    with pytest.raises(OSError, match="too long"):
+        write_whole(tmp_path / f"{file.name}{letter}", b"")
+
+
+def test_what_cannot_be_written_leaves_the_file_and_nothing_beside_it(tmp_path: Path) -> None:
+    file = tmp_path / "a"
+    file.write_bytes(b"old")
+    with pytest.raises(TypeError):
+        write_whole(file, ["no bytes"])  # type: ignore[arg-type]
+    assert [(one.name, one.read_bytes()) for one in tmp_path.iterdir()] == [("a", b"old")]

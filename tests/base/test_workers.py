@@ -6,13 +6,13 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from subprocess import PIPE, Popen
+from subprocess import PIPE, Popen, check_output
 
 import pytest
 
 from d2rpick.base.errors import D2RPickError
 from d2rpick.base.workers import Cores, Farm, cores
-from tests.command import TIME_LIMIT
+from tests.command import ROOT, TIME_LIMIT
 
 FARMS = [Farm, lambda: Cores(2, __name__)]
 
@@ -54,6 +54,40 @@ def test_a_process_that_dies_is_told_for_its_item_alone() -> None:
     assert [found[n].result for n in sorted(found) if n not in dead] == [i**2 for i in range(13)]
 
 
+def children_of(process: int) -> dict[str, list[int]]:
+    """Ids of the processes below one, by what they are; of those that are forked the command is that of the first."""
+    listed = check_output(["ps", "-e", "-ww", "-o", "pid=,ppid=,args="], text=True).splitlines()
+    rows = [line.split(maxsplit=2) for line in listed]
+    kinds: dict[str, list[int]] = {"resource_tracker": [], "forkserver": [], "worker": []}
+    for pid, parent, command in rows:
+        kind = next((kind for kind in kinds if kind in command), "")
+        if int(parent) == process and kind:
+            kinds[kind].append(int(pid))
+    kinds["worker"] = [int(pid) for pid, parent, _ in rows if int(parent) in kinds["forkserver"]]
+    return kinds
+
+
+@pytest.mark.skipif(not Path("/proc").exists(), reason="processes are listed as on Linux")
+@pytest.mark.parametrize("victim", ["forkserver", "worker", "resource_tracker"])
+@pytest.mark.parametrize("after", [1, *(pytest.param(done, marks=pytest.mark.slow) for done in (0, 5))])
+def test_any_process_may_be_killed_without_a_loss(victim: str, after: int) -> None:
+    code = (
+        "from d2rpick.base.workers import Cores\n"
+        "from tests.base.test_workers import square\n"
+        "with Cores(2, 'tests.base.test_workers') as farm:\n"
+        "    for done, answer in enumerate(farm.answers(square, [0] * 12)):\n"
+        "        assert answer.error is None, answer\n"
+        f"        if done == {after}: print(flush=True); input()\n"
+        "print(done)\n"
+    )
+    with Popen([sys.executable, "-c", code], cwd=ROOT, stdin=PIPE, stdout=PIPE, text=True) as process:
+        assert process.stdout
+        assert process.stdout.readline() == "\n"
+        os.kill(children_of(process.pid)[victim][0], signal.SIGKILL)
+        assert process.communicate("\n", timeout=TIME_LIMIT)[0] == "11\n"
+    assert process.returncode == 0
+
+
 @pytest.mark.parametrize("farm", FARMS)
 def test_items_are_taken_as_there_is_room(farm: Callable[[], Farm]) -> None:
     taken = 0
@@ -74,8 +108,8 @@ def test_there_is_a_core() -> None:
 
 
 def test_an_interrupt_while_the_first_process_imports_is_no_traceback(tmp_path: Path) -> None:
-    # the import ends when it is told to, after the interrupt: how long that takes must not matter
-    (tmp_path / "slow.py").write_text("print('importing', flush=True); input(); print('imported')")
+    """A parent that goes on after the interrupt starts the process anew."""
+    (tmp_path / "slow.py").write_text("import sys; print('importing', flush=True); sys.stdin.readline()")
     code = (
         "import signal; from d2rpick.base.workers import Cores, begin\n"
         "signal.signal(signal.SIGINT, lambda *_: None)\n"  # an ignored one would be inherited
@@ -89,4 +123,4 @@ def test_an_interrupt_while_the_first_process_imports_is_no_traceback(tmp_path: 
         assert process.stdout
         assert process.stdout.readline() == "importing\n"
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the children too
-        assert process.communicate("\n", timeout=TIME_LIMIT) == ("imported\n7\n", "")
+        assert process.communicate("\n", timeout=TIME_LIMIT) == ("importing\n7\n", "")

@@ -290,7 +290,7 @@ def test_the_check_takes_its_history_and_what_fails_it_from_the_settings(setting
         ("margin = -1", "margin: -1 was found, a number of at least 0 was expected"),
         ("margin = [1]", "margin is [1], a number or a text was expected"),
         ("no-verify = 1", "no-verify is 1, true or false was expected"),
-        ("tolerance = true", "tolerance is True, a number or a text was expected"),
+        ("tolerance = true", "tolerance is true, a number or a text was expected"),
         ("fit-window = [1]", "fit-window: "),
     ],
 )

@@ -61,9 +61,9 @@ def test_the_published_record_gets_the_published_answer(source: str, digits: flo
 
 
 def test_what_a_pair_keeps_and_how_good_it_is_are_two_things() -> None:
-    poor = run("verify", "--tr", "0.0128853", "--td", "0.064", ENERGY).stdout.splitlines()
-    assert poor[0].startswith("verdict  verified: tr lies in the flight")
-    assert poor[1] == "quality  poor: the vibration after td is off by 96%"
+    poor = unwrapped(run("verify", "--tr", "0.0128853", "--td", "0.064", ENERGY).stdout)
+    assert poor.startswith("verdict verified: tr lies in the flight")
+    assert "quality poor: the vibration after td is off by 96% motion good vibration poor: the vibration" in poor
     alone = unwrapped(run("verify", "--tr", "0.0128853", "--td", "0.064", "--no-verify", ENERGY).stdout)
     assert alone.startswith(
         "verdict verified by the energy level alone: tr lies in the flight, its level is within the tolerance quality "

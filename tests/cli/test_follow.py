@@ -40,7 +40,7 @@ def test_a_run_that_flies_exits_with_0(tmp_path: Path) -> None:
     assert run("follow", "--once", str(tmp_path)).exit_code == 0
 
 
-def test_an_interrupt_ends_it_quietly(tmp_path: Path) -> None:
+def test_an_interrupt_ends_it_with_a_line(tmp_path: Path) -> None:
     data = gzip.decompress((ROOT / "tests/data/drop2_w123_T01.gz").read_bytes())
     (tmp_path / "carT01").write_bytes(data)
     with started("follow", "-f", "ndjson", str(tmp_path)) as process:
@@ -48,4 +48,4 @@ def test_an_interrupt_ends_it_quietly(tmp_path: Path) -> None:
         json.loads(process.stdout.readline())
         os.kill(process.pid, signal.SIGINT)
         _, errors = process.communicate()
-    assert (process.returncode, errors) == (0, b"")
+    assert (process.returncode, errors.strip()) == (-signal.SIGINT, b"d2rpick: interrupted")

@@ -4,6 +4,7 @@ import gzip
 import io
 import json
 import os
+import signal
 import subprocess
 import sys
 import zlib
@@ -15,7 +16,7 @@ import h5py
 import numpy as np
 import pytest
 
-from tests.command import ENERGY, GLSTAT, ROOT, TIME_LIMIT, answer, put, refused, run, started
+from tests.command import ENERGY, GLSTAT, INTERRUPTIBLE, ROOT, TIME_LIMIT, answer, put, refused, run, started
 from tests.made_binout import binout as made_binout
 from tests.made_t01 import t01, value
 from tests.text_files import glstat_text, matsum_text
@@ -62,7 +63,85 @@ def test_an_interrupt_during_the_imports_ends_the_program_without_a_word(
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(ROOT)]))
     with started("info", ENERGY) as process:
         assert process.communicate() == (b"", b"")
-    assert process.returncode == 130
+    assert process.returncode == -signal.SIGINT
+
+
+def test_an_interrupt_that_a_library_swallows_ends_the_program_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As one does that comes in the end of an object, or while an extension module is imported."""
+    (tmp_path / "click.py").write_text(
+        "import os, signal\n"
+        "class Swallowing:\n"
+        "    def __del__(self):\n"
+        "        os.kill(os.getpid(), signal.SIGINT)\n"
+        "Swallowing()\n"
+        "raise SystemExit(0)\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(ROOT)]))
+    with started("info", ENERGY) as process:
+        assert process.communicate() == (b"", b"")
+    assert process.returncode == -signal.SIGINT
+
+
+def test_an_interrupt_while_a_class_is_made_is_no_error_of_the_program(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Python 3.11 raises a RuntimeError for it."""
+    (tmp_path / "numpy.py").write_text(
+        "import os, signal\n"
+        "class Named:\n"
+        "    def __set_name__(self, owner, name):\n"
+        "        os.kill(os.getpid(), signal.SIGINT)\n"
+        "class Owner:\n"
+        "    value = Named()\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(ROOT)]))
+    with started("info", ENERGY) as process:
+        assert process.communicate()[1].strip() == b"d2rpick: interrupted"
+    assert process.returncode == -signal.SIGINT
+
+
+@pytest.mark.parametrize("command", ["study --td 0.064 --jobs 1", "info"])
+def test_an_interrupt_ends_the_loop_of_a_shell(tmp_path: Path, command: str) -> None:
+    """The pipe is opened by the reader of the run, which then waits in it for the interrupt."""
+    pipe = tmp_path / "run.csv"
+    os.mkfifo(pipe)
+    python = f'"{sys.executable}" -c "{INTERRUPTIBLE}"'
+    loop = f'for run in 1 2 3; do {python} {command} "{pipe}"; echo "after $?"; done'
+    trap = [
+        sys.executable,
+        "-c",
+        "import os, signal, sys; signal.signal(2, signal.SIG_DFL); os.execvp('bash', sys.argv[1:])",
+    ]
+    with (
+        subprocess.Popen(
+            [*trap, "bash", "-c", loop],
+            cwd=ROOT,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            start_new_session=True,
+        ) as shell,
+        pipe.open("wb"),
+    ):
+        os.killpg(shell.pid, signal.SIGINT)
+        told, errors = shell.communicate(timeout=TIME_LIMIT)
+    assert (shell.returncode, told, errors.strip()) == (-signal.SIGINT, b"", b"d2rpick: interrupted")
+
+
+def test_a_job_that_ignores_interrupts_goes_on(tmp_path: Path) -> None:
+    pipe = tmp_path / "run.csv"
+    os.mkfifo(pipe)
+    job = f'trap "" INT; exec "{sys.executable}" -m d2rpick info -f json "{pipe}"'
+    with (
+        subprocess.Popen(["bash", "-c", job], cwd=ROOT, stdout=subprocess.PIPE, start_new_session=True) as process,
+        pipe.open("wb") as writer,
+    ):
+        os.killpg(process.pid, signal.SIGINT)
+        writer.write(Path(ENERGY).read_bytes())
+        writer.close()
+        assert json.loads(process.communicate(timeout=TIME_LIMIT)[0])["states"] > 0
+    assert process.returncode == 0
 
 
 def test_a_closed_stderr_loses_no_result() -> None:

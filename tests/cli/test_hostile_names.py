@@ -105,6 +105,15 @@ def test_answers_name_a_file_without_control_codes(command: tuple[str, ...], her
             assert command[0] not in ("info", "study") or in_markdown(NAME) in result.stdout
 
 
+@pytest.mark.parametrize("name", ["=cmd.csv", "+1+2.csv", "-2+3.csv", "@sum.csv"])
+def test_a_spreadsheet_computes_no_name(name: str, here: Path) -> None:
+    shutil.copy(ENERGY, here / name)
+    for command in (("info",), ("study", "--jobs", "1", "--td", "0.064")):
+        (row,) = csv.DictReader(io.StringIO(run(*command, "-f", "csv", "--", name).stdout), strict=True)
+        assert row["source"] == f"'{name}"
+    assert json.loads(run("info", "-f", "json", "--", name).stdout)["source"] == [name]
+
+
 @pytest.mark.parametrize("asked", [("--td", "9"), ("--td", "0.064", "--energy", "no\nsuch\x1b")])
 def test_refusals_name_a_file_without_control_codes(asked: tuple[str, ...], here: Path) -> None:
     shutil.copy(ENERGY, here / NAME)

@@ -267,7 +267,7 @@ def test_the_energy_alone_is_said_to_be_uncertain_and_strict_refuses_it() -> Non
     found = answer("suggest", *ALONE)
     assert (found["flight"]["source"], found["flight"]["certain"]) == ("energy", False)
     pair = ("verify", "--tr", str(found["recommended"]["tr"]), *ALONE)
-    assert "verdict  verified by the energy level alone" in run(*pair).stdout
+    assert "verified by the energy level alone" in run(*pair).stdout
     assert [run(*asked, "--strict").exit_code for asked in (("suggest", *ALONE), pair)] == [1, 1]
     (message,) = (w["message"] for w in found["warnings"] if w["code"] == "flight-from-energy")
     assert "left unused for safety" in message

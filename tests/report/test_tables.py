@@ -1,8 +1,11 @@
 """What is narrowed loses no word but columns that may be left out, and is as wide as asked for where words allow it."""
 
+import csv
+import io
+
 from hypothesis import given, strategies as st
 
-from d2rpick.report.tables import Cell, as_text, wrapped
+from d2rpick.report.tables import Cell, as_csv, as_text, wrapped
 
 WORDS = st.lists(st.text("abc-1", min_size=1, max_size=9), max_size=6).map(" ".join)
 
@@ -51,3 +54,25 @@ def test_spare_columns_are_left_out_in_their_order_and_only_where_room_is_short(
     row: list[Cell] = [0.123456, "1.0e-04", "acceptable", "2.0e-05"]
     names = as_text(head, [row], width, ("+-", "tolerance")).split("\n")[0].split()
     assert names == (head if width >= 40 else head[:3] if width >= 31 else ["tr", "verdict"])
+
+
+def cell_of(value: Cell) -> str:
+    """What a reader of csv gets for a value."""
+    ((cell, last),) = csv.reader(io.StringIO(as_csv([], [[value, "last"]]).removeprefix("\n")), strict=True)
+    assert last == "last"
+    return cell
+
+
+@given(st.text("=+-@＝＋－＠ ;1.eEa", max_size=9))
+def test_no_text_of_a_csv_is_a_formula(text: str) -> None:
+    for piece in cell_of(text).split(";"):
+        begin = piece.strip()[:1]
+        if begin in "=+-@＝＋－＠":
+            assert not begin or isinstance(float(piece), float)
+    assert cell_of(text).replace("'", "") == text
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False) | st.integers())
+def test_a_number_in_a_csv_reads_back_to_itself(number: float) -> None:
+    assert float(cell_of(number)) == number == float(cell_of(str(number)))
+    assert cell_of(f"{number}; {number}") == f"{number}; {number}"

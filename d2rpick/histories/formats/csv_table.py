@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from d2rpick.base.errors import FormatError, listing
 from d2rpick.histories.database import Database
 from d2rpick.histories.formats.curves import Curves, find_curves
 from d2rpick.histories.formats.layout import Layout, as_number, find_layout, is_skipped, split, unique
+from d2rpick.histories.formats.plain_rows import plain_rows
 from d2rpick.histories.formats.text import UTF16, Text, is_whole, precisions
 from d2rpick.histories.names import internal_energies, is_time, meant, near_miss, quantity_of, refuse_other_quantity
 from d2rpick.histories.samples import of_one_run
@@ -224,70 +225,6 @@ def _is_whole(line: str, sample: Sequence[Sequence[str]], layout: Layout, used: 
 # Numbers in the rows: all at once where they are alike, line by line where they are not.
 
 
-def _plain_piece(text: Text, piece: bytes, layout: Layout, used: Sequence[int]) -> Samples | None:
-    """Columns of a piece, shape (rows, len(used)); None unless all rows have all cells and no line is between them."""
-    if layout.decimal == ",":
-        if b"." in piece:
-            return None
-        piece = piece.replace(b",", b".")
-    if b'"' in piece:
-        return None  # a separator in quotes is none
-    taken, chosen = [*range(layout.columns)], None
-    closed = piece[: piece.index(b"\n")].endswith((layout.separator or "\n").encode("latin-1"))
-    if layout.separator and (closed or sorted(used) != taken):
-        # otherwise the parser sees to it that each row has its cells
-        if not _has_all_cells(piece, layout):
-            return None
-        taken = sorted({0, *used})  # a comment would show in the first column
-        chosen = taken if closed or len(taken) < layout.columns else None
-    try:
-        # to import pandas pays in large texts alone
-        table = _by_pandas(piece, layout, chosen) if text.is_large else _by_numpy(piece, layout, chosen)
-    except ValueError:
-        return None
-    lines = np.count_nonzero(np.frombuffer(piece, np.uint8) == ord("\n"))  # count() is slow where they are short
-    if table.shape != (lines, len(taken)):
-        return None  # blank lines were passed over
-    return table if taken == [*used] else table[:, np.searchsorted(taken, used)]
-
-
-def _by_numpy(piece: bytes, layout: Layout, columns: Sequence[int] | None) -> Samples:
-    """Columns of rows of numbers, all unless some are chosen; ValueError where there is something else."""
-    lines = piece.decode("latin-1").split("\n")[:-1]  # no character beside those of latin-1 belongs to a number
-    if not lines[0].strip():
-        raise ValueError  # numpy passes over it, and warns where there is no other
-    return np.loadtxt(lines, delimiter=layout.separator, comments=None, ndmin=2, usecols=columns)
-
-
-def _by_pandas(piece: bytes, layout: Layout, columns: Sequence[int] | None) -> Samples:
-    """The same, five times as fast."""
-    from csv import QUOTE_NONE
-    from io import BytesIO
-
-    import pandas as pd
-
-    options: dict[str, Any] = {"header": None, "usecols": columns, "dtype": np.float64, "quoting": QUOTE_NONE}
-    options |= {"low_memory": False, "skip_blank_lines": False, "na_filter": False}
-    if [*map(int, pd.__version__.split(".")[:2])] < [3, 1]:  # from there on always exact, as `float` is
-        options["float_precision"] = "round_trip"
-    table: Samples = pd.read_csv(BytesIO(piece), sep=layout.separator or r"\s+", **options).to_numpy()
-    return table
-
-
-def _has_all_cells(piece: bytes, layout: Layout) -> bool:
-    """Whether all rows have their number of cells, and end alike."""
-    assert layout.separator
-    signs = np.frombuffer(piece, np.uint8)
-    ends = signs == ord("\n")
-    closed = piece.startswith(layout.separator.encode("latin-1"), piece.index(b"\n") - 1)  # rows end with a separator
-    each, rows = layout.columns + closed, np.count_nonzero(ends)
-    marks = np.flatnonzero(ends | (signs == ord(layout.separator)))
-    if marks.size != rows * each:
-        return False
-    table = marks.reshape(rows, each)
-    return bool(np.all(ends[table[:, -1]]) and (not closed or np.all(np.diff(table[:, -2:]) == 1)))
-
-
 def columns_of(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> list[Samples]:
     """Columns ``used`` of the rows from byte ``begin`` on, that of the times first, each of shape (rows,).
 
@@ -312,7 +249,7 @@ def _tables(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> Iter
     curve = _Curve(text.name, layout, used)
     number = layout.start + 1
     for piece in text.pieces(begin, large=text.is_large):
-        table = _plain_piece(text, piece, layout, used)
+        table = plain_rows(piece, layout, used, is_large=text.is_large)
         if table is not None and np.isfinite(table).all() and not curve.stops_before(float(table[0, 0])):
             rows = len(table)
             yield range(number, number + rows), table

@@ -37,7 +37,7 @@ class Text:
     piece = 1 << 17  # bytes: their cells stay in the processor's cache
     short = 1 << 16  # a text of no more bytes is looked at as a whole to judge the printed format
     some = 100  # of others so many lines from the start, the end and between
-    large = 1 << 21  # bytes of a large text: each call of pandas takes a millisecond
+    large = 1 << 22  # bytes of a large text: each call of pandas or scipy takes milliseconds
 
     def __init__(self, source: Source) -> None:
         self.name = source.name

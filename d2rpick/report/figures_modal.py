@@ -1,0 +1,35 @@
+"""What is drawn of a vibration of many modes: the energy halfway, and the residual of each tr."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from d2rpick.histories.samples import outline
+from d2rpick.report.figures import REFERENCE, STRETCHES, SWITCHED
+from d2rpick.vibration.measures import residual
+from d2rpick.vibration.model import NOTHING_KEPT
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from d2rpick.choice.situation import Situation
+
+
+def draw_halfway(axes: Axes, situation: Situation, tr: float) -> None:
+    """Mark the energy halfway between tr and td, which tells how the two deformations lie to each other."""
+    middle = (tr + situation.td) / 2
+    energy = situation.history.energy_at(middle)
+    axes.scatter([middle], [energy], s=40, marker="D", color=SWITCHED, zorder=3, label="halfway")
+
+
+def draw_residuals(axes: Axes, situation: Situation) -> None:
+    """Draw the residual of each tr in the flight, and that of a release without any vibration."""
+    profile, start = situation.vibration.profile, situation.earliest_tr
+    assert profile is not None
+    shown = profile.time >= (-np.inf if start is None else start)
+    residuals = np.asarray(residual(profile.error[shown], situation.kinetic_share or 0.0))
+    axes.plot(*outline(profile.time[shown], residuals, stretches=STRETCHES), color=REFERENCE, linewidth=1, label="_")
+    axes.axhline(NOTHING_KEPT, color=SWITCHED, linewidth=0.8, label="no vibration kept")
+    axes.set(ylabel="residual R of tr", ylim=(0, None))

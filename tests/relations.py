@@ -1,0 +1,355 @@
+"""Relations between answers: how a choice follows when its history is changed in a known way.
+
+A history is made from a seed and a number: a load, then a flight in which one or two modes vibrate, then a landing.  A
+`Relation` writes it twice, as it is and changed.  Both are read and asked for the same choice.  The second answer must
+be the first one, moved and scaled as the change says: exactly if the reader gets the same numbers, else within the
+stated ``+-`` of both.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+from typing import Final, NamedTuple
+
+import h5py
+import numpy as np
+
+from d2rpick.api.runs import extracted, read as open_files
+from d2rpick.choice.answers import suggest_of
+from d2rpick.choice.question import Settings, read
+from d2rpick.histories.history import Samples
+from d2rpick.histories.names import Selection
+from tests.made_binout import LsdaWriter
+from tests.made_t01 import MadePart, headed
+from tests.text_files import glstat_text, matsum_text
+
+_IDS: Final = (7, 3)  # of the parts: the first vibrates, the second is elsewhere
+_ROUNDED: Final = 1e-9  # of the time or the residual: what another scale changes by rounding
+_TEXTS: Final = {",": ".", ";": ",", "\t": "."}  # separators of a table with their decimal signs
+
+
+class MadeRun(NamedTuple):
+    """A run: times (n,), internal and kinetic energy of the part that vibrates, the energy of another part, td."""
+
+    time: Samples
+    internal: Samples
+    kinetic: Samples
+    other: Samples
+    load_end: float
+    landing: float
+    td: float
+
+
+class Asked(NamedTuple):
+    """Files of a run, and the choice that is asked of them."""
+
+    names: list[str]
+    td: float
+    after: float
+    landing: float | None = None
+    parts: int | None = None
+
+
+class Relation(NamedTuple):
+    """``change`` writes a run twice into a folder.
+
+    Times of the second answer are ``scale`` times those of the first, later by ``shift`` spans of the record.  If it is
+    ``exact``, everything must be the same to rounding.  If it ``may_refuse``, the second history may be too coarse to
+    choose from.
+    """
+
+    change: Callable[[MadeRun, Path, Random], tuple[Asked, Asked]]
+    exact: bool = True
+    scale: float = 1.0
+    shift: float = 0.0
+    may_refuse: bool = False
+
+
+class Chosen(NamedTuple):
+    """What is compared of an answer; None for what nothing can be said of."""
+
+    tr: float | None
+    half_width: float
+    residual: float | None
+    residual_width: float
+    grade: str
+    basis: str
+
+
+def make_run(random: Random) -> MadeRun:
+    """Make a run whose vibration, load and sampling are random; the energy has two periods in one of the vibration."""
+    mode_count = random.choice((1, 1, 2))
+    period = 10 ** random.uniform(-3, 0)
+    flight = random.uniform(3, 8) * period
+    load = random.uniform(0.5, 3) * period
+    step = period / random.choice((20, 30, 50, 80))
+    states = math.ceil((load + 1.3 * flight) / step)
+    time: Samples = np.linspace(0.0, step * (states - 1), states)
+    energy = 10 ** random.uniform(-2, 6)
+    damping = random.uniform(0.0, 0.6) / flight
+    internal, kinetic = np.zeros_like(time), np.zeros_like(time)
+    for mode in range(mode_count):
+        size = energy * (1.0 if mode == 0 else random.uniform(0.02, 0.3))
+        phase = random.uniform(0, 2 * math.pi)
+        angle = 2 * math.pi / period * (1.0 if mode == 0 else random.uniform(1.3, 3.5)) * (time - load) + phase
+        envelope = size * np.exp(-damping * np.maximum(time - load, 0.0))
+        internal += envelope * np.sin(angle) ** 2
+        kinetic += envelope * np.cos(angle) ** 2
+    loaded = np.clip(time / load, 0.0, 1.0)
+    landing = load + flight
+    pushed = energy * 3 * np.maximum(time - landing, 0.0) / flight
+    internal = internal * np.sin(math.pi / 2 * loaded) ** 2 + pushed
+    other = energy * 0.2 * np.sin(math.pi / 2 * loaded) ** 2
+    return MadeRun(time, internal, kinetic, other, load, landing, load + random.uniform(0.5, 0.95) * flight)
+
+
+# How a run is written.
+
+
+def csv(folder: Path, columns: Mapping[str, Samples], name: str = "run.csv", separator: str = ",") -> list[str]:
+    """Write columns with all digits; the names of the files."""
+    rows = (
+        separator.join(map(repr, row)) for row in zip(*(column.tolist() for column in columns.values()), strict=True)
+    )
+    text = "\n".join([separator.join(columns), *rows, ""])
+    file = folder / name
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(text if _TEXTS[separator] == "." else text.replace(".", _TEXTS[separator]))
+    return [str(file)]
+
+
+def columns_of(run: MadeRun) -> dict[str, Samples]:
+    return {"time": run.time, "internal_energy": run.internal}
+
+
+def hdf5(folder: Path, columns: Mapping[str, Samples]) -> list[str]:
+    with h5py.File(folder / "run.h5", "w") as file:
+        for name, column in columns.items():
+            file[name] = column
+    return [str(folder / "run.h5")]
+
+
+def put(folder: Path, name: str, content: bytes) -> list[str]:
+    (folder / name).write_bytes(content)
+    return [str(folder / name)]
+
+
+def asked(run: MadeRun, names: list[str], *, parts: int | None = None) -> Asked:
+    return Asked(names, run.td, run.load_end, run.landing, parts)
+
+
+def rounded(run: MadeRun, digits: int) -> MadeRun:
+    """Give a run as a text with so many digits holds it."""
+
+    def printed(column: Samples) -> Samples:
+        return np.array([float(f"{value:.{digits - 1}E}") for value in column])
+
+    return run._replace(time=printed(run.time), internal=printed(run.internal), other=printed(run.other))
+
+
+def single(run: MadeRun) -> MadeRun:
+    """Give a run as a file in single precision holds it."""
+
+    def stored(column: Samples) -> Samples:
+        return column.astype(np.float32).astype(float)
+
+    return run._replace(time=stored(run.time), internal=stored(run.internal), other=stored(run.other))
+
+
+def binout(folder: Path, run: MadeRun) -> list[str]:
+    """Write the energies of two parts as LS-DYNA does in a binout in single precision."""
+    made = LsdaWriter()
+    made.cd("/matsum/metadata")
+    made.put("ids", _IDS, "i4")
+    for state, time in enumerate(run.time):
+        made.cd(f"/matsum/d{state + 1:06d}")
+        made.put("time", [time], "f4")
+        made.put("internal_energy", [run.internal[state], run.other[state]], "f4")
+    made.table()
+    return put(folder, "binout", bytes(made.data))
+
+
+def time_history(folder: Path, run: MadeRun) -> list[str]:
+    """Write the energies of two parts as Radioss does."""
+    parts = [MadePart(id_, f"part {id_}", (1,)) for id_ in _IDS]
+    made = headed(parts, globals_=2)
+    for time, internal, other in zip(run.time, run.internal, run.other, strict=True):
+        made.state(time, [internal + other, 0.0], [internal, other])
+    return put(folder, "runT01", bytes(made.data))
+
+
+def matsum(folder: Path, run: MadeRun, ids: Sequence[int] = _IDS, name: str = "matsum") -> list[str]:
+    energies = dict(zip(_IDS, (run.internal, run.other), strict=True))
+    return put(folder, name, matsum_text(run.time, ids, np.stack([energies[id_] for id_ in ids], axis=1)))
+
+
+# Changes that must not matter, or matter in a known way.
+
+
+def same_numbers(
+    write: Callable[[Path, MadeRun], list[str]], as_stored: Callable[[MadeRun], MadeRun], parts: int | None = None
+) -> Callable[[MadeRun, Path, Random], tuple[Asked, Asked]]:
+    """Write a table of the numbers that another format stores, and that format."""
+
+    def change(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
+        table = csv(folder, columns_of(as_stored(run)))
+        return asked(run, table), asked(run, write(folder, run), parts=parts)
+
+    return change
+
+
+def in_single_precision(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
+    return asked(run, csv(folder, columns_of(run))), asked(run, csv(folder, columns_of(single(run)), "single.csv"))
+
+
+def other_order_of_parts(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
+    turned = matsum(folder, run, _IDS[::-1], "matsum_turned")
+    return asked(run, matsum(folder, run), parts=_IDS[0]), asked(run, turned, parts=_IDS[0])
+
+
+def further_columns(run: MadeRun, folder: Path, random: Random) -> tuple[Asked, Asked]:
+    more = {"pressure": np.array([random.gauss(0, 1) for _ in run.time]), **columns_of(run), "status": run.other}
+    in_front = {"time": run.time, **more}
+    return asked(run, csv(folder, columns_of(run))), asked(run, csv(folder, in_front, "more.csv"))
+
+
+def kinetic_energy_too(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
+    more = {**columns_of(run), "kinetic_energy": run.kinetic}
+    return asked(run, csv(folder, columns_of(run))), asked(run, csv(folder, more, "more.csv"))
+
+
+def scaled(time: float, energy: float, shift: float = 0.0) -> Callable[[MadeRun, Path, Random], tuple[Asked, Asked]]:
+    """Write times and energies in other units, and times from another origin, so many spans of the record later."""
+
+    def change(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
+        later = shift * float(run.time[-1])
+        columns = {"time": time * run.time + later, "internal_energy": energy * run.internal}
+        again = Asked(
+            csv(folder, columns, "other.csv"), time * run.td + later, time * run.load_end + later,
+            time * run.landing + later,
+        )  # fmt: skip
+        return asked(run, csv(folder, columns_of(run))), again
+
+    return change
+
+
+def doubled_last_state(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
+    doubled = {name: np.append(column, column[-1]) for name, column in columns_of(run).items()}
+    return asked(run, csv(folder, columns_of(run))), asked(run, csv(folder, doubled, "doubled.csv"))
+
+
+def cut_after_the_landing(run: MadeRun, folder: Path, random: Random) -> tuple[Asked, Asked]:
+    end = np.searchsorted(run.time, run.landing) + random.randrange(1, 6)
+    cut = {name: column[:end] for name, column in columns_of(run).items()}
+    return asked(run, csv(folder, columns_of(run))), asked(run, csv(folder, cut, "cut.csv"))
+
+
+def legs_in_another_order(run: MadeRun, folder: Path, random: Random) -> tuple[Asked, Asked]:
+    cuts = sorted(random.sample(range(5, len(run.time) - 5), 2))
+    names = []
+    for number, (begin, end) in enumerate(zip([0, *cuts], [*cuts, len(run.time)], strict=True)):
+        leg = {name: column[max(begin - 2, 0) : end] for name, column in columns_of(run).items()}
+        names += csv(folder, leg, f"leg{number}.csv")
+    turned = random.sample(names, len(names))
+    return asked(run, names), asked(run, turned)
+
+
+def every_second_state(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
+    thinned = {name: column[::2] for name, column in columns_of(run).items()}
+    return asked(run, csv(folder, columns_of(run))), asked(run, csv(folder, thinned, "thinned.csv"))
+
+
+def other_names(run: MadeRun, folder: Path, random: Random) -> tuple[Asked, Asked]:
+    name = random.choice(("a b/glstat.csv", "Läufe/T01", "--td/1.csv", "x" * 200, "=cmd/matsum.txt", ".hidden"))
+    return asked(run, csv(folder, columns_of(run))), asked(run, csv(folder, columns_of(run), name))
+
+
+def other_signs(run: MadeRun, folder: Path, random: Random) -> tuple[Asked, Asked]:
+    other = csv(folder, columns_of(run), "other.txt", random.choice((";", "\t")))
+    return asked(run, csv(folder, columns_of(run))), asked(run, other)
+
+
+def extracted_table(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
+    names = matsum(folder, run)
+    table, _notes = extracted(open_files(names).files, Selection(parts=(str(_IDS[0]),)))
+    columns = {name: table[name] for name in ("time", "internal_energy")}
+    return asked(run, names, parts=_IDS[0]), asked(run, csv(folder, columns))
+
+
+RELATIONS: Final[Mapping[str, Relation]] = {
+    "hdf5": Relation(same_numbers(lambda folder, run: hdf5(folder, columns_of(run)), lambda run: run)),
+    "glstat": Relation(
+        same_numbers(
+            lambda folder, run: put(folder, "glstat", glstat_text(run.time, run.internal)), lambda run: rounded(run, 6)
+        ),
+        exact=False,
+    ),
+    "matsum": Relation(same_numbers(matsum, lambda run: rounded(run, 5), _IDS[0]), exact=False),
+    "binout": Relation(same_numbers(binout, single, _IDS[0]), exact=False),
+    "radioss-th": Relation(same_numbers(time_history, single, _IDS[0]), exact=False),
+    "single precision": Relation(in_single_precision, exact=False),
+    "order of parts": Relation(other_order_of_parts),
+    "further columns": Relation(further_columns),
+    "kinetic energy too": Relation(kinetic_energy_too, exact=False),
+    "time later": Relation(scaled(1.0, 1.0, shift=1.0), exact=False, shift=1.0),
+    "time in ms": Relation(scaled(1e3, 1.0), exact=False, scale=1e3),
+    "time times 64": Relation(scaled(64.0, 1.0), scale=64.0),
+    "energy in mJ": Relation(scaled(1.0, 1e3), exact=False),
+    "energy over 1024": Relation(scaled(1.0, 2.0**-10)),
+    "extracted table": Relation(extracted_table, exact=False),
+    "doubled last state": Relation(doubled_last_state),
+    "cut after the landing": Relation(cut_after_the_landing),
+    "order of legs": Relation(legs_in_another_order),
+    "every second state": Relation(every_second_state, exact=False, may_refuse=True),
+    "other names": Relation(other_names),
+    "other signs": Relation(other_signs),
+}
+
+
+def choose(question: Asked) -> Chosen:
+    """Read the files and choose tr."""
+    parts = () if question.parts is None else (str(question.parts),)
+    settings = Settings(after=question.after, landing=question.landing, margin=0.0)
+    answer = suggest_of(read(question.names, Selection(parts=parts)), question.td, settings, with_better=False)
+    best = answer.chosen
+    grade = answer.quality.grade if answer.quality else ""
+    if best is None:
+        return Chosen(None, 0.0, None, 0.0, grade, answer.basis)
+    half_width = (best.tr_high - best.tr_low) / 2 if best.tr_low is not None and best.tr_high is not None else 0.0
+    above = (best.residual_high or 0.0) - (best.residual or 0.0)
+    return Chosen(best.tr, half_width, best.residual, max(above, 0.0), grade, answer.basis)
+
+
+def difference(relation: Relation, run: MadeRun, first: Chosen, second: Chosen) -> str:
+    """Say how the second answer is not the first one as the relation moves it; nothing if it is."""
+    if second.tr is None and relation.may_refuse:
+        return ""
+    if (first.tr is None) != (second.tr is None):
+        return f"tr {first.tr} became {second.tr}"
+    if first.tr is not None and second.tr is not None:
+        span = relation.scale * float(run.time[-1])
+        moved = relation.scale * first.tr + relation.shift * float(run.time[-1])
+        stated = 0.0 if relation.exact else relation.scale * first.half_width + second.half_width
+        if abs(second.tr - moved) > stated + _ROUNDED * span:
+            return f"tr {moved:.9g} became {second.tr:.9g}, stated to {stated:.2g}"
+    if first.residual is not None and second.residual is not None:
+        stated = 0.0 if relation.exact else first.residual_width + second.residual_width
+        if abs(second.residual - first.residual) > stated + 1e-6:
+            return f"residual {first.residual:.6g} became {second.residual:.6g}, stated to {stated:.2g}"
+    if relation.exact and (first.grade, first.basis) != (second.grade, second.basis):
+        return f"{first.grade} by {first.basis} became {second.grade} by {second.basis}"
+    return ""
+
+
+def check_relation(name: str, random: Random) -> bool:
+    """Compare the two answers of one history; whether a tr was chosen. AssertionError if they do not follow."""
+    relation, run = RELATIONS[name], make_run(random)
+    with TemporaryDirectory() as folder:
+        first, second = (choose(question) for question in relation.change(run, Path(folder), random))
+    wrong = difference(relation, run, first, second)
+    assert not wrong, wrong
+    return first.tr is not None and second.tr is not None

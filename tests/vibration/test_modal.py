@@ -1,0 +1,181 @@
+"""The residual of any pair from the energy alone: against the motion of the modes, and where it must be refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+from d2rpick.choice.answers import suggest, verify
+from d2rpick.choice.question import Settings
+from d2rpick.histories.history import Samples
+from d2rpick.vibration.measures import kinetic_share, lock_in_error, residual
+from d2rpick.vibration.modal import ModalVibration, confirm, identify_modal
+from tests.energies import of, sure
+from tests.vibration.linear_structure import LinearStructure
+
+TIME = np.linspace(0.0, 9.0, 1801)
+EVEN = np.linspace(0.0, 9.0, 40)
+PAIRS = np.array([(tr, td) for tr in EVEN for td in EVEN if tr < td]).T
+
+
+def residuals(vibration: ModalVibration, tr: Samples, td: Samples) -> Samples:
+    """What follows from the lock-in error and the kinetic share."""
+    return residual(lock_in_error(vibration, tr, td), kinetic_share(vibration, td))
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 10**6), st.integers(1, 6), st.sampled_from([0.0, 3.0]))
+def test_the_residual_of_any_pair_is_that_of_the_motion(seed: int, count: int, static: float) -> None:
+    structure = LinearStructure.draw(seed, count)
+    found = sure(identify_modal(TIME, structure.elastic_energy(TIME) + static))
+    assert found.signed, found.doubts
+    true = structure.residual(*PAIRS)
+    assert np.sqrt(np.mean((residuals(found, *PAIRS) - true) ** 2)) < 0.02
+    _, low, high = found.residual_band(residuals(found, *PAIRS), *PAIRS)
+    assert np.mean((true > low - 1e-3) & (true < high + 1e-3)) > 0.9
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.integers(0, 10**6), st.integers(2, 4), st.sampled_from([0.01, 0.02]))
+def test_noise_widens_the_band_and_the_truth_stays_in_it(seed: int, count: int, noise: float) -> None:
+    structure = LinearStructure.draw(seed, count)
+    energy = structure.elastic_energy(TIME)
+    scatter = noise * np.ptp(energy) * np.random.default_rng(seed).standard_normal(TIME.size)
+    clean, noisy = (sure(identify_modal(TIME, one)) for one in (energy, energy + scatter))
+    true = structure.residual(*PAIRS)
+    _, low, high = noisy.residual_band(residuals(noisy, *PAIRS), *PAIRS)
+    assert np.mean((true > low - 1e-3) & (true < high + 1e-3)) > 0.9
+    assert np.median(noisy.half_width(*PAIRS)) > np.median(clean.half_width(*PAIRS))
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.integers(0, 10**6), st.integers(1, 5))
+def test_the_kinetic_energy_says_the_same(seed: int, count: int) -> None:
+    structure = LinearStructure.draw(seed, count)
+    internal = sure(identify_modal(TIME, structure.elastic_energy(TIME)))
+    kinetic = sure(identify_modal(TIME, structure.kinetic_energy(TIME) + 40.0 * np.ones(TIME.size), kinetic=True))
+    assert np.sqrt(np.mean((residuals(kinetic, *PAIRS) - structure.residual(*PAIRS)) ** 2)) < 0.02
+    both = sure(confirm(internal, kinetic))
+    assert both.second is kinetic.reading
+    assert np.all(both.half_width(*PAIRS) >= internal.half_width(*PAIRS))
+
+
+def test_the_kinetic_energy_decides_where_the_internal_one_is_refused() -> None:
+    structure = LinearStructure.draw(4, 3)
+    kinetic = sure(identify_modal(TIME, structure.kinetic_energy(TIME), kinetic=True))
+    drifting = identify_modal(TIME, np.cumsum(np.random.default_rng(1).standard_normal(TIME.size)))
+    assert confirm(drifting, kinetic) is kinetic
+    assert confirm(drifting, None) is drifting
+    assert "kinetic energy" in kinetic.told
+
+
+@pytest.mark.parametrize("stretch", [0.3, 1.0])
+def test_a_stretch_by_spin_is_no_mode(stretch: float) -> None:
+    structure = LinearStructure.draw(11, 3)
+    about = structure.deformations(TIME)
+    about[0] += stretch * structure.amplitude[0]
+    found = sure(identify_modal(TIME, np.sum(about**2, axis=0)))
+    assert not found.reading.is_mode.all()
+    assert np.sqrt(np.mean((residuals(found, *PAIRS) - structure.residual(*PAIRS)) ** 2)) < 0.03
+
+
+def rubbed() -> Samples:
+    """Energy of a mass that slides with friction on its spring: its swings fall by the same length each time."""
+    position, speed, step = 1.0, 0.0, 2e-3
+    positions = []
+    for _ in range(4500):
+        speed -= step * (40.0 * position + 0.3 * np.sign(speed))
+        position += step * speed
+        positions.append(position)
+    return np.square(positions)
+
+
+@pytest.mark.parametrize(
+    ("energy", "reason"),
+    [
+        (rubbed()[::3], "predict|lines"),
+        (np.cumsum(np.random.default_rng(2).standard_normal(1500)), "predict|lines|mean"),
+        (np.cos(np.arange(400) * 1.42) ** 2, "states per period"),
+    ],
+    ids=["friction", "random walk", "coarse"],
+)
+def test_what_is_no_linear_structure_is_refused(energy: Samples, reason: str) -> None:
+    found = sure(identify_modal(np.linspace(0.0, 9.0, energy.size), energy))
+    refusal = sure(found.doubts.refusal)
+    assert any(word in refusal for word in reason.split("|")), refusal
+
+
+@pytest.mark.parametrize("energy", [np.full(500, 3.0), 2.0 - np.linspace(0, 1, 500)], ids=["still", "no swing"])
+def test_without_lines_there_are_no_modes(energy: Samples) -> None:
+    found = identify_modal(np.linspace(0.0, 1.0, energy.size), energy)
+    assert found is None or not found.signed
+    assert identify_modal(np.linspace(0.0, 1.0, 20), np.arange(20.0)) is None
+
+
+def test_nothing_above_single_precision_is_no_vibration() -> None:
+    random = np.random.default_rng(1)
+    assert identify_modal(TIME, 1e3 + 1e-5 * random.standard_normal(TIME.size)) is None
+
+
+STRUCTURE = LinearStructure.draw(21, 5)
+LOADED = of(np.where(TIME < 1.0, 60.0 * (1.0 - TIME), 0.0) + STRUCTURE.elastic_energy(TIME), TIME)
+
+
+def true_residual(tr: float, td: float) -> float:
+    """R of one pair, by the motion."""
+    return float(STRUCTURE.residual(np.array([tr]), np.array([td]))[0])
+
+
+@pytest.mark.parametrize("td", [5.0, 6.3, 7.7, 8.6])
+def test_the_pair_that_is_recommended_is_the_best_there_is(td: float) -> None:
+    answer = suggest(LOADED, td, Settings(after=1.0))
+    best = sure(answer.chosen)
+    assert answer.situation.basis == "modal"
+    assert best.residual == pytest.approx(true_residual(best.tr, td), abs=0.02)
+    early = np.linspace(1.0, td - 0.25 * (td - 1.0), 2000)
+    oracle = float(STRUCTURE.residual(early, np.full(early.size, td)).min())
+    assert true_residual(best.tr, td) < oracle + 0.03
+    verdict = verify(LOADED, best.tr, td, Settings(after=1.0))
+    assert verdict.candidate.residual == pytest.approx(best.residual, abs=1e-9)
+    assert sure(verdict.quality).grade == sure(answer.quality).grade
+
+
+def test_no_pair_worse_than_no_vibration_is_accepted_while_a_better_one_is_there() -> None:
+    answer = suggest(LOADED, 7.7, Settings(after=1.0))
+    assert min(sure(one.residual) for one in answer.candidates) < 1
+    assert all(sure(one.residual) <= 1.01 for one in answer.candidates if one.acceptable)
+    worst = max(np.linspace(1.1, 6.0, 500).tolist(), key=lambda tr: true_residual(tr, 7.7))
+    verdict = verify(LOADED, worst, 7.7, Settings(after=1.0))
+    assert not verdict.verified
+    assert any("which a release without any vibration has" in reason for reason in verdict.reasons)
+
+
+def test_if_nothing_keeps_the_vibration_the_least_deformed_time_is_offered() -> None:
+    """At a td where nearly all energy is kinetic, no tr is better than a release without any vibration."""
+    tds = np.linspace(4.0, 8.5, 600)
+    share = STRUCTURE.kinetic_energy(tds) / (STRUCTURE.kinetic_energy(tds) + STRUCTURE.elastic_energy(tds))
+    td = float(tds[np.argmax(share)])
+    situation = suggest(LOADED, td, Settings(after=1.0)).situation
+    vibration = situation.vibration
+    raised = replace(vibration, compared=sure(vibration.compared)._replace(first=float(td - 0.4)))
+    for one in (vibration, raised):
+        if one.keeps_nothing:
+            moments = one.moments(0.2)
+            energies = STRUCTURE.elastic_energy(moments.tr)
+            assert energies.min() < 0.2 * STRUCTURE.elastic_energy(TIME).max()
+    assert situation.kinetic_share is not None
+
+
+def test_td_is_chosen_where_the_residual_is_least() -> None:
+    from tests.energies import suggest_in_window
+
+    answer = suggest_in_window(LOADED, (4.0, 8.8), Settings(after=1.0))
+    best = sure(answer.recommended)
+    assert best.rigid_time > 0.4 * (8.8 - 1.0)
+    assert true_residual(best.tr, best.td) == pytest.approx(sure(best.residual), abs=0.02)
+    for td in (5.0, 6.3, 7.7, 8.6):
+        other = suggest(LOADED, td, Settings(after=1.0)).recommended
+        assert sure(best.residual) <= sure(sure(other).residual) + 0.02 or sure(other).rigid_time < 3.9
