@@ -133,7 +133,7 @@ def test_every_residual_of_the_nodes_is_near_the_predicted_one() -> None:
     assert off[TOTALS["case"] == "ROLL"].max() < 0.045
 
 
-@pytest.mark.parametrize(("case", "best"), [("FRAME", 0.3), ("ROLL", 0.65)])
+@pytest.mark.parametrize(("case", "best"), [("FRAME", 0.3), pytest.param("ROLL", 0.65, marks=pytest.mark.slow)])
 def test_the_histories_of_the_references_give_the_residuals_of_the_results(case: str, best: float) -> None:
     reference = d2rpick.read(RESULTS / f"{case.lower()}_reference.csv")
     rows = TOTALS[TOTALS["case"] == case]
