@@ -25,6 +25,12 @@ _DROPS: Final = {
     "drop2_pert": "not switched, start changed by 1e-6", "drop2_null1": "rigid for 0.1 ms",
     "drop2_w1": "first fall", "drop2_w2": "second flight", "drop2_w123": "three flights planned at once",
 }  # fmt: skip
+# Cases whose vibration after td is compared node by node, and the parts that absorb their landing.
+_VIBRATING: Final = {
+    "ROLL": "shell box", "FRAME": "frame, 5 m/s", "FRAME-FAST": "frame, 10 m/s", "FRAME-SLOW": "frame, 2.5 m/s",
+    "CAR": "car",
+}  # fmt: skip
+_ABSORBS: Final = 0.05  # least share of the rise of the total energy in a part whose energy is compared
 
 
 def table(name: str) -> NDArray[Any]:
@@ -106,8 +112,43 @@ def drop() -> Figure:
     return _done(figure)
 
 
+def absorbing_parts(rows: NDArray[Any]) -> NDArray[np.bool_]:
+    """Tell which rows of the vibration table are parts that take a fair share of the energy of the landing."""
+    total = {row["case"]: row["rise_J"] for row in rows if row["energy"] == "total"}
+    shares = rows["rise_J"] / [total[case] for case in rows["case"]]
+    return np.asarray((rows["energy"] != "total") & (shares >= _ABSORBS))
+
+
+def vibration() -> Figure:
+    """Residuals by all nodes against the predicted ones, and what differs after the landing against the worth."""
+    rows = table("vibration")
+    switched = rows[~np.isnan(rows["tr_s"])]
+    absorbing = absorbing_parts(switched)
+    figure = Figure(figsize=(10, 4.2), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    left.plot([0, 2], [0, 2], color=FLIGHT, linewidth=1)
+    right.axvline(0.01, color="grey", linestyle="--", linewidth=1, label="1 % and 5 %")
+    right.axvline(0.05, color="grey", linestyle="--", linewidth=1)
+    for (case, name), colour in zip(_VIBRATING.items(), (REFERENCE, FLIGHT, SWITCHED, "#cc79a7", GOOD), strict=True):
+        own = switched[switched["case"] == case]
+        whole = own[own["energy"] == "total"]
+        if not np.isnan(whole["R_predicted"]).all():
+            left.plot(whole["R_predicted"], whole["R_nodes"], "o", color=colour, markersize=4, label=name)
+        right.plot(whole["worth"], whole["rms"], "o", color=colour, markersize=4, label=name)
+        parts = switched[absorbing & (switched["case"] == case)]
+        right.plot(parts["worth"], parts["rms"], "x", color=colour, markersize=4, label="_")
+    left.set(xlabel="residual predicted by the reference [-]", ylabel="residual of all nodes [-]")
+    right.set(xscale="log", yscale="log", xlabel="worth of the vibration error [-]")
+    right.set_ylabel("energy after the landing off by, of its rise [-]")
+    right.set_title("dots: all parts, crosses: single parts", fontsize="small")
+    left.legend(fontsize="x-small")
+    right.legend(fontsize="x-small")
+    return _done(figure)
+
+
 FIGURES: Final[Mapping[str, Callable[[], Figure]]] = {
     "oscillators": oscillators, "rollover": rollover, "car": car, "drop": drop,
+    "vibration": vibration,
 }  # fmt: skip
 
 

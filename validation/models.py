@@ -11,8 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
 DECKS: Final = Path(__file__).parent / "decks"
-# Of the stable step of the elements, and cycles between two lines of the listing.
-_SCALE, _PRINT = 0.9, -2000
+_PRINT: Final = -2000  # cycles between two lines of the listing
 
 
 @dataclass(frozen=True)
@@ -21,7 +20,7 @@ class Model:
 
     The run ends at ``t_end`` and writes its time history each ``interval`` [s].  While rigid the step is capped at
     ``cap`` [s]: with nothing left that is deformable it would grow without limit.  ``begin`` are further lines of the
-    first leg.
+    first leg.  ``scale`` is the share of the stable step of the elements that the solver takes.
     """
 
     name: str
@@ -31,6 +30,7 @@ class Model:
     interval: float
     cap: float
     begin: str = ""
+    scale: float = 0.9
 
     def deck(self) -> bytes:
         """Give the starter deck."""
@@ -49,7 +49,7 @@ class Model:
         switch = "" if number == 1 and rigid else f"/RBODY/{'ON' if rigid else 'OFF'}\n{self.main}\n"
         cap = f"/DTIX\n{self.cap!r} {self.cap!r}\n" if rigid else ""
         return (
-            f"/RUN/{self.name}/{number}\n{end:.10g}\n/VERS/2022\n/DT\n{_SCALE} 0.0\n{cap}{switch}"
+            f"/RUN/{self.name}/{number}\n{end:.10g}\n/VERS/2022\n/DT\n{self.scale} 0.0\n{cap}{switch}"
             f"{self.begin if number == 1 else ''}/TFILE/4\n{self.interval}\n/TH/TITLE\n/PRINT/{_PRINT}\n/MON/ON\n"
             "/PARITH/ON\n"
         )

@@ -1,0 +1,146 @@
+"""Motion of all nodes of a run, and how far the vibration of a switched run is off (R, correlation).
+
+A deck writes the motion of nodes by its first card /TH/NODE, six columns each: DX, DY, DZ, VX, VY and VZ.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from d2rpick.deck import read_inventory
+from d2rpick.deck.geometry import masses_and_steps, sizes_and_lengths
+from d2rpick.deck.mesh import NO_NODE
+from d2rpick.deck.model import SPRING
+from d2rpick.histories.formats.radioss_th import TimeHistory
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    Reals = NDArray[np.float64]
+
+_COLUMNS = 6
+_LINES = ("beam", SPRING)  # a third node orients them
+_NUMBER = 4  # bytes
+
+
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """The nodes whose motion a deck writes: places (nodes, 3) [length] and masses (nodes,) [mass]."""
+
+    places: Reals
+    masses: Reals
+
+    def centre(self, places: Reals) -> Reals:
+        """Centre of mass of the nodes at some places (..., nodes, 3)."""
+        return np.asarray(np.einsum("n,...nx->...x", self.masses, places) / self.masses.sum())
+
+
+class Motion(NamedTuple):
+    """Times (n,), places and velocities of all nodes (n, nodes, 3)."""
+
+    time: Reals
+    places: Reals
+    velocities: Reals
+
+
+class VibrationError(NamedTuple):
+    """How far the vibration of a switched run is off, by the velocities of all nodes less the rigid motion.
+
+    ``residual`` is the root of the kinetic energy of the difference over that of the reference [-]; ``correlation`` is
+    the mean product of the velocities, weighted by mass, over the root of the product of both kinetic energies [-].
+    """
+
+    residual: float
+    correlation: float
+
+
+def read_nodes(deck: Path) -> Nodes:
+    """Read the nodes that a starter deck writes.
+
+    The mass of a part is shared by its elements as their sizes are, alike if these are springs, and the mass of an
+    element by its nodes.
+    """
+    inventory = read_inventory(str(deck))
+    of_parts = masses_and_steps(inventory)
+    masses = np.zeros(len(inventory.coordinates))
+    for elements in inventory.elements:
+        ends = elements.nodes[:, :2] if elements.kind in _LINES else elements.nodes
+        sizes, _ = sizes_and_lengths(elements.kind, elements.nodes, inventory.coordinates)
+        for part in np.unique(elements.part).tolist():
+            own = elements.part == part
+            shares = np.ones(own.sum()) if elements.kind == SPRING else sizes[own]
+            mass = of_parts[part][0]
+            if mass is None:
+                raise ValueError(f"{deck}: the mass of part {part} is unknown; give its density and size")
+            given = ends[own] != NO_NODE  # a triangle has no fourth node
+            of_nodes = given * (mass * shares / shares.sum() / given.sum(axis=1))[:, np.newaxis]
+            np.add.at(masses, ends[own][given], of_nodes[given])
+    return Nodes(inventory.coordinates[inventory.watched], masses[inventory.watched])
+
+
+def read_motion(legs: Sequence[Path], nodes: Nodes, start: float, end: float) -> Motion:
+    """Read the motion between two times [time] from the time histories of a run."""
+    found = [_motion_of_leg(leg, nodes, start, end) for leg in sorted(legs)]
+    return Motion(*(np.concatenate(pieces) for pieces in zip(*found, strict=True)))
+
+
+def _motion_of_leg(leg: Path, nodes: Nodes, start: float, end: float) -> Motion:
+    count = len(nodes.places)
+    history = TimeHistory(leg.read_bytes(), str(leg))
+    inside = (history.time >= start) & (history.time <= end)
+    record = history._head.counts.index(_COLUMNS * count)
+    first = history._begins[record] + history._records.place(0)
+    states = np.frombuffer(leg.read_bytes(), np.uint8, offset=history._records.at)
+    states = states[: history._states * history._stride].reshape(history._states, history._stride)
+    columns = np.ascontiguousarray(states[inside, first : first + _NUMBER * _COLUMNS * count])
+    values = columns.view(">f4").astype(float).reshape(-1, count, _COLUMNS)
+    return Motion(history.time[inside], nodes.places + values[..., :3], values[..., 3:])
+
+
+def compare_vibration(reference: Motion, switched: Motion, nodes: Nodes) -> VibrationError:
+    """Compare the vibration of a switched run with that of its reference, at the times of the reference."""
+    inside = (reference.time >= switched.time[0]) & (reference.time <= switched.time[-1])
+    reference = Motion(*(values[inside] for values in reference))
+    wanted = remove_rigid_motion(reference, nodes)
+    found = remove_rigid_motion(interpolate(switched, reference.time), nodes)
+
+    def energy(first: Reals, second: Reals) -> float:
+        return float(np.einsum("n,tnx,tnx->", nodes.masses, first, second))
+
+    residual = np.sqrt(energy(found - wanted, found - wanted) / energy(wanted, wanted))
+    correlation = energy(found, wanted) / np.sqrt(energy(found, found) * energy(wanted, wanted))
+    return VibrationError(float(residual), float(correlation))
+
+
+def interpolate(motion: Motion, times: Reals) -> Motion:
+    """Give a motion at other times, which lie between its own."""
+    after = np.clip(np.searchsorted(motion.time, times), 1, motion.time.size - 1)
+    share = (times - motion.time[after - 1]) / (motion.time[after] - motion.time[after - 1])
+    share = share[:, np.newaxis, np.newaxis]
+    places, velocities = (
+        values[after - 1] + share * (values[after] - values[after - 1]) for values in (motion.places, motion.velocities)
+    )
+    return Motion(times, places, velocities)
+
+
+def remove_rigid_motion(motion: Motion, nodes: Nodes) -> Reals:
+    """Give the velocities (n, nodes, 3) less those of the rigid body with the same momenta, linear and angular."""
+    arms = motion.places - nodes.centre(motion.places)[:, np.newaxis]
+    moving = motion.velocities - nodes.centre(motion.velocities)[:, np.newaxis]
+    angular = np.einsum("n,tnx->tx", nodes.masses, np.cross(arms, moving))
+    products = np.einsum("n,tnx,tny->txy", nodes.masses, arms, arms)
+    inertia = np.trace(products, axis1=1, axis2=2)[:, np.newaxis, np.newaxis] * np.eye(3) - products
+    spin = np.linalg.solve(inertia, angular[..., np.newaxis])[..., 0]
+    return np.asarray(moving - np.cross(spin[:, np.newaxis], arms))
+
+
+def vibration_energy(motion: Motion, nodes: Nodes) -> float:
+    """Mean energy of the vibration [energy]: twice its kinetic energy, as far as the times cover whole periods."""
+    moving = remove_rigid_motion(motion, nodes)
+    return float(np.einsum("n,tnx,tnx->", nodes.masses, moving, moving) / len(moving))
