@@ -9,7 +9,7 @@ from d2rpick.api import arguments
 from d2rpick.base.errors import if_written
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Mapping, Sequence
 
     import pandas as pd
 
@@ -26,12 +26,14 @@ class Run:
     """One run: its files, opened, and which columns of a table were named; nothing of it changes.
 
     ``files`` is what was opened, ``chosen`` the columns, ``input_format`` what the files were read as, ``"auto"`` where
-    their content decided.  Energies are read when they are asked for.
+    their content decided.  ``folder`` is the one that was named, in which the main deck is looked for.  Energies are
+    read when they are asked for.
     """
 
     files: histories.Run
     chosen: Selection
     input_format: str = "auto"
+    folder: str | None = None
 
     def __repr__(self) -> str:
         from d2rpick.report.pages import of_run
@@ -170,7 +172,14 @@ def read(
     from d2rpick.histories.opening import open_run
 
     chosen = selection_of(time, energy, channels)
-    return Run(open_run(names, chosen, known_format(input_format)), chosen, input_format)
+    return Run(open_run(names, chosen, known_format(input_format)), chosen, input_format, folder_of(names))
+
+
+def folder_of(names: Sequence[str]) -> str | None:
+    """Give the folder that names a run; None if files name it."""
+    import os
+
+    return names[0] if len(names) == 1 and os.path.isdir(names[0]) else None  # noqa: PTH112  odd names
 
 
 def from_frame(

@@ -60,6 +60,8 @@ class Printing(NamedTuple):
         Cards that the starter deck of the run lacks.
     sensor : int
         First id of sensors, where these switch.
+    delete_nodal_bodies, delete_node_sets : bool
+        LS-DYNA: delete nodal rigid bodies (NRBF), or joints and extra nodes (NCSF), while the parts are rigid.
     """
 
     part: tuple[int, ...] = ()
@@ -73,6 +75,8 @@ class Printing(NamedTuple):
     name: str = "Root"
     starter: str = ""
     sensor: int = 901
+    delete_nodal_bodies: bool = False
+    delete_node_sets: bool = False
 
 
 @dataclass(frozen=True)

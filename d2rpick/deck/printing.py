@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -16,10 +15,11 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 from d2rpick.base import __version__
 from d2rpick.base.errors import DeckError
 from d2rpick.deck import printed_card
+from d2rpick.deck.part_sets import NO_SETS, PartSets, cards_of_set, named, numbered
 from d2rpick.deck.printed_card import LONGEST, PHYSICS, PrintedCard, Solver, check_ids, comments, shortest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from d2rpick.deck.printed_card import Printing, Times
 
@@ -27,16 +27,16 @@ _FILE: Final = "switches.k"
 
 _SET_HEAD = "$#   swset      code     time1     time2     time3     entno     relsw    paired"
 _COUNT_HEAD = "$#    nrbf      ncsf       rwf     dtmax       d2r       r2d    offset"
-_OF_LS_DYNA = (
+_DELETE, _ACTIVATE = 1, 2  # constraints on the parts, by NRBF and NCSF
+_LEFT_ACTIVE = (
     "Nodal rigid bodies, spotwelds and rigid walls on these parts stay active",
     "  (NRBF, NCSF, RWF 0); where they are, delete them (1) and activate again (2).",
-    "Springs and dampers are not switched.",
+)
+_DELETED = (
+    "Nodal rigid bodies, joints and extra nodes of the deck, which all lie on these",
+    "  parts, are deleted (NRBF, NCSF 1) while these are rigid, and activated again (2).",
 )
 _CAPPED = "DTMAX: with nothing deformable left the time step would grow without limit."
-# Parts that are listed one by one; of more a set is printed, here with its number.
-_MOST_LISTED: Final = 10
-PartSets = Mapping[tuple[int, ...], int]
-_NO_SETS: Final[PartSets] = {}
 # Of the rigid window, per step: the release is at most a thousandth of it late.  Each window has its own, so that
 # further windows leave the run up to them as it was.
 _CAP_SHARE = 1000
@@ -61,9 +61,9 @@ def _ls_dyna(windows: Sequence[Times], printing: Printing, remarks: Sequence[str
     spans = ", ".join(f"{tr} to {td}" for tr, td in texts)
     lines = [*comments([f"Rigid from {spans}; written by d2rpick {__version__}"]), *told]
     lines = [f"$ {line}" for line in lines]
-    part_sets = _part_sets((ids, *_groups(ids, printing).values()), printing.swset[0])
+    part_sets = numbered((ids, *_groups(ids, printing).values()), printing.swset[0])
     for members, number in part_sets.items():
-        lines += _part_set(members, number)
+        lines += cards_of_set(members, number)
     for pair, numbers in zip(texts, sets, strict=True):
         lines += _window(pair, numbers, ids, printing, part_sets)
     text = "\n".join(lines) + "\n"
@@ -75,45 +75,28 @@ def _window(
 ) -> Iterator[str]:
     rigid, free = [*to_rigid(ids, printing, part_sets)], [*to_deformable(ids, part_sets)]  # with a comment each
     cap = printing.step_cap or _step_cap(*map(float, texts))
-    yield from (*header(sets[0], texts[0], shortest(cap), (len(rigid) - 1, 0)), *rigid)
-    yield from (*header(sets[1], texts[1], "0.0", (0, len(free) - 1)), *free)
+    deleted = [flag * _DELETE for flag in (printing.delete_nodal_bodies, printing.delete_node_sets)]
+    activated = [flag * _ACTIVATE for flag in (printing.delete_nodal_bodies, printing.delete_node_sets)]
+    yield from (*header(sets[0], texts[0], shortest(cap), (len(rigid) - 1, 0), constraints=deleted), *rigid)
+    yield from (*header(sets[1], texts[1], "0.0", (0, len(free) - 1), constraints=activated), *free)
 
 
-def to_rigid(ids: Sequence[int], printing: Printing, part_sets: PartSets = _NO_SETS) -> Iterator[str]:
+def to_rigid(ids: Sequence[int], printing: Printing, part_sets: PartSets = NO_SETS) -> Iterator[str]:
     """Write the parts that become rigid, those that lead first, or the sets that they make up."""
     yield "$#     pid       lrb     ptype"
     for lead, some in _groups(ids, printing).items():
-        yield from (f"{name:10d}{lead:10d}{kind:>10}" for name, kind in _named(some, part_sets))
+        yield from (f"{name:10d}{lead:10d}{kind:>10}" for name, kind in named(some, part_sets))
 
 
-def to_deformable(ids: Sequence[int], part_sets: PartSets = _NO_SETS) -> Iterator[str]:
+def to_deformable(ids: Sequence[int], part_sets: PartSets = NO_SETS) -> Iterator[str]:
     """Write the parts that become deformable, or their set."""
     yield "$#     pid     ptype"
-    yield from (f"{name:10d}{kind:>10}" for name, kind in _named(ids, part_sets))
+    yield from (f"{name:10d}{kind:>10}" for name, kind in named(ids, part_sets))
 
 
 def _step_cap(tr: float, td: float) -> float:
     """Largest step while rigid [time]."""
     return float(f"{(td - tr) / _CAP_SHARE:.2g}")
-
-
-def _named(parts: Sequence[int], part_sets: PartSets) -> list[tuple[int, str]]:
-    """Name parts with their kind: by their set where there is one."""
-    number = part_sets.get(tuple(sorted(parts)))
-    return [(part, "PART") for part in parts] if number is None else [(number, "PSET")]
-
-
-def _part_sets(groups: Iterable[Sequence[int]], first: int) -> dict[tuple[int, ...], int]:
-    """Number a set for each of the groups that are too many to be listed."""
-    many = dict.fromkeys(tuple(sorted(group)) for group in groups if len(group) > _MOST_LISTED)
-    return {group: first + place for place, group in enumerate(many)}
-
-
-def _part_set(parts: Sequence[int], number: int) -> Iterator[str]:
-    yield f"$ Part set {number}: give it another id where the deck has one of that."
-    yield from ("*SET_PART_LIST", "$#     sid", f"{number:10d}")
-    yield "$#    pid1      pid2      pid3      pid4      pid5      pid6      pid7      pid8"
-    yield from ("".join(f"{part:10d}" for part in parts[i : i + 8]) for i in range(0, len(parts), 8))
 
 
 def _groups(ids: Sequence[int], printing: Printing) -> dict[int, list[int]]:
@@ -144,9 +127,18 @@ class Waiting(NamedTuple):
 
 
 def header(
-    swset: int, time: str, step_cap: str, counts: tuple[int, int], waits: Waiting | None = None
+    swset: int,
+    time: str,
+    step_cap: str,
+    counts: tuple[int, int],
+    waits: Waiting | None = None,
+    constraints: Sequence[int] = (0, 0),
 ) -> Iterator[str]:
-    """Write the lines of a switch set down to its parts: at a ``time``, or from then on where it waits."""
+    """Write the lines of a switch set down to its parts: at a ``time``, or from then on where it waits.
+
+    ``counts`` are D2R and R2D, ``constraints`` NRBF and NCSF: 0 leaves constraints as they are, 1 deletes them and 2
+    activates them.
+    """
     on = waits or Waiting()
     yield "*DEFORMABLE_TO_RIGID_AUTOMATIC"
     yield _SET_HEAD
@@ -155,7 +147,8 @@ def header(
         f"{on.contact:10d}{on.other:10d}{on.paired:10d}"
     )
     yield _COUNT_HEAD
-    yield f"{0:10d}{0:10d}{0:10d}{step_cap:>10s}{counts[0]:10d}{counts[1]:10d}{'0.0':>10s}"
+    nrbf, ncsf = constraints
+    yield f"{nrbf:10d}{ncsf:10d}{0:10d}{step_cap:>10s}{counts[0]:10d}{counts[1]:10d}{'0.0':>10s}"
 
 
 def _sets(first: tuple[int, int], count: int) -> Iterator[tuple[int, int]]:
@@ -183,8 +176,8 @@ def _roundings(asked: Times, texts: tuple[str, str]) -> Iterator[str]:
 
 
 def _warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
-    yield from (*PHYSICS, *_OF_LS_DYNA)
-    yield _CAPPED
+    deleted = printing.delete_nodal_bodies or printing.delete_node_sets
+    yield from (*PHYSICS, *(_DELETED if deleted else _LEFT_ACTIVE), "Springs and dampers are not switched.", _CAPPED)
     if printing.merge is None and printing.bodies:
         yield from (
             f"{len(body)} parts are one rigid body by the deck, led by part {body[0]} (LRB)."

@@ -174,7 +174,7 @@ def _always_rigid(case: Case) -> Iterator[Objection]:
 
 @passes(_both("1", "         2         1      PART"))
 @fails(_both("1", "2"), _LAYERS, _BEAMS)
-@rule("D2R108", WARNING, "several parts made rigid with LRB 0 although they share nodes")
+@rule("D2R108", ERROR, "several parts made rigid with LRB 0 although they share nodes")
 def _torn(case: Case) -> Iterator[Objection]:
     """With LRB 0 each part becomes a rigid body of its own, and the bodies fight over the nodes they share. Merge
     them: the lead part with LRB 0, the others with LRB = the lead.
