@@ -245,7 +245,7 @@ def _radioss_sensors(windows: Sequence[Times], printing: Printing, remarks: Sequ
     DeckError
         As `_radioss` does.
     """
-    from d2rpick.deck.radioss_deck import STOPS_SINCE  # not above: other cards do without
+    from d2rpick.deck.radioss_sensors import STOPS_SINCE  # not above: other cards do without
 
     windows, ids, end = _of_run(windows, printing)
     sensors, last = _sensors(windows, printing.sensor)
@@ -264,7 +264,7 @@ def _radioss_sensors(windows: Sequence[Times], printing: Printing, remarks: Sequ
 
 def _sensors(windows: Sequence[Times], first: int) -> tuple[str, int]:
     """Write sensors with ids from ``first`` on, and give the id of the one that is active outside of the windows."""
-    from d2rpick.deck.radioss_deck import NEVER, inactive
+    from d2rpick.deck.radioss_sensors import NEVER, inactive
 
     spans = inactive(tuple(windows))
     texts, last = list[str](), first

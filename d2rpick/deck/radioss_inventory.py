@@ -17,7 +17,7 @@ from d2rpick.deck.mesh import KINDS, NOT_COUNTED, Mesh, elements_of, nodes_of
 from d2rpick.deck.model import Formulation, Inventory, Material, PartData, Section
 from d2rpick.deck.radioss_deck import SOLIDS, Starter, below_title, blocks, kept_off, keyword, number_of, reals, whole
 from d2rpick.deck.radioss_flaws import flaws_of
-from d2rpick.deck.radioss_run import Run, find_run_windows, left_rigid
+from d2rpick.deck.radioss_run import Run, find_run_windows, left_rigid, parts_of_fixed_bodies
 from d2rpick.deck.reader import cuts, holds_mesh
 
 if TYPE_CHECKING:
@@ -67,8 +67,9 @@ def read(run: Run) -> Inventory:
     windows = find_run_windows(run).windows.windows if run.legs else ()
     joints = _joints(run, starter)
     switched = run.named if run.legs else {body.node.value for body in starter.bodies}  # all without an engine file
+    rigid = _always_rigid(windows) | parts_of_fixed_bodies(run)
     return Inventory(
-        "radioss", _parts(starter, mesh, _always_rigid(windows)), mesh.elements, mesh.coordinates, notes,
+        "radioss", _parts(starter, mesh, rigid), mesh.elements, mesh.coordinates, notes,
         not notes, joints=model.placed(joints.found, mesh.table), switched=model.placed(joints.switched, mesh.table),
         ties=joints.unknown, watched=mesh.table.known(_watched(starter)),
         moved=starter.transformed, files=tuple(run.deck.sources),

@@ -352,9 +352,36 @@ def holds_mesh(block: Block) -> bool:
     return re.match(_MESH, block.head, re.IGNORECASE) is not None
 
 
+# Keywords of Radioss that values follow, in engine files: one of them without any is cut.
+_WITH_VALUES: Final = (
+    "RUN",
+    "RBODY",
+    "DT",
+    "DTIX",
+    "STOP",
+    "INIV",
+    "SENS",
+    "TFILE",
+    "VERS",
+    "BCS",
+    "BCSR",
+    "DEL",
+    "END",
+)
+
+
+def _is_whole(block: Block) -> bool:
+    """Whether nothing that matters can be missing from a last line without line end: a comment, or no values follow."""
+    *above, last = block.source.text(block.start, block.end).split("\n")
+    if last.startswith(("$", "#") if block.head.startswith("/") else "$"):
+        return True
+    first = block.head[1:].split("/")[0].strip().upper()
+    return block.head.startswith("/") and not above and not any(name.startswith(first) for name in _WITH_VALUES)
+
+
 def _sign_of_cut(block: Block, *, main: bool) -> str:
     mesh, radioss = holds_mesh(block), block.head.startswith("/")
-    if not block.source.ends_with_line():
+    if not block.source.ends_with_line() and not _is_whole(block):
         return f"the file ends within a line of {'its mesh' if mesh else block.head.strip()}"
     if main and mesh:
         return f"the {'starter' if radioss else 'main'} deck ends within its mesh, without {'/' if radioss else '*'}END"

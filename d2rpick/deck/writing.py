@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import DeckError, name_units
 from d2rpick.base.files import write_whole
-from d2rpick.deck import radioss_deck
 from d2rpick.deck.ls_dyna_parts import read_parts
 from d2rpick.deck.printing import EngineFile, engine_lines, listed, off
 from d2rpick.deck.radioss_deck import Leg, Starter, below_title, blocks, card_of, kept_off, keyword, numbers, read_legs
 from d2rpick.deck.radioss_files import root_of, run_files
 from d2rpick.deck.radioss_run import Run, parts_off, read_run
+from d2rpick.deck.radioss_sensors import STOPS_SINCE
 from d2rpick.deck.reader import Deck, cure, cuts, read_deck
 from d2rpick.deck.source import Block, SourceFile
 from d2rpick.deck.switching import find_windows, read_switching
@@ -185,7 +185,7 @@ def _edit(block: Block, sensors: Mapping[int, int]) -> Iterator[tuple[int, tuple
         text = lines[row.distance].rstrip(b"\r").decode("latin-1").ljust(20)
         first, second = (card.integer(row, place).value for place in (0, 1))
         if card.words[0] == "BEGIN":
-            new = f"{max(first, radioss_deck.STOPS_SINCE):10d}{text[10:]}"
+            new = f"{max(first, STOPS_SINCE):10d}{text[10:]}"
         elif first in sensors:
             if second:
                 raise DeckError(f"{row.field(1).at}: sensor {second} switches this /RBODY already; remove it first")

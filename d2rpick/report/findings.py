@@ -71,7 +71,7 @@ def as_table(checks: Checks, _: Shown) -> str:
     lines: list[str] = []
     for result in checks.results:
         lines.append(_shown(result.deck, checks.root))
-        if not result.cards:
+        if not result.cards and not result.windows:
             lines.append("  no switching cards")
         elif not result.windows and not result.findings:
             lines.append("  switching cards that switch nothing")

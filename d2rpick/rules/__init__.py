@@ -200,7 +200,7 @@ def check_deck(
         order.setdefault(finding.file, len(order))
     findings.sort(key=lambda finding: (order[finding.file], finding.line, finding.column, finding.rule))
     windows, remarks = tuple(_told(case.windows.windows)), tuple(_remarks(case.deck))
-    return Checked(path, windows, tuple(findings), len(case.sets), tuple(case.deck.files), remarks, case.solver)
+    return Checked(path, windows, tuple(findings), case.switching, tuple(case.deck.files), remarks, case.solver)
 
 
 def _told(windows: Iterable[Window]) -> Iterator[CheckedWindow]:

@@ -105,6 +105,11 @@ class Case:
         """All switching cards."""
         return read_switching(self.deck)
 
+    @property
+    def switching(self) -> int:
+        """Number of the cards that switch something."""
+        return len(self.sets)
+
     @cached_property
     def headers(self) -> tuple[tuple[SwitchSet, Header], ...]:
         """Switching cards that have a header, with it."""
@@ -208,20 +213,20 @@ class RunCase(Case):
         return self.run.legs[-1].stop if self.run.legs else None
 
     @property
-    def unread(self) -> Sequence[Unread]:
-        """Includes that were not read, where a main node that is switched may stand in them."""
-        bodies = {body.node.value for body in self.run.starter.bodies} if self.run.starter else set()
-        return self.deck.unread if self.run.named - bodies - {0} else ()
+    def switching(self) -> int:
+        """Number of cards that switch something: of the legs, and of bodies with a sensor or of rigid parts."""
+        bodies = self.run.starter.bodies if self.run.starter else ()
+        return len(self.sets) + sum(bool(body.sensor or body.part) for body in bodies)
 
     @property
     def untimed(self) -> tuple[tuple[Field, str], ...]:
         """Bodies that a sensor switches whose time is not known."""
-        from d2rpick.deck.radioss_deck import active_spans  # not above: start-up
+        from d2rpick.deck.radioss_sensors import active_spans  # not above: start-up
 
         starter, legs = self.run.starter, [leg for leg in self.run.legs[:-1] if leg.sensor]
-        found = [(one, active_spans(starter, one.sensor)) for one in starter.bodies if one.sensor] if starter else []
-        told = [(one.node.field, f"rigid body {one.id} is switched by {why}") for one, why in found
-                if isinstance(why, str)]  # fmt: skip
+        sensed = [body for body in starter.bodies if body.sensor] if starter else []
+        spans = [(body, active_spans(starter, body.sensor, self.run.resets)) for body in sensed if starter]
+        told = [(body.node.field, f"{body.name} is switched by {why}") for body, why in spans if isinstance(why, str)]
         return *told, *((leg.run.here, f"leg {leg.number} ends when sensor {leg.sensor} is active") for leg in legs)
 
     @cached_property

@@ -118,12 +118,14 @@ def _unreadable_members(case: Case) -> Iterator[Problem]:
 @rule("D2R003", ERROR, "an include file is missing or cannot be read", BOTH)
 def _includes(case: Case) -> Iterator[Objection]:
     """Looked for in the main deck's folder, in the *INCLUDE_PATH folders and in the including file's folder. A file
-    that includes itself or cannot be read is reported too; one that a Radioss starter deck asks for, only where a
-    main node that is switched was not found without it. Switching cards, parts or parameters may be in it, so the
-    other findings may be incomplete.
+    that includes itself or cannot be read is reported too, also one that a Radioss starter deck asks for (#include): a
+    rigid body with a sensor may stand in it. Switching cards, parts or parameters may be in it, so the other findings
+    may be incomplete.
     """
     for missing in case.unread:
         cure = _CURES.get(missing.reason, "correct it")
+        if case.solver != LS_DYNA and missing.reason in _CURES:
+            cure = "add the file"
         found = f"include {missing.name.text!r} was not read ({missing.reason})"
         yield missing.name, f"{found}; switching cards may hide in it: {cure}"
 

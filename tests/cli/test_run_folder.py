@@ -50,8 +50,8 @@ def checked_in(folder: Path, card: str) -> str:
 
 @pytest.mark.parametrize("command", ["plan", "suggest", "parts", "explore"])
 def test_the_only_main_deck_is_used_and_named(command: str, box: Path) -> None:
-    part = () if command == "parts" else ("--part", "flying")
-    part += ("--steps", "3") if command == "explore" else ()
+    part = [] if command == "parts" else ["--part", "flying"]
+    part += ["--steps", "3"] if command == "explore" else []
     alone = answer(command, *part, str(box))
     (named,) = [one["message"] for one in alone["warnings"] if one["code"] == "deck-in-folder"]
     assert named.startswith(f"{box / 'main.k'} is the main deck in the folder of the run")
