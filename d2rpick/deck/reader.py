@@ -34,6 +34,13 @@ class Unread(NamedTuple):
     reason: str
 
 
+class Restart(NamedTuple):
+    """When a restart begins [time of the run], and where that is written."""
+
+    at: float
+    stop_field: Field
+
+
 def _asked_by(card: Card) -> Iterator[tuple[Field, Transform, tuple[Problem, ...]]]:
     """Names of the files that an ``*INCLUDE`` card asks for, the transform of each, and what of that is unreadable.
 
@@ -106,7 +113,7 @@ class Deck:
     """A deck as read: ``cards`` that matter, ``disabled`` ones (*COMMENT), encrypted blocks, includes.
 
     ``problems`` are numbers of includes that could not be read; ``ends`` the last block of each file that has no *END,
-    and whether that file is the main one.
+    and whether that file is the main one.  ``restarts`` are those that go on with its run.
     """
 
     path: str
@@ -120,6 +127,7 @@ class Deck:
     sources: list[SourceFile] = field(default_factory=list)
     ends: list[tuple[Block, bool]] = field(default_factory=list)
     long: bool = False  # whether the main file ends in long format
+    restarts: dict[str, Restart] = field(default_factory=dict)  # by file
 
     @property
     def files(self) -> list[str]:

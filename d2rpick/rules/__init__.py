@@ -22,7 +22,7 @@ from d2rpick.rules.base import LS_DYNA, Case, Finding, RunCase, Severity
 from d2rpick.rules.rule import Rule
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.deck.card import Field
     from d2rpick.deck.switching import SwitchSet, Unit, Window
@@ -165,6 +165,7 @@ def check_deck(
     configuration: Configuration | None = None,
     judge: Judge | None = None,
     content: bytes | None = None,
+    restarts: Sequence[str] = (),
 ) -> Checked:
     """Read a deck with its includes, or a Radioss run with its legs, and apply the rules.
 
@@ -178,6 +179,8 @@ def check_deck(
         Judges the windows by an energy history; without one the energy rules find nothing.
     content : bytes, optional
         What the deck holds, where it does not lie in a file.
+    restarts : sequence of str, optional
+        Small restarts of LS-DYNA that go on with its run: their cards switch when they begin.
 
     Returns
     -------
@@ -193,7 +196,7 @@ def check_deck(
     """
     configuration = configuration or Configuration()
     configuration.verify(RULES)
-    case = _read(path, content, judge)
+    case = _read(path, content, judge, restarts)
     findings = list(_findings(case, configuration))
     order = {path: 0}  # the deck itself first, its includes as they come
     for finding in findings:
@@ -230,8 +233,8 @@ def _findings(case: Case, configuration: Configuration) -> Iterator[Finding]:
             yield Finding(rule.id, severity, message, case.deck.path, place.file, place.line, place.column)
 
 
-def _read(path: str, content: bytes | None, judge: Judge | None) -> Case:
-    """Read a deck by what it is: a run of Radioss, or an LS-DYNA deck."""
+def _read(path: str, content: bytes | None, judge: Judge | None, restarts: Sequence[str]) -> Case:
+    """Read a deck by what it is: a run of Radioss, or an LS-DYNA deck with its restarts."""
     source = SourceFile(path, content)
     of_radioss = source.read(0, 1) != b"*" and recognises(source.read(0, HEAD))
     if of_radioss and (content is not None or os.path.isfile(path)):  # noqa: PTH113  a pipe gives its bytes once
@@ -239,7 +242,12 @@ def _read(path: str, content: bytes | None, judge: Judge | None) -> Case:
 
         run = read_run(path, content)
         return RunCase(run.deck, judge, run=run)
-    return Case(read_deck(path, source), judge)
+    deck = read_deck(path, source)
+    if restarts:
+        from d2rpick.deck.restarts import joined  # not above: start-up
+
+        deck = joined(deck, restarts)
+    return Case(deck, judge)
 
 
 def _remarks(deck: Deck) -> Iterator[str]:

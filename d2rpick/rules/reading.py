@@ -205,9 +205,10 @@ def _disabled(case: Case) -> Iterator[Objection]:
 )
 @rule("D2R302", INFO, "not judged by time: CODE 1-5, restart cards, plain *DEFORMABLE_TO_RIGID", BOTH)
 def _untimed(case: Case) -> Iterator[Objection]:
-    """CODE 1 to 4 switch by a contact or wall force, CODE 5 by a sensor, restart cards when the restart begins,
-    plain cards at the start, a Radioss body by a sensor other than /SENSOR/TIME: no time on the card can be compared
-    with an energy history.
+    """CODE 1 to 4 switch by a contact or wall force, CODE 5 by a sensor, restart cards when the restart begins, plain
+    cards at the start, a Radioss body by a sensor other than /SENSOR/TIME: no time on the card can be compared with an
+    energy history. Restarts that are checked together with their main deck have times: each begins at the ENDTIM of
+    the run before it.
     """
     for place, how in case.untimed:
         yield place, f"{how}; not judged by time"
@@ -263,8 +264,12 @@ def _without_parts(case: Case) -> Iterator[Objection]:
 
 
 def _reason(card: SwitchSet) -> str:
+    if card.restart:
+        return ""
     if card.kind == "restart":
         return "acts at the restart, whose time is the end of the run before"
+    if card.kind == "plain" and not card.switched and not card.count_problem:
+        return ""  # it only lets restarts switch
     if card.kind == "plain":
         return "acts at the start of the run"
     if card.header is None or card.header.code.problem or card.header.code.value not in _CODES:

@@ -1,4 +1,4 @@
-"""D2R103, D2R104, D2R106-108, D2R112, D2R113, D2R116: the parts that are switched, and what holds on to them."""
+"""D2R103, D2R104, D2R106-108, D2R112, D2R113, D2R116-117: the parts that are switched, and what holds on to them."""
 
 from __future__ import annotations
 
@@ -88,6 +88,25 @@ def _never_rigid(case: Case) -> Iterator[Objection]:
     ]
     for _, place, named in _by_card(orphans):
         yield place, f"{named} switched back, but no card makes it rigid before; add the D2R line or remove this"
+
+
+_RESTART: Final = "*RIGID_DEFORMABLE_D2R\n{:10d}\n*RIGID_DEFORMABLE_R2D\n{:10d}\n"
+
+
+@passes(PASS, Example(_RESTART.format(1, 2)))
+@fails(Example(_RESTART.format(1, 1)))
+@rule("D2R117", ERROR, "a part made rigid and deformable in one restart")
+def _both_ways(case: Case) -> Iterator[Objection]:
+    """*RIGID_DEFORMABLE_D2R and _R2D of a restart act together, when it begins: a part that both name is not rigid
+    for any time, or rigid to the end, and nobody knows which.
+    """
+    of_restarts = [event for event in case.windows.events if event.by.kind == "restart"]
+    for file, events in grouped((event.by.card.file, event) for event in of_restarts).items():
+        rigid = {event.unit for event in events if event.line.to_rigid}
+        both = [event for event in events if not event.line.to_rigid and event.unit in rigid]
+        for _, place, named in _by_card(both):
+            found = f"{named} made rigid and deformable when the restart {file} begins"
+            yield place, f"{found}; one of them belongs into another restart"
 
 
 @fails(deck(THERE), deck("*DEFORMABLE_TO_RIGID\n         1\n"))

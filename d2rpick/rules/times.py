@@ -83,7 +83,8 @@ def _order(case: Case) -> Iterator[Objection]:
     """The R2D switch of a part must come after its D2R switch; the solver does not sort them for you."""
     for (opening, closing), windows in _closed(case).items():
         first = windows[0]
-        if first.td is not None and first.td <= first.tr and not _lost(first):
+        together = opening.kind == closing.kind == "restart" and opening.card.file == closing.card.file  # D2R117
+        if first.td is not None and first.td <= first.tr and not _lost(first) and not together:
             found = f"{_named(windows)} switched back at {first.td:g} but made rigid at {first.tr:g}"
             way_out = f"({opening.time_field.at}), an earlier time was expected there; are the two times swapped?"
             yield closing.time_field, f"{found} {way_out}"
