@@ -19,6 +19,7 @@ from d2rpick.deck.radioss_deck import SOLIDS, Starter, below_title, blocks, kept
 from d2rpick.deck.radioss_flaws import flaws_of
 from d2rpick.deck.radioss_run import Run, find_run_windows, left_rigid, parts_of_fixed_bodies
 from d2rpick.deck.reader import cuts, holds_mesh
+from d2rpick.deck.unswitchable import unswitchable_of_radioss
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -97,12 +98,13 @@ def _notes(run: Run, starter: Starter) -> Iterator[str]:
 
 def _parts(starter: Starter, mesh: Mesh, rigid: set[int]) -> Mapping[int, PartData]:
     materials, properties = dict(_materials(starter)), dict(_properties(starter))
-    kinds, unturned = mesh.kinds, starter.unturned
+    kinds, unturned, unswitchable = mesh.kinds, starter.unturned, unswitchable_of_radioss(starter)
     found: dict[int, PartData] = {}
     for part, line in starter.parts.items():
         section = _section(properties.get(line.prop), kinds.get(part, set()), turns=part not in unturned)
         made_of = _material(materials.get(line.material), properties.get(line.prop), part in rigid)
-        found[part] = PartData(part, line.title, made_of, section)
+        why = unswitchable[part].reason if part in unswitchable else ""
+        found[part] = PartData(part, line.title, made_of, section, why)
     return found
 
 

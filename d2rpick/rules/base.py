@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_files import Flaw
     from d2rpick.deck.radioss_run import Run, RunWindows
     from d2rpick.deck.reader import Deck, Unread
+    from d2rpick.deck.unswitchable import Unswitchable
     from d2rpick.rules.judgement import HistoryJudge
 
 
@@ -166,6 +167,13 @@ class Case:
         return {part: f"ELFORM {one.elform}, {one.unturned}" for part, one in found if one and one.unturned}
 
     @cached_property
+    def unswitchable(self) -> Mapping[int, Unswitchable]:
+        """Parts that must not be switched."""
+        from d2rpick.deck.unswitchable import unswitchable_of_ls_dyna  # not above: start-up
+
+        return unswitchable_of_ls_dyna(self.deck, self.parts)
+
+    @cached_property
     def supporting(self) -> tuple[tuple[Card, Value[float]], ...]:
         """Numbers of other cards that the rules rely on: ENDTIM, and DT of the energy databases."""
         names = ("CONTROL_TERMINATION", "DATABASE_GLSTAT", "DATABASE_MATSUM")
@@ -233,6 +241,13 @@ class RunCase(Case):
     def unturned(self) -> Mapping[int, str]:
         """Parts of elements without a co-rotating frame."""
         return self.run.starter.unturned if self.run.starter else {}
+
+    @cached_property
+    def unswitchable(self) -> Mapping[int, Unswitchable]:
+        """Parts that must not be switched."""
+        from d2rpick.deck.unswitchable import unswitchable_of_radioss  # not above: start-up
+
+        return unswitchable_of_radioss(self.run.starter) if self.run.starter else {}
 
     @cached_property
     def flaws(self) -> tuple[Flaw, ...]:

@@ -1,4 +1,4 @@
-"""D2R103, D2R104, D2R106-108, D2R112, D2R113, D2R116-117: the parts that are switched, and what holds on to them."""
+"""D2R103, D2R104, D2R106-108, D2R112, D2R113, D2R116-119: the parts that are switched, and what holds on to them."""
 
 from __future__ import annotations
 
@@ -284,6 +284,41 @@ def _unturned(case: Case) -> Iterator[Objection]:
         found = f"{name_units(part for part, _ in those)} of solids that do not co-rotate ({form})"
         why = "the stresses locked in do not turn with the rigid body"
         yield those[0][1], f"{found}: {why}; expect an error after a large rotation"
+
+
+def _unswitchable(case: Case, *, flows: bool) -> Iterator[Objection]:
+    """Parts that are switched, by cards that act at any time, and must not be."""
+    kept = {part: why.reason for part, why in case.unswitchable.items() if why.flows == flows} if case.sets else {}
+    opened = [event for event in case.windows.events if event.line.to_rigid and event.unit.part in kept]
+    first = {event.unit.id: event for event in reversed(opened)}
+    for reason, parts in grouped((kept[part], part) for part in sorted(first)).items():
+        yield first[parts[0]].line.part.field, f"{name_units(parts)}: {reason}; do not switch it"
+
+
+def _of_law(law: str) -> Example:
+    return deck(f"{law}\n         1     1.0e-9       1.0       0.3\n" + THERE + BACK)
+
+
+@passes(PASS, _solid("1"))
+@fails(_solid("5"), _solid("11"), _solid("12"))
+@rule("D2R118", ERROR, "a switched part whose material flows through its mesh", BOTH)
+def _flows(case: Case) -> Iterator[Objection]:
+    """ALE and Eulerian elements (LS-DYNA: ELFORM 5, 6, 7, 11, 12; Radioss: /ALE/MAT, /EULER/MAT) hold whatever flows
+    through them: there is no body to be made rigid. Source: the vendor's keyword data, Altair's help.
+    """
+    return _unswitchable(case, flows=True)
+
+
+@passes(PASS, _of_law("*MAT_ELASTIC"))
+@fails(_of_law("*MAT_MOONEY-RIVLIN_RUBBER"), _of_law("*MAT_077_O"), _of_law("*MAT_ORTHOTROPIC_ELASTIC"))
+@rule("D2R119", WARNING, "a switched part whose law keeps a stress-free reference", BOTH)
+def _with_reference(case: Case) -> Iterator[Objection]:
+    """Hyperelastic and total Lagrangian laws compute the stress from the deformation since the start, and not from
+    what was stored when the part was made rigid: it may come back with a stress that it did not have. Source: the
+    theory of the laws, and a report of 2026 on LS-DYNA R14 in which a hyperelastic solid did; not tried with the
+    solver. Radioss: hyperelastic laws, and solids with Ismstr 10 to 12.
+    """
+    return _unswitchable(case, flows=False)
 
 
 @passes(PASS, _constrained(_NODAL, "         1         0"), _constrained(_NODAL.replace("   5\n", "   6\n")))
