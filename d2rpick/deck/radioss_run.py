@@ -18,13 +18,15 @@ from d2rpick.base.errors import DeckError, are, in_rows, name_units
 from d2rpick.deck.card import Field, Value
 from d2rpick.deck.radioss_deck import Leg, Starter, blocks, card_of, kept_off, keyword, read_legs
 from d2rpick.deck.radioss_files import ENGINE, HEAD, STARTER, recognises, run_files
-from d2rpick.deck.radioss_sensors import active_spans, inactive
+from d2rpick.deck.radioss_sensors import Course, active_spans, inactive, only_force
 from d2rpick.deck.reader import Deck, Unread, why_unread
 from d2rpick.deck.source import SourceFile
 from d2rpick.deck.switching import Event, Switched, SwitchSet, Unit, Window, Windows, follow
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+
+    Contacts = Callable[[Collection[int]], tuple[tuple[float, float], ...] | None]
 
     from d2rpick.deck.card import Card
     from d2rpick.deck.radioss_rigid import Body
@@ -160,10 +162,11 @@ def in_order(legs: list[Leg]) -> bool:
     return numbers == list(range(1, len(legs) + 1)) and sorted_stops and not any(stop.problem for stop in stops)
 
 
-def find_run_windows(run: Run) -> RunWindows:
+def find_run_windows(run: Run, contacts: Contacts | None = None) -> RunWindows:
     """Follow every body that a leg or a sensor switches through the run.
 
     A body whose parts are not known is one unit, named by its main node.  Legs that are not in order have no windows.
+    ``contacts`` gives when something pushes some parts, for sensors of forces; None where no history shows it.
     """
     sets = tuple(_switches(run.legs)) if in_order(run.legs) else ()
     starter = None if run.starter and run.starter.moved else run.starter
@@ -179,7 +182,7 @@ def find_run_windows(run: Run) -> RunWindows:
             for unit in _units(node, parts):
                 windows += _follow(unit, node, sets, run.legs[0])
     for node in sorted(sensors):
-        windows += _by_sensor(run, bodies[node], parts)
+        windows += _by_sensor(run, bodies[node], parts, course_of(run, parts.get(node, ()), contacts))
     for body in bodies.values():
         if body.part and not body.sensor and body.node.value not in switched:
             windows.append(_always(body))
@@ -214,9 +217,15 @@ def _follow(unit: Unit, node: int, sets: tuple[LegSwitch, ...], first: Leg) -> l
     return [window for window in follow(unit, events)[0] if window.td is None or window.td > 0]
 
 
-def _by_sensor(run: Run, body: Body, parts: dict[int, set[int]]) -> Iterator[Window]:
-    """Windows of a body with a sensor of times: it is rigid while the sensor is not active."""
-    active = active_spans(run.starter, body.sensor, run.resets) if run.starter else ""
+def course_of(run: Run, parts: Collection[int], contacts: Contacts | None) -> Course:
+    """Give what is known of the course of a run for sensors that switch some parts."""
+    known = contacts is not None and parts and run.starter is not None and only_force(run.starter)
+    return Course(run.resets, contacts(parts) if known and contacts else None)
+
+
+def _by_sensor(run: Run, body: Body, parts: dict[int, set[int]], course: Course) -> Iterator[Window]:
+    """Windows of a body with a sensor: it is rigid while the sensor is not active."""
+    active = active_spans(run.starter, body.sensor, course) if run.starter else ""
     if isinstance(active, str):
         return
     end = run.legs[-1].stop.value if run.legs and in_order(run.legs) else math.inf

@@ -207,14 +207,19 @@ def _disabled(case: Case) -> Iterator[Objection]:
 def _untimed(case: Case) -> Iterator[Objection]:
     """CODE 1 to 4 switch by a contact or wall force, CODE 5 by a sensor, restart cards when the restart begins, plain
     cards at the start, a Radioss body by a sensor other than /SENSOR/TIME: no time on the card can be compared with an
-    energy history. Restarts that are checked together with their main deck have times: each begins at the ENDTIM of
-    the run before it.
+    energy history. If a history has the momenta of the parts, and the deck has one contact or wall, the times at which
+    a force switches are found from them and judged. Restarts that are checked together with their main deck have
+    times: each begins at the ENDTIM of the run before it.
     """
     for place, how in case.untimed:
         yield place, f"{how}; not judged by time"
     for card in case.sets:
         reason = _reason(card) if case.solver == LS_DYNA else ""
-        if reason:
+        forced = next((one for one in case.forced if card.card in one.cards), None)
+        if reason and forced:
+            times = f"by the momenta of the history {forced.switches} times, first at {forced.times[0][0]:.6g}"
+            yield card.card.here, f"*{card.card.name} {reason}: {times}"
+        elif reason:
             yield card.card.here, f"*{card.card.name} {reason}; not judged by time"
 
 

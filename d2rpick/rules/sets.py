@@ -1,4 +1,4 @@
-"""D2R004-010: switch sets among each other, and switches by the force of a contact or rigid wall."""
+"""D2R004-010, D2R208: switch sets among each other, and switches by the force of a contact or rigid wall."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from functools import partial
 from typing import TYPE_CHECKING, Final, Literal
 
 from d2rpick.base.errors import listing
+from d2rpick.deck.force_switching import delay_without_chatter
 from d2rpick.deck.ls_dyna_parts import Entities, read_entities
 from d2rpick.deck.switching import BY_TIME, Header, SwitchSet, Unit
-from d2rpick.rules.base import ERROR, WARNING, Case, Objection
+from d2rpick.rules.base import BOTH, ERROR, WARNING, Case, Objection
 from d2rpick.rules.rule import BACK, PASS, THERE, Example, automatic, deck, fails, passes, rule
 
 if TYPE_CHECKING:
@@ -227,3 +228,34 @@ def _unnamed(case: Case) -> Iterator[Objection]:
             what = "a contact" if header.code.value in _OF_CONTACT else "a rigid wall"
             found = f"ENTNO is 0 with CODE {header.code.value}, which waits for the force of {what}"
             yield header.entno.field, f"{found}; give its number"
+
+
+# A box that lands on its edge, and rattles.
+_LANDING: Final = "--drop 0.2 --tilt 20 --mesh 4 --ground-stiffness 2e6 --t-end 0.7 --dt 5e-4 --write-as matsum"
+
+
+def _landed(wait: str) -> Example:
+    there = automatic(1, "0.0", rigid=["1"], code=2, pair=(2, 1))
+    again = automatic(2, "0.0", deformable=["1"], code=4, pair=(1, -1))
+    old = f"{'0.0':>10s}{'0.0':>10s}{'0.0':>10s}"
+    again = again.replace(old, f"{'0.0':>10s}{'0.0':>10s}{wait:>10s}", 1)
+    landed = deck(there + again).deck.replace("       0.2", "       0.7", 1)  # ENDTIM
+    return Example(landed, history=_LANDING, computed_by="rollover")
+
+
+@passes(PASS, _landed("0.07"))
+@fails(_landed("0.0"))
+@rule("D2R208", WARNING, "a switch by force that chatters in the history", BOTH)
+def _chatters(case: Case) -> Iterator[Objection]:
+    """A force comes and goes many times in one impact. If the history has the momenta of the parts, and the deck has
+    one contact or wall, the switches are followed through it: windows below a tenth of the longest are no flight. A
+    TIME3 of the set that makes the parts deformable (Radioss: Tdelay of the sensor) that lasts longer than the contact
+    keeps them out. A force that comes and goes within one interval of the history is not seen.
+    """
+    for one in case.forced:
+        short = len(one.times) - len(one.lasting)
+        if short:
+            wait = delay_without_chatter(one.lasting, one.contacts)
+            cure = f"; {wait:.3g} or more as {one.wait} leaves {len(one.lasting)}" if wait else ""
+            found = f"{one.switches} switches by the history, in {len(one.times)} windows"
+            yield one.place.here, f"{found}, {short} of which are below a tenth of the longest{cure}"
