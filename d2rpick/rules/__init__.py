@@ -32,6 +32,13 @@ if TYPE_CHECKING:
 _MODULES = (reading, sets, times, switched_parts, runs)
 _ALL = (one for module in _MODULES for one in vars(module).values() if isinstance(one, Rule))
 _BY_HISTORY: Final = "D2R2"  # rules that an energy history alone can break
+_ALIKE: Final = 0.9  # of two ids, one of which has one sign more
+# What follows from one mistake of units is not reported beside it.
+_FOLLOW: Final = {
+    "D2R115": {"D2R101", "D2R205", "D2R206", "D2R207"},
+    "D2R207": {"D2R205", "D2R206"},
+    "D2R206": {"D2R205"},
+}
 RULES: Final[Mapping[str, Rule]] = {rule.id: rule for rule in sorted(_ALL, key=lambda rule: rule.id)}
 
 
@@ -85,8 +92,17 @@ def _expected_instead(name: str, known: Collection[str]) -> str:
     """What would have been a rule; the nearest one is named."""
     import difflib
 
-    near = difflib.get_close_matches(name.upper(), known, n=1)
+    asked = name.upper()
+    near = [rule for rule in sorted(known) if _signs_apart(rule, asked) == 1]
+    near = near or difflib.get_close_matches(asked, known, n=1, cutoff=_ALIKE)
     return "an id like D2R101 or its beginning was expected" + (f"; did you mean {near[0]}?" if near else "")
+
+
+def _signs_apart(one: str, other: str) -> int:
+    """Number of places at which two texts of one length differ; that length for others."""
+    if len(one) != len(other):
+        return max(len(one), len(other))
+    return sum(a != b for a, b in zip(one, other, strict=True))
 
 
 def read_configuration(table: Mapping[str, object], source: str = "", others: Collection[str] = ()) -> Configuration:
@@ -197,13 +213,20 @@ def check_deck(
     configuration = configuration or Configuration()
     configuration.verify(RULES)
     case = _read(path, content, judge, restarts)
-    findings = list(_findings(case, configuration))
+    findings = _without_what_follows(list(_findings(case, configuration)))
     order = {path: 0}  # the deck itself first, its includes as they come
     for finding in findings:
         order.setdefault(finding.file, len(order))
     findings.sort(key=lambda finding: (order[finding.file], finding.line, finding.column, finding.rule))
     windows, remarks = tuple(_told(case.windows.windows)), tuple(_remarks(case.deck))
     return Checked(path, windows, tuple(findings), case.switching, tuple(case.deck.files), remarks, case.solver)
+
+
+def _without_what_follows(findings: list[Finding]) -> list[Finding]:
+    """Leave out findings that follow from a mistake of units which another finding reports."""
+    causes = {finding.rule for finding in findings} & _FOLLOW.keys()
+    follow = set[str]().union(*(_FOLLOW[rule] for rule in causes))
+    return [finding for finding in findings if finding.rule not in follow]
 
 
 def _told(windows: Iterable[Window]) -> Iterator[CheckedWindow]:

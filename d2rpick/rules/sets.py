@@ -171,9 +171,12 @@ def _there(case: Case) -> Iterator[Objection]:
             continue
         for header in headers:
             if entities.named(header.entno.value) is None:
-                there = f"has {_listed(entities)}" if entities.found else "has none"
-                found = f"ENTNO is {header.entno.value}, but no {what} has this number: the deck {there}"
-                yield header.entno.field, f"{found}; the switch never comes: give the number of one of them"
+                number = f"ENTNO is {header.entno.value}, but"
+                if entities.found:
+                    found = f"{number} no {what} has this number: the deck has {_listed(entities)}"
+                    yield header.entno.field, f"{found}; the switch never comes: give the number of one of them"
+                else:
+                    yield header.entno.field, f"{number} the deck has no {what}, so the switch never comes; add one"
 
 
 @passes(_with_floor(4, 7), _force(2, 1, contact=_BY_ORDER), _force(3, 7, contact=_contact("GENERAL") + _WALL))
