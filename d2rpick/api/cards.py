@@ -31,7 +31,8 @@ _ONLY_JUDGED: Final = "`parts` chooses by whose energy a card for {} is judged; 
 class CardOptions(TypedDict, total=False):
     """How a card is printed.
 
-    ``solver``: ``"ls-dyna"``, ``"radioss"`` or ``"radioss-sensors"`` (default: the one that wrote the history).
+    ``solver``: ``"ls-dyna"``, ``"radioss"`` or ``"radioss-sensors"`` (default: the one that wrote the history); with
+    ``contact`` or ``wall``, the number of what pushes, ``"ls-dyna-contact"`` or ``"radioss-contact"``.
     ``step_cap``: the largest time step while rigid.  LS-DYNA: ``merge``, the lead part that all others are merged into,
     ``swset``, ids of the two switch sets of the first window.  Radioss: ``node``, main nodes of the rigid bodies,
     ``end`` of the run and its ``name``.
@@ -44,6 +45,8 @@ class CardOptions(TypedDict, total=False):
     node: Parts | None
     end: float | None
     name: str | None
+    contact: int | None
+    wall: int | None
 
 
 class Judging(CardOptions, total=False):
@@ -99,6 +102,8 @@ class Cards:
     node: tuple[str, ...] = option("Radioss: main nodes of the rigid bodies.", "names", "IDS", many=True)
     end: float | None = option("Radioss: end of the run.  [default: end of the history]", TIME, "T")
     name: str | None = option("Radioss: name of the run.  [default: Root]", metavar="NAME")
+    contact: int | None = option("Contact whose force switches (solvers ls-dyna-contact, radioss-contact).", _IDS, "ID")
+    wall: int | None = option("Rigid wall whose force switches (the same solvers).", _IDS, "ID")
     starter: str = ""  # cards that the starter deck lacks
     sensor: int = 901  # first id of sensors that is free
     delete_nodal_bodies: bool = False  # as those of Printing
@@ -164,7 +169,7 @@ class Cards:
 
         found = suiting(deck, parts)
         cards = replace(self, solver=self.solver or found.solver)
-        if found.solver == "ls-dyna" == cards.solver:
+        if found.solver == "ls-dyna" and str(cards.solver).startswith("ls-dyna"):
             cards = replace(
                 cards,
                 swset=cards.swset or found.swset,

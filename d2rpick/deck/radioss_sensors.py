@@ -72,8 +72,8 @@ def active_spans(starter: Starter, number: int, course: Course = _UNKNOWN, above
             return f"sensor {number}, of {one}"
     known = [one for one in found if not isinstance(one, str)]
     if kind == "OR":
-        return _either(known)
-    return inactive(_either([inactive(one) for one in known]) if kind == "AND" else known[0])
+        return either(known)
+    return inactive(either([inactive(one) for one in known]) if kind == "AND" else known[0])
 
 
 def _while_pushed(starter: Starter, number: int, rows: Sequence[Row], course: Course) -> Spans | str:
@@ -87,7 +87,7 @@ def _while_pushed(starter: Starter, number: int, rows: Sequence[Row], course: Co
         return f"{name} of a size that is not followed"
     if number in course.resets:
         return f"{name} and is reset"
-    return _either([tuple((start + needed, end + wait) for start, end in course.contacts if end - start >= needed)])
+    return either([tuple((start + needed, end + wait) for start, end in course.contacts if end - start >= needed)])
 
 
 def waits_for_force(starter: Starter, number: int) -> bool:
@@ -109,7 +109,8 @@ def only_force(starter: Starter) -> bool:
     return len(contacts) + len(starter.named("RWALL")) == 1
 
 
-def _either(several: Sequence[Spans]) -> Spans:
+def either(several: Sequence[Spans]) -> Spans:
+    """Spans in which one of several is active."""
     joined: list[tuple[float, float]] = []
     for start, stop in sorted(one for spans in several for one in spans):
         if joined and start <= joined[-1][1]:

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import DeckError, name_units
 from d2rpick.base.files import write_whole
+from d2rpick.deck.engine_files import EngineFile, engine_lines, listed, off
 from d2rpick.deck.ls_dyna_parts import read_parts
-from d2rpick.deck.printing import EngineFile, engine_lines, listed, off
 from d2rpick.deck.radioss_deck import Leg, Starter, below_title, blocks, card_of, kept_off, keyword, numbers, read_legs
 from d2rpick.deck.radioss_files import root_of, run_files
 from d2rpick.deck.radioss_run import Run, parts_off, read_run

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import Card
     from d2rpick.deck.reader import Deck
     from d2rpick.deck.switching import Unit
+    from d2rpick.flight.contact_times import ContactTimes
     from d2rpick.rules.judgement import HistoryJudge
 
     Spans = tuple[tuple[float, float], ...]  # of time
@@ -72,10 +73,10 @@ def forced_switches(deck: Deck, events: Sequence[Event], judge: HistoryJudge, en
         found: list[Window] = []
         contacts: Spans = ()
         for event in by_card[there]:
-            seen = None if event.unit.part is None else judge.contacts([event.unit.part])
-            if seen is not None:
-                contacts = seen
-                found += _windows(event, back, by_card, waiting, seen, end)
+            pushed = None if event.unit.part is None else judge.pushed([event.unit.part])
+            if pushed is not None:
+                contacts = _as_seen(pushed, back)
+                found += _windows(event, back, by_card, waiting, contacts, end)
         if found:
             cards = (there.card, back.card) if back else (there.card,)
             yield Forced(there.card, cards, tuple(found), contacts, "TIME3")
@@ -102,6 +103,13 @@ def _waiting(card: SwitchSet) -> ForceSwitch | None:
         header.time3.value * factor,
         bool(header.paired.value),
     )
+
+
+def _as_seen(pushed: ContactTimes, back: SwitchSet | None) -> Spans:
+    """Give the contacts as the set sees them that makes parts deformable: earlier by the time to fly its OFFSET."""
+    offset = back.header.offset.value if back and back.header and not back.header.offset.problem else 0.0
+    lead = offset / pushed.speed if pushed.speed and offset > 0 else 0.0
+    return tuple((start - lead, end) for start, end in pushed.spans)
 
 
 def _pair(

@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import ArgumentError, DeckError, name_units
 from d2rpick.deck import read_inventory
+from d2rpick.deck.engine_files import capped, listed, off
 from d2rpick.deck.ls_dyna_parts import read_entities
 from d2rpick.deck.pieces import inner_period, supports_of
 from d2rpick.deck.printed_card import PHYSICS, PrintedCard, Printing, check_ids, comments, shortest
-from d2rpick.deck.printing import Waiting, capped, header, listed, off, to_deformable, to_rigid
 from d2rpick.deck.radioss_bodies import bodies_for
 from d2rpick.deck.radioss_deck import kept_off, number_of
 from d2rpick.deck.radioss_run import parts_off, read_run
 from d2rpick.deck.radioss_sensors import WITHOUT_FORCE
 from d2rpick.deck.reader import read_deck
+from d2rpick.deck.switch_sets import Waiting, header, to_deformable, to_rigid
 from d2rpick.running.inner_motion import Wait, check_wait, wait_of_deck
 
 if TYPE_CHECKING:

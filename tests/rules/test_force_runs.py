@@ -106,6 +106,18 @@ def events(folder: Path) -> list[tuple[bool, float]]:
     return found
 
 
+def visible(listed: list[tuple[bool, float]]) -> list[tuple[bool, float]]:
+    """Leave out what a history cannot show: a contact at 0, the last interval, and windows shorter than three."""
+    inside = [event for event in listed if 0 < event[1] < END - INTERVAL]
+    kept: list[tuple[bool, float]] = []
+    for rigid, time in inside:
+        if kept and kept[-1][0] and not rigid and time - kept[-1][1] < 3 * INTERVAL:
+            kept.pop()
+        else:
+            kept.append((rigid, time))
+    return kept
+
+
 @pytest.mark.parametrize("run", bounces())
 def test_the_sensor_switches_as_often_as_momenta_say(tmp_path: Path, run: Bounce) -> None:
     """In the run without switching the sensor switches nothing: its listing is the truth of what it would do."""
@@ -120,9 +132,9 @@ def test_the_sensor_switches_as_often_as_momenta_say(tmp_path: Path, run: Bounce
     windows = check_deck(str(switched / "X_0000.rad"), judge=judge).windows
     predicted = [(True, one.tr) for one in windows if one.tr > 0]
     predicted += [(False, one.td) for one in windows if one.td is not None]
-    predicted.sort(key=lambda event: event[1])
-    listed = events(reference)
-    if len(listed) - len(predicted) == 1 and listed[-1][1] > END - 2 * INTERVAL:
-        listed.pop()  # within the last interval
+    predicted, listed = visible(sorted(predicted, key=lambda event: event[1])), visible(events(reference))
+    longer = predicted if len(predicted) > len(listed) else listed
+    if len(predicted) != len(listed) and longer[-1][1] > END - 3 * INTERVAL:
+        longer.pop()  # it may lie on either side of the last interval
     assert [way for way, _ in predicted] == [way for way, _ in listed]
     assert [time for _, time in predicted] == pytest.approx([time for _, time in listed], abs=1.5 * INTERVAL)
