@@ -1,4 +1,4 @@
-"""D2R004-010, D2R208: switch sets among each other, and switches by the force of a contact or rigid wall."""
+"""D2R004-010, D2R012, D2R208: switch sets among each other, and switches by the force of a contact or rigid wall."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Final, Literal
 from d2rpick.base.errors import listing
 from d2rpick.deck.force_switching import delay_without_chatter
 from d2rpick.deck.ls_dyna_parts import Entities, read_entities
-from d2rpick.deck.switching import BY_TIME, Header, SwitchSet, Unit
+from d2rpick.deck.switching import BY_SENSOR, BY_TIME, Header, SwitchSet, Unit
 from d2rpick.rules.base import BOTH, ERROR, WARNING, Case, Objection
 from d2rpick.rules.rule import BACK, PASS, THERE, Example, automatic, deck, fails, passes, rule
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from d2rpick.deck.card import Card
 
 
 _OF_WALL: Final = {1, 3}
@@ -203,6 +205,37 @@ def _listed(entities: Entities) -> str:
         f"{one.id or one.number} (*{one.keyword}{f' {one.title!r}' if one.title else ''})" for one in entities.found
     ]
     return listing(texts, most=_MOST_LISTED)
+
+
+_CONTROL: Final = "*SENSOR_CONTROL\n         5   DEF2RIG{:10d}        ON\n         3\n"
+
+
+def _sensed(control: str) -> Example:
+    return deck(control + automatic(20, "0.0", rigid=["1"], code=BY_SENSOR))
+
+
+@passes(PASS, _sensed(_CONTROL.format(20)), _sensed("*SENSOR_CONTROL_TITLE\nby force\n" + _CONTROL.format(20)[16:]))
+@fails(_sensed(""), _sensed(_CONTROL.format(21)), _sensed(_CONTROL.format(20).replace("DEF2RIG", " AIRBAG")))
+@rule("D2R012", ERROR, "CODE 5 without a *SENSOR_CONTROL that switches the set")
+def _uncontrolled(case: Case) -> Iterator[Objection]:
+    """A set with CODE 5 is switched by a *SENSOR_CONTROL with TYPE DEF2RIG whose TYPEID is its SWSET. Without one it
+    never switches. Judged only when all of the deck could be read and it has parts. When the sensor switches is not
+    followed (D2R302). Source: vendor keyword data.
+    """
+    if not case.whole:
+        return
+    controlled = {number for card in case.deck.named("SENSOR_CONTROL") for number in _controlled(card)}
+    for _, header in case.headers:
+        if header.code.value == BY_SENSOR and not header.code.problem and header.swset.value not in controlled:
+            found = f"no *SENSOR_CONTROL of type DEF2RIG has TYPEID {header.swset.value}, so set {header.swset.value}"
+            yield header.code.field, f"{found} never switches; add one, or choose another CODE"
+
+
+def _controlled(card: Card) -> Iterator[int]:
+    """Switch sets that a *SENSOR_CONTROL switches."""
+    for row in card.data[:1]:
+        if card.word(row, 1).value == "DEF2RIG":
+            yield card.integer(row, 2).value + card.transform.rest
 
 
 def _delayed(wait: str) -> Example:

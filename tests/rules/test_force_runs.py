@@ -94,28 +94,21 @@ def _contact() -> str:
     return text + f"{'000':>10}{'':10}{0:10d}{reals(0.05, 0.0, 0.0)}{wide(0, 0)[:-1]}{reals(0.0)[:-1]}{wide(0)}"
 
 
-def events(folder: Path) -> list[tuple[bool, float]]:
-    """Give when the sensor becomes inactive (True) or active, by the listing."""
-    found, now = [], 0.0
+def listed_windows(folder: Path) -> list[tuple[float, float]]:
+    """Give when the sensor is not active, by the listing: from 0 on, from one time to another, and to the end."""
+    ends, now = [0.0], 0.0
     for line in (folder / "X_0001.out").read_text("latin-1").splitlines():
         if cycle := re.match(r"\s+\d+\s+([\d.E+-]+)\s+[\d.E+-]+ [A-Z]+ ", line):
             now = float(cycle[1])
         elif event := re.search(rf"SENSOR \(\w+\) NUMBER +{SENSOR} ,?(DE)?ACTIVATED AT TIME +([\d.E+-]+)", line):
             time = float(event[2])
-            found.append((bool(event[1]), time if time < END else now))
-    return found
+            ends.append(time if time < END else now)
+    return list(zip(ends[::2], [*ends[1::2], END][: len(ends[::2])], strict=True))
 
 
-def visible(listed: list[tuple[bool, float]]) -> list[tuple[bool, float]]:
-    """Leave out what a history cannot show: a contact at 0, the last interval, and windows shorter than three."""
-    inside = [event for event in listed if 0 < event[1] < END - INTERVAL]
-    kept: list[tuple[bool, float]] = []
-    for rigid, time in inside:
-        if kept and kept[-1][0] and not rigid and time - kept[-1][1] < 3 * INTERVAL:
-            kept.pop()
-        else:
-            kept.append((rigid, time))
-    return kept
+def met(window: tuple[float, float], others: list[tuple[float, float]]) -> bool:
+    """Whether both ends of a window are those of another one, within an interval and the step of the listing."""
+    return any(window == pytest.approx(other, abs=1.5 * INTERVAL) for other in others)
 
 
 @pytest.mark.parametrize("run", bounces())
@@ -130,11 +123,10 @@ def test_the_sensor_switches_as_often_as_momenta_say(tmp_path: Path, run: Bounce
     solve(reference, "X")
     judge = HistoryJudge(d2.read(reference / "XT01").files, Selection(), Settings())
     windows = check_deck(str(switched / "X_0000.rad"), judge=judge).windows
-    predicted = [(True, one.tr) for one in windows if one.tr > 0]
-    predicted += [(False, one.td) for one in windows if one.td is not None]
-    predicted, listed = visible(sorted(predicted, key=lambda event: event[1])), visible(events(reference))
-    longer = predicted if len(predicted) > len(listed) else listed
-    if len(predicted) != len(listed) and longer[-1][1] > END - 3 * INTERVAL:
-        longer.pop()  # it may lie on either side of the last interval
-    assert [way for way, _ in predicted] == [way for way, _ in listed]
-    assert [time for _, time in predicted] == pytest.approx([time for _, time in listed], abs=1.5 * INTERVAL)
+    predicted = [(one.tr, END if one.td is None else one.td) for one in windows]
+    listed = listed_windows(reference)
+    for some, others in ((predicted, listed), (listed, predicted)):
+        # what is shorter than that may fall between two states of the history
+        lasting = [(tr, td) for tr, td in some if td - tr > 3 * INTERVAL]
+        assert lasting
+        assert all(met(window, others) for window in lasting)
