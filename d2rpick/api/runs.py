@@ -72,14 +72,26 @@ class Run:
         """What was left out or assumed in reading."""
         return self.files.notes
 
-    def overview(self, deck: Path | None = None) -> Overview:
+    def overview(self, deck: arguments.Deck | None = None) -> Overview:
         """Give what ``d2rpick info`` shows: format, states, sampling, channels, parts, flights, health.
 
-        The main ``deck`` of the run tells gravity, supports and imposed motion.
+        The main ``deck`` of the run tells gravity, supports and imposed motion.  Default: the only main deck in the
+        folder that was read; False for none.
         """
         from d2rpick.choice.overview import survey
 
-        return survey(self.files, self.chosen, None if deck is None else arguments.one_path("deck", deck))
+        named = arguments.one_path("deck", deck) if deck else None
+        return survey(self.files, self.chosen, self._deck_in_folder if deck is None else named)
+
+    @property
+    def _deck_in_folder(self) -> str | None:
+        """The only main deck in the folder that was read."""
+        if self.folder is None:
+            return None
+        from d2rpick.deck import decks_of_run
+
+        decks = decks_of_run(self.folder)
+        return decks[0] if len(decks) == 1 else None
 
     def to_frame(self, parts: Parts | None = None) -> pd.DataFrame:
         """Give energies over time as a table, at full precision.

@@ -47,10 +47,12 @@ def info(request: Request, output: Output) -> None:
     d2rpick info sample_data/energy.glstat
     d2rpick info -f json sample_data/rollover.csv
     """
+    from d2rpick.api.deck_in_folder import naming
+
     selection = request.selection()
     with opened(request, output) as (run, output):
-        overview = replace(run, chosen=selection).overview(request.deck)
-    output.notes((), overview.cautions)
+        overview = replace(run, chosen=selection).overview(request.deck or False)
+    output.notes((), (*naming(request), *overview.cautions))
     form = output.output_format
     shown = output.shown()
     output.result(in_words(write("overview", form, overview, shown), form, shown.width))

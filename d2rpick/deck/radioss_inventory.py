@@ -17,7 +17,7 @@ from d2rpick.deck.mesh import KINDS, NOT_COUNTED, Mesh, elements_of, nodes_of
 from d2rpick.deck.model import Formulation, Inventory, Material, PartData, Section
 from d2rpick.deck.radioss_deck import SOLIDS, Starter, below_title, blocks, kept_off, keyword, number_of, reals, whole
 from d2rpick.deck.radioss_flaws import flaws_of
-from d2rpick.deck.radioss_run import Run, find_run_windows, left_rigid, parts_of_fixed_bodies
+from d2rpick.deck.radioss_run import Run, find_run_windows, left_rigid, parts_of_fixed_bodies, sensors_of_parts
 from d2rpick.deck.reader import cuts, holds_mesh
 from d2rpick.deck.unswitchable import unswitchable_of_radioss
 
@@ -99,11 +99,13 @@ def _notes(run: Run, starter: Starter) -> Iterator[str]:
 def _parts(starter: Starter, mesh: Mesh, rigid: set[int]) -> Mapping[int, PartData]:
     materials, properties = dict(_materials(starter)), dict(_properties(starter))
     kinds, unturned, unswitchable = mesh.kinds, starter.unturned, unswitchable_of_radioss(starter)
+    sensors = sensors_of_parts(starter)
     found: dict[int, PartData] = {}
     for part, line in starter.parts.items():
         section = _section(properties.get(line.prop), kinds.get(part, set()), turns=part not in unturned)
         made_of = _material(materials.get(line.material), properties.get(line.prop), part in rigid)
-        why = unswitchable[part].reason if part in unswitchable else ""
+        by_sensor = f"the deck switches it by sensor {sensors[part]} already" if part in sensors else ""
+        why = unswitchable[part].reason if part in unswitchable else by_sensor
         found[part] = PartData(part, line.title, made_of, section, why)
     return found
 

@@ -294,6 +294,13 @@ def parts_of_fixed_bodies(run: Run) -> set[int]:
     return set().union(*held.values())
 
 
+def sensors_of_parts(starter: Starter) -> dict[int, int]:
+    """Give the sensors that switch the rigid bodies of parts, by part."""
+    sensors = {body.node.value: body for body in starter.bodies if body.sensor and not starter.moved}
+    held = rigid_parts(starter, {node: body.group for node, body in sensors.items()}) if sensors else {}
+    return {part: sensors[node].sensor for node, parts in held.items() for part in parts}
+
+
 class LeftRigid(NamedTuple):
     """Parts that lie whole in such bodies, where to put them off, what is wrong, and how it is mended."""
 

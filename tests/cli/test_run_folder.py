@@ -72,6 +72,15 @@ def test_python_uses_the_same_deck(box: Path) -> None:
     assert "--deck" in found.command  # since the command names the files of the run
 
 
+def test_the_overview_reads_the_same_deck(box: Path) -> None:
+    assert f"deck-in-folder: {box / 'main.k'}" in run("info", str(box)).stderr
+    assert "deck-in-folder" not in run("info", "--no-deck", str(box)).stderr
+    by_python, by_command = d2.read(box).overview(), answer("info", str(box))
+    assert [flight.start for _, flight in by_python.flights] == [one["start"] for one in by_command["flights"]]
+    shutil.copy(box / "main.k", box / "other.k")
+    assert d2.read(box).overview().flights  # nothing is asked here: none is read
+
+
 def test_parts_that_share_nodes_are_merged_and_the_pasted_card_is_clean(box: Path) -> None:
     card, told = card_in(box)
     assert "         2         1      PART" in card

@@ -264,3 +264,10 @@ def test_a_body_that_nothing_switches_makes_its_parts_rigid(tmp_path: Path) -> N
     material = read_inventory(main).parts[1].material
     assert material is not None
     assert material.kind == "deformable"
+
+
+@pytest.mark.parametrize("name", ["rigid parts with a sensor", "sensors of time join"])
+def test_parts_that_a_sensor_switches_already_are_not_switched_again(tmp_path: Path, name: str) -> None:
+    found = read_inventory(place(tmp_path, (LISTED | RIGID_PARTS)[name])).parts
+    assert found[1].unswitchable == "the deck switches it by sensor 7 already"
+    assert found[2].unswitchable == ""
