@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from d2rpick.api.cards import Cards
-from d2rpick.base.errors import if_written
+from d2rpick.base.errors import DeckError, if_written
 from d2rpick.base.files import write_whole
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from d2rpick.api.asked import Asked
     from d2rpick.api.runs import Run
     from d2rpick.base.errors import Caution
+    from d2rpick.choice.judged_card import SolverInput
     from d2rpick.choice.situation import Situation
     from d2rpick.choice.trade_off import TradeOff
     from d2rpick.report.formats import Shown
@@ -157,12 +158,20 @@ class RunAnswer(Paged):
         explored: TradeOff | None,
     ) -> PageContext:
         """Give what a page shows beside the answer, with the card of the chosen situation and tr."""
-        from d2rpick.choice.judged_card import input_for
         from d2rpick.report.page import PageContext
 
-        request = (cards or Cards()).request(self.question)
-        card = input_for(self.question.reference, *chosen, request) if chosen else None
+        card = self._card(cards, *chosen) if chosen else None
         return PageContext(self.question.reference.run, command, judging, card, explorer=self._explorer([explored]))
+
+    def _card(self, cards: Cards | None, situation: Situation, tr: float) -> SolverInput:
+        """Give the card of a tr, or why there is none, with what the deck of the run says of it."""
+        from d2rpick.choice.judged_card import SolverInput, input_for
+
+        try:
+            suited, _ = (cards or Cards()).by_deck(self.question)
+        except DeckError as error:
+            return SolverInput("", "part", refusal=str(error))
+        return input_for(self.question.reference, situation, tr, suited.request(self.question))
 
     def _explorer(self, found: Iterable[TradeOff | None]) -> Any:
         """Give what can be explored on a page, and the command line that asks for each td."""

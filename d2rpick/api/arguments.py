@@ -14,9 +14,12 @@ from d2rpick.api.request import OPTIONS, TIME, Number
 from d2rpick.base.errors import DeckError
 
 if TYPE_CHECKING:
+    from typing import Literal
+
     from d2rpick.vibration.oscillator import Oscillator
 
     Path = str | os.PathLike[str]
+    Deck = Path | Literal[False]  # False: none, also where one lies in the folder of the run
     Parts = str | int | Iterable[str | int]
 
 _LONGEST_SHOWN: Final = 60  # of a wrong value in a message

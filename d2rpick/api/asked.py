@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from d2rpick.api import arguments
+from d2rpick.api.deck_in_folder import naming, with_deck_in_folder
 from d2rpick.api.request import Request
 from d2rpick.base.errors import ArgumentError, Caution, FormatError, listing, name_units
 from d2rpick.base.tuples import NamedTuple
@@ -40,6 +41,12 @@ class Asked(NamedTuple):
     model: CostModel | None = None
     on_card: tuple[str, ...] = ()
     cautions: tuple[Caution, ...] = ()
+    of_this_run: bool = True  # whether the deck, where there is one, may be that of the run
+
+    @property
+    def deck(self) -> str | None:
+        """The main deck of the run; None without one, or if it is the deck of another model."""
+        return self.request.deck if self.of_this_run else None
 
     @property
     def options(self) -> tuple[str, ...]:
@@ -53,7 +60,7 @@ def request_of(
     run: Run | None,
     parts: Parts | None,
     flying: Parts | None,
-    deck: arguments.Path | None,
+    deck: arguments.Deck | None,
     weights: Weights | arguments.Path | None,
     choosing: Choosing,
 ) -> Request:
@@ -61,8 +68,10 @@ def request_of(
     if run is not None:
         arguments.check_run("run", run)
     chosen = run.chosen if run else Selection()
-    return Request(
-        deck=None if deck is None else arguments.one_path("deck", deck),
+    request = Request(
+        deck=None if deck is None or deck is False else arguments.one_path("deck", deck),
+        no_deck=deck is False,
+        run_folder=run.folder if run else None,
         weights=arguments.file_or_weights(weights),
         history=run.sources if run else (),
         input_format=run.input_format if run else "auto",
@@ -73,16 +82,18 @@ def request_of(
         channel=tuple(f"{quantity}={name}" for quantity, name in chosen.channels),
         **arguments.chosen(choosing),
     )
+    return with_deck_in_folder(request)
 
 
 def open_run(request: Request, names: Sequence[str] = ()) -> Run:
     """Open the run that is asked about, or other files as its files are opened."""
-    from d2rpick.api.runs import Run
+    from d2rpick.api.runs import Run, folder_of
     from d2rpick.histories import opening
 
     selection = request.selection(parts=False)
-    files = opening.open_run(names or request.history, selection, request.input_format)
-    return Run(files, selection, request.input_format)
+    names = names or request.history
+    files = opening.open_run(names, selection, request.input_format)
+    return Run(files, selection, request.input_format, folder_of(names))
 
 
 def on_card_only(request: Request, run: histories.Run) -> bool:
@@ -113,9 +124,11 @@ def ask(run: Run, request: Request, *, card_alone: bool = False, merge: int | No
     selection = request.selection(parts=False)._replace(parts=request.part)
     if request.part:
         _check_recommended(request, files)
+    foreign = False
     if model is not None:
-        from d2rpick.choice.deck_of_run import in_deck, with_deck
+        from d2rpick.choice.deck_of_run import in_deck, of_another_model
 
+        foreign = of_another_model(files, model.inventory) is not None
         files = in_deck(files, model.inventory)
         selection = selected(files, selection, settings, model)
     parts: tuple[str, ...] = ()
@@ -126,8 +139,11 @@ def ask(run: Run, request: Request, *, card_alone: bool = False, merge: int | No
     reference = Reference.of(files, selection)
     cautions: tuple[Caution, ...] = ()
     if model is not None:
+        from d2rpick.choice.deck_of_run import with_deck
+
         settings, cautions = with_deck(settings, reference, model)
-    asked = Asked(run, request, reference, selection, settings, model, parts, cautions)
+        cautions = (*naming(request), *cautions)
+    asked = Asked(run, request, reference, selection, settings, model, parts, cautions, of_this_run=not foreign)
     return asked if merge is None else _merged(asked, merge)
 
 

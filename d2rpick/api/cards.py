@@ -31,7 +31,8 @@ _ONLY_JUDGED: Final = "`parts` chooses by whose energy a card for {} is judged; 
 class CardOptions(TypedDict, total=False):
     """How a card is printed.
 
-    ``solver``: ``"ls-dyna"``, ``"radioss"`` or ``"radioss-sensors"`` (default: the one that wrote the history).
+    ``solver``: ``"ls-dyna"``, ``"radioss"`` or ``"radioss-sensors"`` (default: the one that wrote the history); with
+    ``contact`` or ``wall``, the number of what pushes, ``"ls-dyna-contact"`` or ``"radioss-contact"``.
     ``step_cap``: the largest time step while rigid.  LS-DYNA: ``merge``, the lead part that all others are merged into,
     ``swset``, ids of the two switch sets of the first window.  Radioss: ``node``, main nodes of the rigid bodies,
     ``end`` of the run and its ``name``.
@@ -44,6 +45,8 @@ class CardOptions(TypedDict, total=False):
     node: Parts | None
     end: float | None
     name: str | None
+    contact: int | None
+    wall: int | None
 
 
 class Judging(CardOptions, total=False):
@@ -100,8 +103,12 @@ class Cards:
     node: tuple[str, ...] = option("Radioss: main nodes of the rigid bodies.", "names", "IDS", many=True)
     end: float | None = option("Radioss: end of the run.  [default: end of the history]", TIME, "T")
     name: str | None = option("Radioss: name of the run.  [default: Root]", metavar="NAME")
+    contact: int | None = option("Contact whose force switches (solvers ls-dyna-contact, radioss-contact).", _IDS, "ID")
+    wall: int | None = option("Rigid wall whose force switches (the same solvers).", _IDS, "ID")
     starter: str = ""  # cards that the starter deck lacks
     sensor: int = 901  # first id of sensors that is free
+    delete_nodal_bodies: bool = False  # as those of Printing
+    delete_node_sets: bool = False
 
     @classmethod
     def of(cls, given: CardOptions) -> Cards:
@@ -125,7 +132,14 @@ class Cards:
         given = {name: getattr(self, name) for name in self.given}
         if self.node:
             given["node"] = tuple(numbers("--node", self.node))
-        return Printing(part=tuple(parts), starter=self.starter, sensor=self.sensor, **given)
+        return Printing(
+            part=tuple(parts),
+            starter=self.starter,
+            sensor=self.sensor,
+            delete_nodal_bodies=self.delete_nodal_bodies,
+            delete_node_sets=self.delete_node_sets,
+            **given,
+        )
 
     def check_solver(self, solver: str) -> None:
         """Refuse an option that says what the input of ``solver`` has no place for."""
@@ -138,33 +152,45 @@ class Cards:
                 hint = "" if self.solver else f"; without `solver` the card is one for {SOLVERS[solver].title}"
                 raise ArgumentError(f"`{name}` is an option of `solver` {owner}{hint}")
 
-    def by_deck(self, deck: str | None) -> Cards:
-        """Take the solver and the name of the run from the deck, unless they are given."""
-        if deck is None:
-            return self
-        from d2rpick.deck.radioss_files import run_files
-        from d2rpick.deck.radioss_run import read_run
+    def by_deck(self, asked: Asked) -> tuple[Cards, tuple[str, ...]]:
+        """Complete a card by the deck of the run, unless its options say otherwise.
 
-        if not run_files(deck):
-            return replace(self, solver=self.solver or "ls-dyna")
-        legs = read_run(deck).legs
-        return replace(self, solver=self.solver or "radioss", name=self.name or (legs[0].name if legs else None))
+        The deck gives the solver, the name and end of the run, ids that are free, the constraints that have to be
+        deleted, and the rigid bodies that switch the parts.  Notes say which bodies it lacks.
 
-    def for_bodies(self, asked: Asked) -> tuple[Cards, tuple[str, ...]]:
-        """Let the deck say which rigid bodies switch the parts, with what it lacks, and notes of that.
-
-        Only a Radioss deck has any; where main nodes are given they are meant.
+        Raises
+        ------
+        DeckError
+            If the deck cannot be read, or rigid bodies of it cannot switch the parts.
         """
+        deck, parts = asked.deck, [part.id for part in asked.reference.history.parts or ()]
+        if deck is None:
+            return self, ()
+        from d2rpick.deck.suiting import suiting
+
+        found = suiting(deck, parts)
+        cards = replace(self, solver=self.solver or found.solver)
+        if found.solver == "ls-dyna" and str(cards.solver).startswith("ls-dyna"):
+            cards = replace(
+                cards,
+                swset=cards.swset or found.swset,
+                delete_nodal_bodies=found.delete_nodal_bodies,
+                delete_node_sets=found.delete_node_sets,
+            )
+            return cards, ()
         from d2rpick.deck.printing import SOLVERS
 
-        deck, parts = asked.request.deck, asked.reference.history.parts
-        if deck is None or not parts or self.node or SOLVERS[self.solver or ""].switches != "node":
-            return self, ()
+        if SOLVERS[cards.solver or ""].title != SOLVERS[found.solver].title:
+            return cards, ()
+        end = found.end if cards.end is None else cards.end
+        cards = replace(cards, name=cards.name or found.name, end=end)
+        if not parts or cards.node:
+            return cards, ()
         from d2rpick.deck.radioss_bodies import bodies_for
 
-        found = bodies_for(deck, [part.id for part in parts])
-        nodes = tuple(map(str, found.nodes))
-        return replace(self, node=nodes, starter=found.cards, sensor=found.sensor), found.notes
+        bodies = bodies_for(deck, parts)
+        nodes = tuple(map(str, bodies.nodes))
+        return replace(cards, node=nodes, starter=bodies.cards, sensor=bodies.sensor), bodies.notes
 
     def request(self, asked: Asked) -> CardRequest:
         """Say how the card of a run is printed."""
@@ -204,10 +230,12 @@ class JudgedCard(NamedTuple):
     """A card, with what was found of each of its new windows as printed; ``str`` gives its text.
 
     ``card`` has ``text``, ``files`` by the names that the solver expects, ``windows`` as printed and ``notes``.
+    ``cautions`` are what `check` has against the card in the deck of the run, and what is not known without a deck.
     """
 
     card: PrintedCard
     verdicts: tuple[Verdict, ...] = ()
+    cautions: tuple[Caution, ...] = ()
 
     def __str__(self) -> str:
         return self.card.text
@@ -232,21 +260,28 @@ def judged(
     ArgumentError
         If nobody says whom it switches, or an option belongs to another solver.
     """
+    from d2rpick.api.card_in_deck import objections
     from d2rpick.choice.answers import verify_of
     from d2rpick.choice.judged_card import judged_card
     from d2rpick.deck.printing import SOLVERS
 
+    cards, notes = cards.by_deck(asked)
     reference, request = asked.reference, cards.request(asked).by(asked.settings)
     judge = judge or partial(verify_of, reference, settings=asked.settings)
     found = judged_card(windows, reference.history, judge, request, done)
+    solver, printing = request.of(reference.history)
     if found is None:
-        raise ArgumentError(needed(SOLVERS[request.of(reference.history)[0]]))
-    return JudgedCard(*found)
+        raise ArgumentError(needed(SOLVERS[solver]))
+    card, verdicts = found
+    card = replace(card, notes=(*notes, *card.notes))
+    apart = 0 if printing.merge or SOLVERS[solver].switches != "part" else len(printing.part)
+    return JudgedCard(card, verdicts, tuple(objections(card, asked, apart)))
 
 
-def all_cautions(verdicts: Iterable[Verdict]) -> tuple[Caution, ...]:
-    """Cautions of verdicts, each once, and the verdicts themselves where they are objections."""
-    return tuple(dict.fromkeys(caution for verdict in verdicts for caution in _cautions(verdict)))
+def all_cautions(card: JudgedCard) -> tuple[Caution, ...]:
+    """Cautions of a card and of its verdicts, each once, and the verdicts themselves where they are objections."""
+    of_verdicts = (caution for verdict in card.verdicts for caution in _cautions(verdict))
+    return tuple(dict.fromkeys((*of_verdicts, *card.cautions)))
 
 
 def _cautions(verdict: Verdict) -> Iterator[Caution]:

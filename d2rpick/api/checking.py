@@ -15,6 +15,7 @@ from d2rpick.base.errors import Caution, ConfigurationError, D2RPickError, DeckE
 from d2rpick.base.files import STDIN
 from d2rpick.deck import main_decks
 from d2rpick.deck.radioss_files import run_files
+from d2rpick.deck.restarts import is_restart
 from d2rpick.report.findings import FINDING, Checks
 from d2rpick.report.tables import positional
 from d2rpick.rules import RULES, Checked, Configuration, check_deck, configuration_for
@@ -183,24 +184,49 @@ def _each(named: Sequence[str], rules: Configuration, judge: HistoryJudge | None
     seen: set[str] = set()
     real_folder = cache(os.path.realpath)  # which asks the system for each folder above
     configured = cache(lambda folder: configuration_for(os.path.join(folder, ""), rules, SETTINGS))  # noqa: PTH118
-    for name in named:
-        try:
-            decks = main_decks(name) if os.path.isdir(name) else [name]  # noqa: PTH112  Path raises on odd names
-        except DeckError as error:
-            yield Unreadable(name, error)
+    found_by_name = {name: _decks(name) for name in dict.fromkeys(named)}
+    listed = [deck for decks in found_by_name.values() if not isinstance(decks, DeckError) for deck in decks]
+    restarts = _restarts(listed)
+    for name, decks in found_by_name.items():
+        if isinstance(decks, DeckError):
+            yield Unreadable(name, decks)
             continue
         for deck in decks:
             folder, file = os.path.split(deck)
             real = os.path.realpath(deck) if os.path.islink(deck) else os.path.join(real_folder(folder), file)  # noqa: PTH114, PTH118
-            if real not in seen:
-                found = _found(deck, configured, judge, folder)
+            if real not in seen and not any(deck in legs for legs in restarts.values()):
+                found = _found(deck, configured, judge, folder, restarts.get(deck, ()))
                 others = [] if isinstance(found, Checked) and found.solver == LS_DYNA else run_files(deck)
                 seen.update([real, *map(os.path.realpath, others)])
                 yield found
 
 
+def _decks(name: str) -> list[str] | DeckError:
+    """Give the main decks in a folder, or the deck itself; an error for a folder without any."""
+    try:
+        return main_decks(name) if os.path.isdir(name) else [name]  # noqa: PTH112  Path raises on odd names
+    except DeckError as error:
+        return error
+
+
+def _restarts(decks: Sequence[str]) -> dict[str, list[str]]:
+    """Give the small restarts that go on with the run of a deck of LS-DYNA, the only other deck in their folder."""
+    small = [deck for deck in decks if is_restart(deck)]
+    legs: dict[str, list[str]] = {}
+    for restart in small:
+        folder = os.path.dirname(os.path.abspath(restart))  # noqa: PTH100, PTH120
+        beside = [deck for deck in decks if os.path.dirname(os.path.abspath(deck)) == folder and deck not in small]  # noqa: PTH100, PTH120
+        if len(beside) == 1 and not run_files(beside[0]):
+            legs.setdefault(beside[0], []).append(restart)
+    return legs
+
+
 def _found(
-    name: str, configured: Callable[[str], Configuration], judge: HistoryJudge | None, folder: str
+    name: str,
+    configured: Callable[[str], Configuration],
+    judge: HistoryJudge | None,
+    folder: str,
+    restarts: Sequence[str],
 ) -> Checked | Unreadable:
     """Check a deck by the configuration nearest to it; what is wrong with either does not hide other decks."""
     source = ""
@@ -210,7 +236,7 @@ def _found(
         content = sys.stdin.buffer.read() if name == STDIN else None
         if judge and content is None:
             judge.beside(name)
-        found = check_deck(name, configuration, judge, content)
+        found = check_deck(name, configuration, judge, content, restarts)
         return found._replace(files=(source, *found.files), notes=configuration.notes)
     except Exception as error:
         if isinstance(error, D2RPickError) and not isinstance(error, ConfigurationError | DeckError):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Unpack
 from d2rpick.api import arguments
 from d2rpick.api.answer import Answer, Paged, frame_of, written
 from d2rpick.api.asked import model_of, request_of
+from d2rpick.api.deck_in_folder import naming
 from d2rpick.base.errors import ArgumentError
 from d2rpick.choice import calibration, sets_of_parts
 from d2rpick.choice.cost import Weights, weights_as_toml
@@ -69,7 +70,7 @@ class PartTable(Paged, sets_of_parts.Parts):
 def parts(
     run: Run,
     *,
-    deck: arguments.Path | None = None,
+    deck: arguments.Deck | None = None,
     weights: Weights | arguments.Path | None = None,
     given: Parts | None = None,
     tr: float | None = None,
@@ -83,7 +84,8 @@ def parts(
     run : Run
         As `read` gives it, without switching.
     deck : path, optional
-        Main deck of the run: of LS-DYNA, or a starter or engine file of Radioss.
+        Main deck of the run: of LS-DYNA, or a starter or engine file of Radioss.  Default: the only main deck in the
+        folder that was read; False for none.
     weights : Weights or path, optional
         Cost of an element by formulation, or the file that ``d2rpick calibrate`` wrote.
     given : number, title or several, optional
@@ -122,7 +124,7 @@ def tabled(run: Run, request: Request, tr: float | None, td: float | None) -> Pa
     found = sets_of_parts.parts_of(run.files, request.settings, model, given=ids, times=times, beside=beside)
     window = [text for name, time in (("tr", tr), ("td", td)) if time is not None for text in (f"--{name}", repr(time))]
     command = ("parts", *window, *request.asking(), *positional(request.history))
-    return PartTable.of(found, run=run, command=command)
+    return PartTable.of(found, run=run, command=command, cautions=naming(request))
 
 
 def check_times(tr: float | None, td: float | None) -> Times | float | None:

@@ -10,7 +10,7 @@ from d2rpick.api.answer import RunAnswer, frame_of
 from d2rpick.api.asked import Asked, ask, request_of
 from d2rpick.api.cards import CardOptions, Cards, JudgedCard, judged
 from d2rpick.api.request import NOT_NEGATIVE, check_window
-from d2rpick.base.errors import ArgumentError
+from d2rpick.base.errors import ArgumentError, DeckError
 from d2rpick.choice import plan as planning, trade_off
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def explore(
     steps: int | None = _STEPS,
     parts: Parts | None = None,
     flying: Parts | None = None,
-    deck: arguments.Path | None = None,
+    deck: arguments.Deck | None = None,
     weights: Weights | arguments.Path | None = None,
     **choosing: Unpack[Choosing],
 ) -> Exploration:
@@ -169,10 +169,17 @@ class Plan(RunAnswer, planning.Plan):
         """Write the page, with the cards of the next run."""
         from d2rpick.report.pages import plan_page
 
-        cards = cards or Cards()
-        card = self.printed(cards) if cards.request(self.question).whom(self.history) else None
+        card = self._card_of_windows(cards or Cards())
         explorer = self._explorer(trade_off.explored_flights(self.question.reference, self))
         return plan_page(self, self.question.reference.run, command, card.card.text if card else None, explorer)
+
+    def _card_of_windows(self, cards: Cards) -> JudgedCard | None:
+        """Give the card of the next run; None if nobody says whom it switches, or the bodies of the deck cannot."""
+        try:
+            suited, _ = cards.by_deck(self.question)
+        except DeckError:
+            return None
+        return self.printed(cards) if suited.request(self.question).whom(self.history) else None
 
 
 def plan(
@@ -180,7 +187,7 @@ def plan(
     *,
     parts: Parts | None = None,
     flying: Parts | None = None,
-    deck: arguments.Path | None = None,
+    deck: arguments.Deck | None = None,
     weights: Weights | arguments.Path | None = None,
     min_rigid: float | None = None,
     done: Iterable[tuple[float, float]] | None = (),

@@ -85,6 +85,7 @@ LIMITS: Final = (
     *("fit_window", "no_verify", "strict", "keep_vibration"),
 )
 CHOOSING: Final = (*LIMITS, "cost_share", "step_ratio")
+_NOT_TYPED: Final = ("history", "given", "run_folder", "deck_in_folder")
 # Stands for a file that there is not: typed as it is, the command line is refused instead of taking other weights.
 _IN_MEMORY: Final = "<weights in memory>"
 
@@ -97,7 +98,11 @@ class Request:
     ``given`` names the options that were given, where values that are the default count as well.
     """
 
-    deck: str | None = option("Main deck of the run.", "file", "DECK")
+    deck: str | None = option("Main deck of the run.", "file", "DECK", instead_of=("no_deck",))
+    no_deck: bool = option(
+        "Use no deck.  [default: if HISTORY is the folder of a run, the main deck in it]",
+        *("flag",), default=False, instead_of=("deck",),
+    )  # fmt: skip
     weights: str | Weights | None = option(  # noqa: RUF009
         "Cost of an element by formulation, as d2rpick calibrate writes it.  [default: measured with OpenRadioss]",
         *("file", "FILE"),
@@ -164,21 +169,40 @@ class Request:
     step_ratio: float | None = option(
         "Time step while rigid over that before, 1 or more.  [default: 1]", AT_LEAST_ONE, "N"
     )
+    run_folder: str | None = None  # that of a run whose files are named in `history`
+    deck_in_folder: bool = False  # whether `deck` was found in the folder of the run
     given: Collection[str] | None = None
 
     def __post_init__(self) -> None:
         """Refuse what makes no sense together."""
+        if self.no_deck and self.deck:
+            raise ArgumentError("`deck` and `no_deck` exclude each other")
+        if self.folder is None:
+            self.check_deck()
         ways = {"an oscillator": self._oscillator_given, "`fit_window`": self.fit_window, "`replay`": self.no_verify}
         chosen = [name for name, value in ways.items() if value]
         if len(chosen) > 1:
             raise ArgumentError(f"{chosen[0]} and {chosen[1]} exclude each other")
+        check_window("fit_window", self.fit_window)
+        if self.after is not None and self.landing is not None and not self.after < self.landing:
+            raise ArgumentError(f"`landing` {self.landing:g} is not after `after` {self.after:g}, the end of the load")
+
+    @property
+    def folder(self) -> str | None:
+        """The folder of the run, in which its main deck is looked for; None if a deck is named, or none is wanted."""
+        import os
+
+        if self.deck is not None or self.no_deck:
+            return None
+        named = self.history[0] if len(self.history) == 1 else ""
+        return self.run_folder or (named if os.path.isdir(named) else None)  # noqa: PTH112  odd names
+
+    def check_deck(self) -> None:
+        """Refuse what needs a deck if there is none."""
         if self.step_ratio is not None and self.cost_share is None and not self.deck:
             raise ArgumentError("`step_ratio` needs `cost_share` or `deck` too: the run time needs both")
         if self.weights is not None and self.deck is None:
             raise ArgumentError("`weights` needs `deck`, the deck whose elements are weighted")
-        check_window("fit_window", self.fit_window)
-        if self.after is not None and self.landing is not None and not self.after < self.landing:
-            raise ArgumentError(f"`landing` {self.landing:g} is not after `after` {self.after:g}, the end of the load")
 
     @property
     def _oscillator_given(self) -> bool:
@@ -234,13 +258,13 @@ class Request:
 
     def without_history(self) -> None:
         """Refuse to be told how to judge, but not by what."""
-        if lost := [name for name in self._given() if name in {*JUDGING, *CHOOSING}]:
+        if lost := [name for name in self._given() if name in {*JUDGING, *CHOOSING, "deck", "no_deck"}]:
             raise ArgumentError(f"`{lost[0]}` needs an energy history; give one with `history`")
 
     def _given(self) -> Iterator[str]:
         for one in fields(self):
             given = getattr(self, one.name) != one.default if self.given is None else one.name in self.given
-            if given and one.name not in ("history", "given"):
+            if given and one.name not in _NOT_TYPED:
                 yield one.name
 
 

@@ -11,7 +11,7 @@ from d2rpick.api.tables import is_table
 from d2rpick.base.errors import if_written
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     import pandas as pd
 
@@ -31,12 +31,14 @@ class Run:
     runs are equal if the same bytes were read under the same names, in the same way.
 
     ``files`` is what was opened, ``chosen`` the columns, ``input_format`` what the files were read as, ``"auto"`` where
-    their content decided.  Energies are read when they are asked for.
+    their content decided.  ``folder`` is the one that was named, in which the main deck is looked for.  Energies are
+    read when they are asked for.
     """
 
     files: histories.Run
     chosen: Selection
     input_format: str = "auto"
+    folder: str | None = None
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Run):
@@ -88,14 +90,26 @@ class Run:
         """What was left out or assumed in reading."""
         return self.files.notes
 
-    def overview(self, deck: Path | None = None) -> Overview:
+    def overview(self, deck: arguments.Deck | None = None) -> Overview:
         """Give what ``d2rpick info`` shows: format, states, sampling, channels, parts, flights, health.
 
-        The main ``deck`` of the run tells gravity, supports and imposed motion.
+        The main ``deck`` of the run tells gravity, supports and imposed motion.  Default: the only main deck in the
+        folder that was read; False for none.
         """
         from d2rpick.choice.overview import survey
 
-        return survey(self.files, self.chosen, None if deck is None else arguments.one_path("deck", deck))
+        named = arguments.one_path("deck", deck) if deck else None
+        return survey(self.files, self.chosen, self._deck_in_folder if deck is None else named)
+
+    @property
+    def _deck_in_folder(self) -> str | None:
+        """The only main deck in the folder that was read."""
+        if self.folder is None:
+            return None
+        from d2rpick.deck import decks_of_run
+
+        decks = decks_of_run(self.folder)
+        return decks[0] if len(decks) == 1 else None
 
     def to_frame(self, parts: Parts | None = None) -> pd.DataFrame:
         """Give energies over time as a table, at full precision.
@@ -195,7 +209,14 @@ def read(
     from d2rpick.histories.opening import open_run
 
     chosen, kind = selection_of(time, energy, channels), known_format(input_format)
-    return Run(open_run(names, chosen, kind), chosen, kind)
+    return Run(open_run(names, chosen, kind), chosen, kind, folder_of(names))
+
+
+def folder_of(names: Sequence[str]) -> str | None:
+    """Give the folder that names a run; None if files name it."""
+    import os
+
+    return names[0] if len(names) == 1 and os.path.isdir(names[0]) else None  # noqa: PTH112  odd names
 
 
 def from_frame(

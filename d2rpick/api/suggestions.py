@@ -129,7 +129,7 @@ def suggest(
     td_window: tuple[float, float] | None = None,
     parts: Parts | None = None,
     flying: Parts | None = None,
-    deck: arguments.Path | None = None,
+    deck: arguments.Deck | None = None,
     weights: Weights | arguments.Path | None = None,
     **choosing: Unpack[Choosing],
 ) -> Suggestion:
@@ -151,6 +151,7 @@ def suggest(
     deck : path, optional
         Main deck of the run: tells what the parts cost, which are springs, which rigid bodies they become, and the
         parts of ``"recommended"``.  Without it they are taken for one body: ``position_error_assumes`` of a candidate.
+        Default: the only main deck in the folder that was read; False for none.
     weights : Weights or path, optional
         Cost of an element by formulation, or the file that ``d2rpick calibrate`` wrote.
     **choosing
@@ -203,7 +204,7 @@ def verify(
     min_mean_energy: float | None = MIN_MEAN_ENERGY,
     parts: Parts | None = None,
     flying: Parts | None = None,
-    deck: arguments.Path | None = None,
+    deck: arguments.Deck | None = None,
     weights: Weights | arguments.Path | None = None,
     **choosing: Unpack[Choosing],
 ) -> Verdict:

@@ -103,6 +103,9 @@ def doubts_of_solver(parts: Collection[int], inventory: Inventory) -> Iterator[C
     for flaw in inventory.flaws:
         yield Caution(flaw.code, f"{flaw.place.file}:{flaw.place.line}: {flaw.message}")
     yield from (Caution("deck-not-followed", note) for note in inventory.boundary.notes)
+    for part in parts:
+        if part in inventory.parts and (why := inventory.parts[part].unswitchable):
+            yield Caution("unswitchable-part", f"{name_units([part])}: {why}; leave it out")
     unturned = [part for part in parts if part in inventory.parts and not inventory.parts[part].section.turns]
     if unturned and inventory.solver == "radioss":
         found = f"{name_units(unturned)}: the stresses of these solids do not turn with the rigid body"

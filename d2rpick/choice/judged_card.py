@@ -32,7 +32,9 @@ class CardRequest(NamedTuple):
         """Name the solver, and say what its card needs."""
         ids = self.printing.part or tuple(part.id for part in history.parts or ())
         end = float(history.time[-1]) if self.printing.end is None else self.printing.end
-        return self.solver or solver_of(history.format), self.printing._replace(part=ids, end=end)
+        solver = self.solver or solver_of(history.format)
+        printing = self.printing._replace(part=ids, end=end)
+        return solver, _pushed(printing, history) if "contact" in SOLVERS[solver].takes else printing
 
     def whom(self, history: History) -> tuple[int, ...]:
         """Give the parts or main nodes that the card switches; none where nobody says it."""
@@ -45,6 +47,15 @@ class CardRequest(NamedTuple):
         bodies = tuple(body.parts for body in settings.bodies or ())
         off = tuple(node for node in settings.kept_off if node not in self.printing.node)
         return self._replace(printing=self.printing._replace(bodies=bodies, off=off))
+
+
+def _pushed(printing: Printing, history: History) -> Printing:
+    """Say when something pushes the parts, and how fast they come to it, as far as momenta of parts show it."""
+    from d2rpick.flight.contact_times import contact_times  # not above: other cards do without
+
+    momenta = next((one for one in history.momenta if one.parts), None)
+    found = contact_times(momenta) if momenta else None
+    return printing._replace(pushed=found.spans, speed=found.speed) if found else printing
 
 
 class SolverInput(NamedTuple):

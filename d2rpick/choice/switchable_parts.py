@@ -310,6 +310,8 @@ def _to_keep(row: PartRow, fact: PartFacts | None, data: PartData | None, alone:
     if row.elements is not None and not row.elements:
         yield "no elements"
         return
+    if data and data.unswitchable:
+        yield data.unswitchable
     if fact and fact.held:
         yield fact.held
     elif fact and fact.has_energy is False:

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 @options.time("--td", "Switch back at this time, one for each --tr.", many=True)
 @options.file("--windows", "Instead of both: a file with lines 'tr td'.")
 @options.takes(
-    *("part", *CARDS, *REFERENCE, *FILES, "exit_zero"),
+    *("part", *CARDS, "deck", "no_deck", *REFERENCE, *FILES, "exit_zero"),
+    deck="Main deck of the run of --history: tells which parts become one rigid body.",
     part={
         "help": "Parts to switch, by number (3,7) or range (10-19), or with --history by title.",
         "type": click_type("names"),
@@ -37,7 +38,8 @@ def card(
 ) -> None:
     """Print solver input for switching windows, ready to be pasted.
 
-    With a history, the times are judged again as printed, and the verdict is added as a comment.
+    With a history, the times are judged again as printed, and the verdict is added as a comment.  With the deck of the
+    run, parts that share nodes are merged, and the deck is checked with the card in it.
 
     Examples
     --------
@@ -53,7 +55,7 @@ def card(
     output = output.beside(windows, *(run.sources if run else ()))
     found = card_of(times, run, request, cards)
     read = found.verdicts[0].situation.history.notes if found.verdicts else ()
-    output.notes(read, all_cautions(found.verdicts))
+    output.notes(read, all_cautions(found))
     output.notes(found.card.notes, ())
     output.content(text_bytes(found.card.text))
     output.finish(objection=not found.verified)

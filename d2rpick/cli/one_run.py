@@ -30,11 +30,12 @@ from d2rpick.report.formats import FORMATS, write
 
 if TYPE_CHECKING:
     from d2rpick.api.plans import Plan
+    from d2rpick.base.errors import Caution
 
 
 @options.command
 @options.takes(
-    *("deck", HISTORY, *READING, *RESULT),
+    *("deck", "no_deck", HISTORY, *READING, *RESULT),
     deck="Main deck of the run: tells gravity, supports and imposed motion, without which flights are found.",
     forms=FORMATS["overview"],
 )
@@ -46,10 +47,12 @@ def info(request: Request, output: Output) -> None:
     d2rpick info sample_data/energy.glstat
     d2rpick info -f json sample_data/rollover.csv
     """
+    from d2rpick.api.deck_in_folder import naming
+
     selection = request.selection()
     with opened(request, output) as (run, output):
-        overview = replace(run, chosen=selection).overview(request.deck)
-    output.notes((), overview.cautions)
+        overview = replace(run, chosen=selection).overview(request.deck or False)
+    output.notes((), (*naming(request), *overview.cautions))
     form = output.output_format
     shown = output.shown()
     output.result(in_words(write("overview", form, overview, shown), form, shown.width))
@@ -123,7 +126,7 @@ def suggest(td: float | None, td_window: WINDOW, request: Request, cards: Cards,
     output.beside_answer(answer, lambda: answer.page(options.repeat(), request.judging(), cards))
     if card:
         found = answer.printed(cards)
-        told = [] if found is None else [one for one in all_cautions(found.verdicts) if one not in answer.cautions]
+        told = [] if found is None else [one for one in all_cautions(found) if one not in answer.cautions]
         return output.finish(objection=not output.card(found, told), grade=answer.quality and answer.quality.grade)
     output.answer(answer)
     return output.finish(objection=answer.recommended is None, grade=answer.quality and answer.quality.grade)
@@ -227,7 +230,7 @@ def verify(
 @options.time("--tr", "With --td: compare the sets in this window.")
 @options.time("--td", "Compare the sets in a window that ends here.  [default: at the end of the longest flight]")
 @options.takes(
-    *("deck", "weights", HISTORY, *READING, *LIMITS, "step_ratio", "report", *RESULT),
+    *("deck", "no_deck", "weights", HISTORY, *READING, *LIMITS, "step_ratio", "report", *RESULT),
     deck=f"{DECK}.",
     step_ratio="Time step while rigid over that before, 1 or more.",
     report="Write everything to one HTML page to read and sign.",
@@ -285,7 +288,7 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
     kind="output",
 )
 @options.takes(
-    *("deck", "weights", HISTORY, *READING, *CHOOSING, "plot", "report", *CARDS, *RESULT),
+    *("deck", "no_deck", "weights", HISTORY, *READING, *CHOOSING, "plot", "report", *CARDS, *RESULT),
     deck=DECK_OF_PARTS,
     forms=[*FORMATS["plan"], "card"],
 )
@@ -318,26 +321,33 @@ def plan(
     if every and form not in ("value", "card") and not write_deck:
         raise click.UsageError("--all belongs to -f value, -f card and --write-deck; other forms hold every window")
     _check_deck(request, cards, form, write_deck)
-    cards = cards.by_deck(request.deck) if form == "card" or write_deck else cards
     output.check(cards, by_itself=bool(write_deck))
     with opened(request, output, done, *before) as (run, output):
         asked = ask(run, request, merge=cards.merge)
         if write_deck and (foreign := [one for one in asked.cautions if one.code == "deck-of-another-model"]):
             raise DeckError(f"{request.deck}: {foreign[0].message}")
-        cards, added = cards.for_bodies(asked) if form == "card" or write_deck else (cards, ())
         earlier = open_run(request, before) if before else None
     answer = planned(asked, min_rigid, options.windows_in(done) if done else (), earlier)
-    output.notes((*answer.history.notes, *added), answer.cautions)
+    output.notes(answer.history.notes, answer.cautions)
     output.beside_answer(answer, lambda: answer.page(options.repeat(), (), cards))
     found = answer.printed(cards, every=every) if form == "card" or write_deck else None
     checked, passed = _write_and_check(found, answer, write_deck, output) if found and write_deck else ("", True)
     if checked and form != "table":
         click.echo(checked, err=True)
     if form == "card":
-        told = [] if found is None else all_cautions(one for one in found.verdicts if not one.verified)
-        return output.finish(objection=not (output.card(found, told) and passed))
+        return output.finish(objection=not (output.card(found, _untold(found, answer)) and passed))
+    if found:
+        output.notes(found.card.notes, ())
     output.answer(answer, checked if form == "table" else "", every=every)
     return output.finish(objection=not (answer.supported and passed))
+
+
+def _untold(card: JudgedCard | None, plan: Plan) -> list[Caution]:
+    """Cautions of the card that the plan has not: those of windows that do not verify, and those of the card itself."""
+    if card is None:
+        return []
+    failed = tuple(verdict for verdict in card.verdicts if not verdict.verified)
+    return [caution for caution in all_cautions(card._replace(verdicts=failed)) if caution not in plan.cautions]
 
 
 def _check_deck(request: Request, cards: Cards, form: str, folder: str | None) -> None:

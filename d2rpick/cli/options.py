@@ -28,7 +28,7 @@ TABLES: Final[tuple[Any, ...]] = (Request, Cards, Output)
 FILES: Final = ("output_file", "overwrite", "quiet")
 RESULT: Final = ("output_format", "exit_zero", *FILES)
 HISTORY: Final = "HISTORY"  # stands for the argument, not the option of that name
-ONE_RUN: Final = ("deck", "weights", HISTORY, *READING, *CHOOSING)
+ONE_RUN: Final = ("deck", "no_deck", "weights", HISTORY, *READING, *CHOOSING)
 REFERENCE: Final = ("history", *JUDGING)
 ANSWER: Final = ("plot", "report", *CARDS, "min_quality", *RESULT)
 DECK: Final = (
@@ -43,7 +43,7 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
         *("tolerance", "max_kinetic_share", "max_residual", "min_mean_energy", "strict", "keep_vibration"),
     ),
     "What to read": ("history", "switched", "from", *READING, "done", "before"),
-    "Deck and cost": ("deck", "weights", "write_deck"),
+    "Deck and cost": ("deck", "no_deck", "weights", "write_deck"),
     "Cards": CARDS,
     "Output": ("all", "limit", "plot", "report", "min_quality", *RESULT, "verbose", "show_settings", "debug", "help"),
     "Advanced": (*OSCILLATOR, "fit_window", "no_verify", "cost_share", "step_ratio"),
@@ -161,6 +161,10 @@ def takes(
                 if taken:
                     more = {"given": given & {*taken}} if table is Request else {}
                     values[table.__name__.lower()] = table(**{name: values.pop(name) for name in taken}, **more)
+            if "no_deck" in names:
+                from d2rpick.api.deck_in_folder import with_deck_in_folder
+
+                values["request"] = with_deck_in_folder(values["request"])
             return function(*args, **values)
 
         if "quiet" in names:

@@ -55,22 +55,56 @@ def main_decks(folder: str) -> list[str]:
     DeckError
         If there is none, with what to do.
     """
-    from d2rpick.deck import radioss_files, reader  # not above: start-up
-
     decks = [path for path in _files(folder) if _begins(path)]
-    included: set[str] = set()
-    for path in decks:
-        if radioss_files.run_files(path):
-            continue  # its includes have no /BEGIN
-        try:
-            included.update(map(os.path.realpath, reader.read_deck(path).files[1:]))
-        except DeckError:
-            continue  # said when it is checked
+    included = {os.path.realpath(path) for deck in decks for path in _includes(deck)}
     found = [path for path in decks if os.path.realpath(path) not in included]
     if not found:
         what = "every one is included by another" if decks else "no file with *KEYWORD or /BEGIN"
         raise DeckError(f"{folder}: no main deck in this folder ({what}); give the deck itself")
     return found
+
+
+def decks_of_run(folder: str) -> list[str]:
+    """Find the main decks that lie in the folder of a run and have parts.
+
+    Restart decks and files of switching cards alone have none.  A run of Radioss is named by its starter deck.
+    """
+    try:
+        decks = main_decks(folder)
+    except DeckError:
+        return []
+    return [path for path in decks if os.path.samefile(os.path.dirname(path) or os.curdir, folder) and _has_parts(path)]  # noqa: PTH120, PTH121  start-up
+
+
+def _has_parts(path: str) -> bool:
+    from d2rpick.deck import radioss_files  # not above: start-up
+
+    try:
+        if radioss_files.run_files(path):
+            from d2rpick.deck.radioss_run import read_run
+
+            starter = read_run(path).starter
+            return bool(starter and starter.parts)
+        from d2rpick.deck.ls_dyna_parts import read_parts
+        from d2rpick.deck.reader import read_deck
+
+        return bool(read_parts(read_deck(path)).materials)
+    except DeckError:
+        return True  # what is wrong is said by who reads it
+
+
+def _includes(path: str) -> list[str]:
+    """Names of the files that a deck includes; none of a deck that cannot be read, which is said when it is checked."""
+    from d2rpick.deck import radioss_files, reader  # not above: start-up
+
+    try:
+        if radioss_files.run_files(path):
+            from d2rpick.deck.radioss_run import read_run
+
+            return list(read_run(path).included)
+        return reader.read_deck(path).files[1:]
+    except DeckError:
+        return []
 
 
 def _files(folder: str) -> Iterator[str]:

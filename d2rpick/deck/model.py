@@ -178,12 +178,13 @@ class Section(NamedTuple):
 
 
 class PartData(NamedTuple):
-    """What the deck says about one part besides its elements."""
+    """What the deck says about one part besides its elements; ``unswitchable`` is why it must not be switched."""
 
     id: int
     title: str
     material: Material | None = None
     section: Section = Section()
+    unswitchable: str = ""
 
 
 @dataclass(frozen=True, eq=False)

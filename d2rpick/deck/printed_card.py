@@ -60,6 +60,12 @@ class Printing(NamedTuple):
         Cards that the starter deck of the run lacks.
     sensor : int
         First id of sensors, where these switch.
+    contact, wall : int, optional
+        The contact, or the rigid wall, whose force switches, for solvers that take one.
+    pushed : tuple of (float, float)
+        When something pushes the parts, by a history [time]; ``speed`` is how fast they come to it [length/time].
+    delete_nodal_bodies, delete_node_sets : bool
+        LS-DYNA: delete nodal rigid bodies (NRBF), or joints and extra nodes (NCSF), while the parts are rigid.
     """
 
     part: tuple[int, ...] = ()
@@ -73,6 +79,12 @@ class Printing(NamedTuple):
     name: str = "Root"
     starter: str = ""
     sensor: int = 901
+    delete_nodal_bodies: bool = False
+    delete_node_sets: bool = False
+    contact: int | None = None
+    wall: int | None = None
+    pushed: tuple[Times, ...] = ()
+    speed: float | None = None
 
 
 @dataclass(frozen=True)

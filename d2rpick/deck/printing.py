@@ -8,38 +8,38 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 from d2rpick.base import __version__
 from d2rpick.base.errors import DeckError
 from d2rpick.deck import printed_card
+from d2rpick.deck.engine_files import capped, engine_lines, legs, off, own_cap
+from d2rpick.deck.part_sets import PartSets, cards_of_set, numbered
 from d2rpick.deck.printed_card import LONGEST, PHYSICS, PrintedCard, Solver, check_ids, comments, shortest
+from d2rpick.deck.switch_sets import Waiting, groups_by_lead, header, to_deformable, to_rigid
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
+    from d2rpick.deck.contact_timing import Pushes
     from d2rpick.deck.printed_card import Printing, Times
 
 _FILE: Final = "switches.k"
 
-_SET_HEAD = "$#   swset      code     time1     time2     time3     entno     relsw    paired"
-_COUNT_HEAD = "$#    nrbf      ncsf       rwf     dtmax       d2r       r2d    offset"
-_OF_LS_DYNA = (
+_CODES: Final = {"INTER": (2, 4), "RWALL": (1, 3)}  # without a force, with one
+_OF_OFFSET: Final = "OFFSET was not tried with the solver: it should exceed the thickness of the contact."
+_DELETE, _ACTIVATE = 1, 2  # constraints on the parts, by NRBF and NCSF
+_LEFT_ACTIVE = (
     "Nodal rigid bodies, spotwelds and rigid walls on these parts stay active",
     "  (NRBF, NCSF, RWF 0); where they are, delete them (1) and activate again (2).",
-    "Springs and dampers are not switched.",
+)
+_DELETED = (
+    "Nodal rigid bodies, joints and extra nodes of the deck, which all lie on these",
+    "  parts, are deleted (NRBF, NCSF 1) while these are rigid, and activated again (2).",
 )
 _CAPPED = "DTMAX: with nothing deformable left the time step would grow without limit."
-# Parts that are listed one by one; of more a set is printed, here with its number.
-_MOST_LISTED: Final = 10
-PartSets = Mapping[tuple[int, ...], int]
-_NO_SETS: Final[PartSets] = {}
-# Of the rigid window, per step: the release is at most a thousandth of it late.  Each window has its own, so that
-# further windows leave the run up to them as it was.
-_CAP_SHARE = 1000
 
 
 def _ls_dyna(windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()) -> PrintedCard:
@@ -61,9 +61,9 @@ def _ls_dyna(windows: Sequence[Times], printing: Printing, remarks: Sequence[str
     spans = ", ".join(f"{tr} to {td}" for tr, td in texts)
     lines = [*comments([f"Rigid from {spans}; written by d2rpick {__version__}"]), *told]
     lines = [f"$ {line}" for line in lines]
-    part_sets = _part_sets((ids, *_groups(ids, printing).values()), printing.swset[0])
+    part_sets = numbered((ids, *groups_by_lead(ids, printing).values()), printing.swset[0])
     for members, number in part_sets.items():
-        lines += _part_set(members, number)
+        lines += cards_of_set(members, number)
     for pair, numbers in zip(texts, sets, strict=True):
         lines += _window(pair, numbers, ids, printing, part_sets)
     text = "\n".join(lines) + "\n"
@@ -74,88 +74,45 @@ def _window(
     texts: tuple[str, str], sets: tuple[int, int], ids: Sequence[int], printing: Printing, part_sets: PartSets
 ) -> Iterator[str]:
     rigid, free = [*to_rigid(ids, printing, part_sets)], [*to_deformable(ids, part_sets)]  # with a comment each
-    cap = printing.step_cap or _step_cap(*map(float, texts))
-    yield from (*header(sets[0], texts[0], shortest(cap), (len(rigid) - 1, 0)), *rigid)
-    yield from (*header(sets[1], texts[1], "0.0", (0, len(free) - 1)), *free)
+    cap = printing.step_cap or own_cap(*map(float, texts))
+    deleted = [flag * _DELETE for flag in (printing.delete_nodal_bodies, printing.delete_node_sets)]
+    activated = [flag * _ACTIVATE for flag in (printing.delete_nodal_bodies, printing.delete_node_sets)]
+    yield from (*header(sets[0], texts[0], shortest(cap), (len(rigid) - 1, 0), constraints=deleted), *rigid)
+    yield from (*header(sets[1], texts[1], "0.0", (0, len(free) - 1), constraints=activated), *free)
 
 
-def to_rigid(ids: Sequence[int], printing: Printing, part_sets: PartSets = _NO_SETS) -> Iterator[str]:
-    """Write the parts that become rigid, those that lead first, or the sets that they make up."""
-    yield "$#     pid       lrb     ptype"
-    for lead, some in _groups(ids, printing).items():
-        yield from (f"{name:10d}{lead:10d}{kind:>10}" for name, kind in _named(some, part_sets))
+def _ls_dyna_contact(windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()) -> PrintedCard:
+    """Print a pair of sets that switch by the force of a contact (CODE 2 and 4) or rigid wall (1 and 3).
 
+    The windows of the card are those in which the pair switches in the history.
 
-def to_deformable(ids: Sequence[int], part_sets: PartSets = _NO_SETS) -> Iterator[str]:
-    """Write the parts that become deformable, or their set."""
-    yield "$#     pid     ptype"
-    yield from (f"{name:10d}{kind:>10}" for name, kind in _named(ids, part_sets))
+    Raises
+    ------
+    DeckError
+        As `_ls_dyna` does, and if no wait gives as many windows as are planned.
+    """
+    from d2rpick.deck.contact_timing import pair_timing  # not above: other cards do without
 
-
-def _step_cap(tr: float, td: float) -> float:
-    """Largest step while rigid [time]."""
-    return float(f"{(td - tr) / _CAP_SHARE:.2g}")
-
-
-def _named(parts: Sequence[int], part_sets: PartSets) -> list[tuple[int, str]]:
-    """Name parts with their kind: by their set where there is one."""
-    number = part_sets.get(tuple(sorted(parts)))
-    return [(part, "PART") for part in parts] if number is None else [(number, "PSET")]
-
-
-def _part_sets(groups: Iterable[Sequence[int]], first: int) -> dict[tuple[int, ...], int]:
-    """Number a set for each of the groups that are too many to be listed."""
-    many = dict.fromkeys(tuple(sorted(group)) for group in groups if len(group) > _MOST_LISTED)
-    return {group: first + place for place, group in enumerate(many)}
-
-
-def _part_set(parts: Sequence[int], number: int) -> Iterator[str]:
-    yield f"$ Part set {number}: give it another id where the deck has one of that."
-    yield from ("*SET_PART_LIST", "$#     sid", f"{number:10d}")
-    yield "$#    pid1      pid2      pid3      pid4      pid5      pid6      pid7      pid8"
-    yield from ("".join(f"{part:10d}" for part in parts[i : i + 8]) for i in range(0, len(parts), 8))
-
-
-def _groups(ids: Sequence[int], printing: Printing) -> dict[int, list[int]]:
-    """Give the parts by their lead, those without one first, under 0."""
-    leads = _leads(ids, printing)
-    found: dict[int, list[int]] = {}
-    for part in sorted(ids, key=lambda part: part in leads):
-        found.setdefault(leads.get(part, 0), []).append(part)
-    return found
-
-
-def _leads(ids: Sequence[int], printing: Printing) -> dict[int, int]:
-    """Give the lead of each part that is merged into another."""
-    if printing.merge is not None:
-        return {part: printing.merge for part in ids if part != printing.merge}
-    bodies = [[part for part in body if part in ids] for body in printing.bodies]
-    return {part: body[0] for body in bodies for part in body[1:]}
-
-
-class Waiting(NamedTuple):
-    """What a switch waits for: its CODE, the contact, the delay after it [time], the set of its pair, and its place."""
-
-    code: int = 0
-    contact: int = 0
-    delay: float = 0.0
-    other: int = 0
-    paired: int = 0
-
-
-def header(
-    swset: int, time: str, step_cap: str, counts: tuple[int, int], waits: Waiting | None = None
-) -> Iterator[str]:
-    """Write the lines of a switch set down to its parts: at a ``time``, or from then on where it waits."""
-    on = waits or Waiting()
-    yield "*DEFORMABLE_TO_RIGID_AUTOMATIC"
-    yield _SET_HEAD
-    yield (
-        f"{swset:10d}{on.code:10d}{time:>10s}{'0.0':>10s}{shortest(on.delay):>10s}"
-        f"{on.contact:10d}{on.other:10d}{on.paired:10d}"
-    )
-    yield _COUNT_HEAD
-    yield f"{0:10d}{0:10d}{0:10d}{step_cap:>10s}{counts[0]:10d}{counts[1]:10d}{'0.0':>10s}"
+    windows, ids = printed_card.check_windows(windows), check_ids(printing.part)
+    kind, number, pushes = _force_of(printing)
+    free, forced = _CODES[kind]
+    timing = pair_timing(windows, pushes)
+    first, second = printing.swset
+    part_sets = numbered((ids, *groups_by_lead(ids, printing).values()), first)
+    rigid, back = [*to_rigid(ids, printing, part_sets)], [*to_deformable(ids, part_sets)]
+    cap = printing.step_cap or min(own_cap(*times) for times in timing.windows)
+    waits = Waiting(free, number, 0.0, second, 1, latest=timing.latest)
+    returns = Waiting(forced, number, timing.wait, first, -1, offset=timing.offset)
+    spans = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in timing.windows)
+    told = (*comments([f"Rigid from {spans} in the history; written by d2rpick {__version__}"]),)
+    told += (*_warnings(ids, printing), *_BY_FORCE[:2], _OF_OFFSET, *comments(remarks))
+    lines = [f"$ {line}" for line in told]
+    for members, name in part_sets.items():
+        lines += cards_of_set(members, name)
+    lines += (*header(first, shortest(timing.earliest), shortest(cap), (len(rigid) - 1, 0), waits), *rigid)
+    lines += (*header(second, "0.0", "0.0", (0, len(back) - 1), returns), *back)
+    text = "\n".join(lines) + "\n"
+    return PrintedCard(text, timing.windows, {_FILE: text})
 
 
 def _sets(first: tuple[int, int], count: int) -> Iterator[tuple[int, int]]:
@@ -183,8 +140,8 @@ def _roundings(asked: Times, texts: tuple[str, str]) -> Iterator[str]:
 
 
 def _warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
-    yield from (*PHYSICS, *_OF_LS_DYNA)
-    yield _CAPPED
+    deleted = printing.delete_nodal_bodies or printing.delete_node_sets
+    yield from (*PHYSICS, *(_DELETED if deleted else _LEFT_ACTIVE), "Springs and dampers are not switched.", _CAPPED)
     if printing.merge is None and printing.bodies:
         yield from (
             f"{len(body)} parts are one rigid body by the deck, led by part {body[0]} (LRB)."
@@ -198,8 +155,6 @@ def _warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
 
 
 _RUN_NAME = re.compile(r"[\w.-]+", re.ASCII)
-_NODES_PER_LINE = 10
-_MOST_LEGS = 99  # the solver numbers them with two digits where it matters, in the names of time histories
 _OF_RADIOSS = (
     "Ids are main nodes of /RBODY, not bodies; an unknown one is skipped silently.",
     "Gravity and damping act on a rigid body only if its main node is in their",
@@ -212,15 +167,12 @@ _OF_RADIOSS = (
     "An initial velocity must move the main node of a body too.",
     "Repeat your output keywords (/TFILE, /ANIM, ...) in every file.",
 )
+_BY_FORCE = (
+    "The windows are those of the history: a switched run lands elsewhere, and at",
+    "  other times, after its first window that locks in energy.",
+    "They end in the first step of a contact, without a margin before it.",
+)
 _OF_SENSORS = tuple(line for line in _OF_RADIOSS[1:-1] if not line.startswith(("The starter looks", "A body that")))
-
-
-class EngineFile(NamedTuple):
-    """An engine run: its number, its end, and its largest step where the bodies are rigid in it, else None."""
-
-    number: int
-    stop: float
-    cap: float | None
 
 
 def _radioss(windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()) -> PrintedCard:
@@ -252,10 +204,55 @@ def _radioss_sensors(windows: Sequence[Times], printing: Printing, remarks: Sequ
     DeckError
         As `_radioss` does.
     """
-    from d2rpick.deck.radioss_deck import STOPS_SINCE  # not above: other cards do without
+    from d2rpick.deck.radioss_sensors import inactive  # not above: other cards do without
 
-    windows, ids, end = _of_run(windows, printing)
-    sensors, last = _sensors(windows, printing.sensor)
+    windows, _, _ = _of_run(windows, printing)
+    return _of_sensors(windows, printing, _sensors(inactive(windows), printing.sensor), remarks)
+
+
+def _radioss_contact(windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()) -> PrintedCard:
+    """Print a sensor of the force of a contact or rigid wall, by which the bodies are deformable in the contacts.
+
+    The windows of the card are those in which it switches in the history.
+
+    Raises
+    ------
+    DeckError
+        As `_radioss` does, and if no wait gives as many windows as are planned.
+    """
+    from d2rpick.deck.contact_timing import sensor_timing
+
+    windows, _, _ = _of_run(windows, printing)
+    kind, number, pushes = _force_of(printing)
+    timing = sensor_timing(windows, pushes)
+    row = f"{number:10d}{'NF':>10}{-1.0:20}{0.0:20}{0.0:20}"
+    sensor = f"/SENSOR/{kind}/{{}}\nforce, or shortly after\n{shortest(timing.wait, 20):>20}\n{row}\n"
+    spans = [(0.0, timing.earliest)] * (timing.earliest > 0) + [(timing.latest, math.inf)]
+    how = (f"Deformable while /{kind} {number} has a force and {timing.wait:.6g} longer (Tdelay).", *_BY_FORCE)
+    sensors = _sensors(spans, printing.sensor, [sensor])
+    return _of_sensors(timing.windows, printing, sensors, (*how, *remarks))
+
+
+def _force_of(printing: Printing) -> tuple[str, int, Pushes]:
+    """Give the kind and number of what pushes, and when; DeckError unless one is given and a history shows it."""
+    from d2rpick.deck.contact_timing import Pushes
+
+    if (printing.contact is None) == (printing.wall is None):
+        raise DeckError("a card for switches by force needs one `contact`, or one rigid `wall`, by its number")
+    if not printing.pushed:
+        raise DeckError("a card for switches by force needs a history with momenta that show when something pushes")
+    kind, number = ("INTER", printing.contact) if printing.contact is not None else ("RWALL", printing.wall)
+    return kind, number or 0, Pushes(printing.pushed, printing.speed)
+
+
+def _of_sensors(
+    windows: Sequence[Times], printing: Printing, sensors: tuple[str, int], remarks: Sequence[str]
+) -> PrintedCard:
+    """Print sensors that switch the bodies, and one engine file for the whole run."""
+    from d2rpick.deck.radioss_sensors import STOPS_SINCE
+
+    texts, last = sensors
+    ids, end = check_ids(printing.node), printing.end or 0.0
     cap = min(leg.cap for leg in legs(windows, end, printing.step_cap) if leg.cap is not None)
     lines = (f"/RUN/{printing.name}/1", f"{end!r:>20}", *off(printing.off), *capped(cap))
     files = {f"{printing.name}_0001.rad": "\n".join(lines) + "\n"}
@@ -265,20 +262,23 @@ def _radioss_sensors(windows: Sequence[Times], printing: Printing, remarks: Sequ
         f"/BEGIN needs version {STOPS_SINCE} or later, which knows when a sensor of time stops.",
         "The largest step holds for the whole run: below the deformable step it changes that run; set --step-cap.",
     )
-    told = _told(windows, printing, (*_OF_SENSORS, *how, *remarks), files, sensors)
+    told = _told(tuple(windows), printing, (*_OF_SENSORS, *how, *remarks), files, texts)
     return replace(told, sensors=dict.fromkeys(ids, last))
 
 
-def _sensors(windows: Sequence[Times], first: int) -> tuple[str, int]:
-    """Write sensors with ids from ``first`` on, and give the id of the one that is active outside of the windows."""
-    from d2rpick.deck.radioss_deck import NEVER, inactive
+def _sensors(spans: Sequence[Times], first: int, further: Sequence[str] = ()) -> tuple[str, int]:
+    """Write sensors with ids from ``first`` on, and give the id of the one that is active in one of ``spans``.
 
-    spans = inactive(tuple(windows))
-    texts, last = list[str](), first
-    for number, (start, stop) in enumerate(spans, start=first):
-        until = min(stop, NEVER)
-        texts.append(f"/SENSOR/TIME/{number}\ndeformable\n{shortest(start, 20):>20}\n{shortest(until, 20):>20}\n")
-    for number, other in enumerate(range(first + 1, first + len(spans)), start=first + len(spans)):
+    ``further`` are sensors, with a place for their id, while which it is active too.
+    """
+    from d2rpick.deck.radioss_sensors import NEVER
+
+    clock = "/SENSOR/TIME/{}\ndeformable\n"
+    kinds = [f"{clock}{shortest(start, 20):>20}\n{shortest(min(stop, NEVER), 20):>20}\n" for start, stop in spans]
+    kinds += further
+    texts = [text.format(number) for number, text in enumerate(kinds, start=first)]
+    last = first
+    for number, other in enumerate(range(first + 1, first + len(kinds)), start=first + len(kinds)):
         texts.append(f"/SENSOR/OR/{number}\ndeformable\n{0:20d}\n{last:10d}{other:10d}\n")
         last = number
     return "".join(texts), last
@@ -307,48 +307,14 @@ def _told(
     return PrintedCard(text, windows, files, starter=starter)
 
 
-def legs(windows: Sequence[Times], end: float, step_cap: float | None) -> list[EngineFile]:
-    """Give the engine runs that the windows ask for; a window from 0 on needs none before it."""
-    caps = [step_cap or _step_cap(tr, td) for tr, td in windows]
-    switches = zip(windows, caps, strict=True)
-    stops = [(time, cap) for (tr, td), own in switches for time, cap in ((tr, None), (td, own)) if time > 0]
-    if len(stops) >= _MOST_LEGS:
-        raise DeckError(f"{len(windows)} windows need {len(stops) + 1} engine runs, at most {_MOST_LEGS} were expected")
-    numbered = enumerate([*stops, (end, None)], start=1)
-    return [EngineFile(number, stop, cap) for number, (stop, cap) in numbered]
-
-
-def off(nodes: Sequence[int]) -> Iterator[str]:
-    """Put rigid bodies off; the starter of OpenRadioss overlooks a second such block right behind the first."""
-    if nodes:
-        yield from ("/RBODY/OFF", *listed(nodes))
-
-
-def listed(ids: Sequence[int]) -> Iterator[str]:
-    """Write numbers in lines."""
-    yield from (" ".join(map(str, ids[i : i + _NODES_PER_LINE])) for i in range(0, len(ids), _NODES_PER_LINE))
-
-
-def engine_lines(leg: EngineFile, name: str, ids: Sequence[int], others: Sequence[int]) -> Iterator[str]:
-    """Write what an engine file says of a leg: its run, and which main nodes are rigid; ``others`` stay off."""
-    yield f"/RUN/{name}/{leg.number}"
-    yield f"{leg.stop!r:>20}"
-    if leg.cap is not None and ids:
-        yield from ("/RBODY/ON", *listed(ids))
-    yield from off(others if leg.cap is not None else (*ids, *others))
-    if leg.cap is not None:
-        yield from capped(leg.cap)
-
-
-def capped(cap: float) -> Iterator[str]:
-    """Hold the step of a leg with rigid bodies below a limit."""
-    yield from ("# with nothing deformable left the step would grow without limit", "/DTIX", f"{cap!r} {cap!r}")
-
-
 SOLVERS: Final[Mapping[str, Solver]] = {
     "ls-dyna": Solver("LS-DYNA", ("glstat", "matsum", "binout"), "part", ("merge", "swset", "step_cap"), _ls_dyna),
     "radioss": Solver("Radioss", ("radioss-th",), "node", ("step_cap", "end", "name"), _radioss),
     "radioss-sensors": Solver("Radioss", (), "node", ("step_cap", "end", "name"), _radioss_sensors),
+    "ls-dyna-contact": Solver(
+        "LS-DYNA", (), "part", ("merge", "swset", "step_cap", "contact", "wall"), _ls_dyna_contact
+    ),
+    "radioss-contact": Solver("Radioss", (), "node", ("step_cap", "end", "name", "contact", "wall"), _radioss_contact),
 }
 DEFAULT: Final = "ls-dyna"  # of histories that name no solver
 

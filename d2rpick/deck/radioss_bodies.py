@@ -16,7 +16,7 @@ from d2rpick.deck.geometry import Placement, masses_and_steps
 from d2rpick.deck.mesh import nodes_of
 from d2rpick.deck.model import DISCRETE, Inventory
 from d2rpick.deck.pieces import pieces_of
-from d2rpick.deck.radioss_deck import Body, Starter, below_title, keyword, whole
+from d2rpick.deck.radioss_deck import Starter, below_title, keyword, whole
 from d2rpick.deck.radioss_flaws import NodeGroups
 from d2rpick.deck.radioss_run import Run, read_run, rigid_parts
 from d2rpick.deck.reader import cuts
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.card import Card
     from d2rpick.deck.mesh import Reals
+    from d2rpick.deck.radioss_rigid import Body
 
 _PER_LINE: Final = 10
 _STAYS: Final = 1  # Ikrem: the starter leaves the nodes in rigid walls

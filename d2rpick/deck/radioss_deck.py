@@ -6,7 +6,6 @@ A block is a line that begins with ``/``, and the data lines below it.  Columns 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -14,18 +13,16 @@ from d2rpick.base.caching import cached_property
 from d2rpick.base.graph import reached
 from d2rpick.deck.card import Card, Field, Row, Scope, Value
 from d2rpick.deck.expression import ExpressionError, number, real
+from d2rpick.deck.radioss_rigid import BODY, MADE_HERE, Body, Merge, RigidBodies, rigid_bodies
 from d2rpick.deck.source import Block, SourceFile
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-    Spans = tuple[tuple[float, float], ...]  # of time
-
 
 _INCLUDE = b"#include"
+_ENDS: Final = (["/END"], ["/END/ENGINE"])
 _DIGITS = 10  # of an id
-STOPS_SINCE: Final = 2023  # version of the format from which on a sensor of time has an end
-NEVER: Final = 1e20
 
 
 def blocks(source: SourceFile) -> Iterator[Block]:
@@ -35,7 +32,7 @@ def blocks(source: SourceFile) -> Iterator[Block]:
         if start:
             yield Block(source, start[0], position, start[1])
         start = position, raw.rstrip(b"\r\n").decode("latin-1")
-        if start[1].upper().split() == ["/END"]:
+        if start[1].upper().split() in _ENDS:
             return
     if start:
         yield Block(source, start[0], None, start[1])
@@ -109,6 +106,7 @@ class Leg:
     cap: Value[float] | None = None
     version: str = ""
     starts: list[Start] = field(default_factory=list)
+    resets: list[int] = field(default_factory=list)  # sensors that are reset at its start
     sensor: int = 0  # which ends it, at a time that nobody knows before
 
 
@@ -144,6 +142,8 @@ def _take(leg: Leg, card: Card) -> None:
         leg.switched.append((card, words[1] == "ON", tuple(_integer(value) for value in numbers(card))))
     elif words[:2] == ("STOP", "LSENSOR"):
         leg.sensor = next((int(value.value) for value in numbers(card)), 0)
+    elif words[:2] == ("SENS", "RESET"):
+        leg.resets += [int(value.value) for value in numbers(card)]
     elif words == ("DTIX",):
         leg.cap = next(reversed(list(numbers(card))), None)
     elif words[0] == "INIV":
@@ -189,24 +189,14 @@ def _integer(value: Value[float]) -> Value[int]:
 WITHOUT_FRAME: Final = {"TETRA4", "TETRA10", "BRIC20", "SHEL16"}  # their stresses do not turn with a rigid body
 _WIDTH: Final = 10
 _OF_BODY: Final = (0, 1, 6, 7)  # main node, sensor, group, Ikrem in columns of 10: the mass between takes two
+# /PART of a rigid part: Irigid in its first line, main node and sensor in its second.
+_IRIGID: Final = 5
+_OF_RIGID_PART: Final = (0, 5)
+_RIGID_PARTS_SINCE: Final = 2612  # version of the format
 _ICOROTATIONAL: Final = 2  # Iframe
 _NOT_TURNED: Final = {1, 2, 12}  # Isolid of bricks without a co-rotating frame; 12 by the help up to 2017
 _DEFAULT_ISOLID: Final = 1
 SOLIDS: Final = {"SOLID", "TYPE14", "SOL_ORTH", "TYPE6"}
-
-
-class Body(NamedTuple):
-    """A rigid body: its id, main node, sensor and group of nodes (0: none).
-
-    ``stays``: its nodes are to stay in rigid walls (Ikrem 1, or a sensor).
-    """
-
-    id: int
-    node: Value[int]
-    sensor: int
-    group: int
-    card: Card
-    stays: bool
 
 
 class PartLine(NamedTuple):
@@ -241,15 +231,45 @@ class Starter:
         rows = below_title(found[-1]) if found else ()
         return found[-1].integer(rows[0], 0).value if rows else 0
 
-    @cached_property
+    @property
     def bodies(self) -> Sequence[Body]:
-        """Rigid bodies; one of /RBODY/LAGMUL, whose keyword has no id there, is never switched."""
-        return [
-            Body(number_of(card), node, sensor.value, group.value, card, bool(sensor.value or keeps.value))
-            for card in self.named("RBODY")
-            for row in below_title(card)[: number_of(card) > 0]
-            for node, sensor, group, keeps in [[card.integer(row, at) for at in _OF_BODY]]
-        ]
+        """Rigid bodies, each with all that is merged into it.
+
+        One of /RBODY/LAGMUL, whose keyword has no id there, is never switched.
+        """
+        return self.rigid.bodies
+
+    @cached_property
+    def rigid(self) -> RigidBodies:
+        """Rigid bodies as the engine has them."""
+        written = [*self._written_bodies(), *self._bodies_of_parts()]
+        return rigid_bodies(written, [*self._merges()], self._last_node)
+
+    def _written_bodies(self) -> Iterator[Body]:
+        for card in self.named("RBODY"):
+            for row in below_title(card)[: number_of(card) > 0]:
+                node, sensor, group, keeps = (card.integer(row, at) for at in _OF_BODY)
+                stays = bool(sensor.value or keeps.value)
+                yield Body(number_of(card), node, sensor.value, group.value, card, stays)
+
+    def _bodies_of_parts(self) -> Iterator[Body]:
+        """Bodies that the starter makes of parts with Irigid 1."""
+        for card in self.named("PART") if self.version >= _RIGID_PARTS_SINCE else ():
+            if len(card.rows) > 2 and card.integer(card.rows[1], _IRIGID).value == 1:
+                node, sensor = (card.integer(card.rows[2], at) for at in _OF_RIGID_PART)
+                part = number_of(card)
+                yield Body(0, node, sensor.value, MADE_HERE + part, card, bool(sensor.value), part)
+
+    def _merges(self) -> Iterator[Merge]:
+        for card in self.named("MERGE"):
+            for row in below_title(card) if card.words[1:2] == ("RBODY",) else ():
+                main, main_kind, other, kind = (card.integer(row, at).value for at in range(4))
+                yield Merge(main_kind or BODY, main, kind or BODY, other)
+
+    def _last_node(self) -> int:
+        """Highest id of a node."""
+        lines = (line for card in self.named("NODE") for _, line in card.block.lines())
+        return max((whole(line[:_WIDTH]) for line in lines), default=0)
 
     @cached_property
     def parts(self) -> Mapping[int, PartLine]:
@@ -269,7 +289,9 @@ class Starter:
     def groups(self) -> Mapping[int, tuple[str, tuple[int, ...]]]:
         """What a group of nodes is made of, and the ids of that."""
         found = (card for card in self.named("GRNOD") if card.words[1:])
-        return {number_of(card, 2): (card.words[1], _ids(below_title(card))) for card in found}
+        written = {number_of(card, 2): (card.words[1], _ids(below_title(card))) for card in found}
+        rigid_parts = {body.group: ("PART", (body.part,)) for body in self._bodies_of_parts()}
+        return {**written, **rigid_parts, **self.rigid.groups}
 
     @cached_property
     def sensors(self) -> Mapping[int, Card]:
@@ -340,55 +362,3 @@ def _ids(rows: Iterable[Row]) -> tuple[int, ...]:
 def reals(row: Row, count: int) -> list[float]:
     """Read numbers of 20 columns each; a blank is 0, NaN what is none."""
     return [real(row.text[at : at + 2 * _WIDTH]) for at in range(0, count * 2 * _WIDTH, 2 * _WIDTH)]
-
-
-# Sensors of times.  A rigid body with a sensor is deformable while that is active, and rigid while it is not.  Source:
-# Altair's public help for /SENSOR and /RBODY, the format files of OpenRadioss (Tstop has a line of its own, since
-# version 2023), and runs computed with it.
-
-
-def active_spans(starter: Starter, number: int, above: tuple[int, ...] = ()) -> Spans | str:
-    """Find when a sensor is active: spans (from, to) in order, or what cannot be followed, in words.
-
-    ``above`` are sensors that ask for this one.
-    """
-    card = starter.sensors.get(number)
-    if card is None or number in above:
-        return f"sensor {number}, which {'asks for itself' if card else 'the deck has not'}"
-    rows, kind = below_title(card), card.words[1]
-    if kind not in ("TIME", "OR", "AND", "NOT"):
-        return f"sensor {number}, which is not a time sensor"
-    delay = reals(rows[0], 1)[0] if rows else 0.0
-    if kind == "TIME":
-        stop = reals(rows[1], 1)[0] if len(rows) > 1 and starter.version >= STOPS_SINCE else 0.0
-        if math.isnan(delay) or math.isnan(stop):
-            return f"sensor {number}, whose time is no number"
-        stop = stop if 0 < stop < NEVER else math.inf
-        return ((max(delay, 0.0), stop),) if delay < stop else ()
-    if delay or len(rows) < 2:
-        return f"sensor {number}, whose delay is not followed"
-    asked = [card.integer(rows[1], at).value for at in range(1 if kind == "NOT" else 2)]
-    found = [active_spans(starter, one, (*above, number)) for one in asked]
-    for one in found:
-        if isinstance(one, str):
-            return f"sensor {number}, of {one}"
-    known = [one for one in found if not isinstance(one, str)]
-    if kind == "OR":
-        return _either(known)
-    return inactive(_either([inactive(one) for one in known]) if kind == "AND" else known[0])
-
-
-def _either(several: Sequence[Spans]) -> Spans:
-    joined: list[tuple[float, float]] = []
-    for start, stop in sorted(one for spans in several for one in spans):
-        if joined and start <= joined[-1][1]:
-            start, stop = joined[-1][0], max(stop, joined.pop()[1])
-        joined.append((start, stop))
-    return tuple(joined)
-
-
-def inactive(spans: Spans) -> Spans:
-    """Spans between those in which a sensor is active."""
-    ends = [0.0, *(end for span in spans for end in span), math.inf]
-    pairs = zip(ends[::2], ends[1::2], strict=True)
-    return tuple((start, stop) for start, stop in pairs if start < stop)

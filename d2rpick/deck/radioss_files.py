@@ -73,10 +73,19 @@ def run_files(path: str) -> list[str]:
     return files if any(Path(path).samefile(one) for one in files) else [path, *files]
 
 
+def root_of(path: str) -> str:
+    """Give the name that all files of a run begin with, ``NAME`` of ``NAME_0001.rad``; empty if a file has none.
+
+    The engine looks for the restart that begins like its own file, whatever the name in /RUN is.  Source: runs
+    computed with OpenRadioss.
+    """
+    numbered = re.fullmatch(_NUMBERED, os.path.basename(path))  # noqa: PTH119  start-up
+    return numbered[1] if numbered else ""
+
+
 def _run_name(path: str, head: bytes) -> str:
     """Name of a run by that of its file, else by what stands in it."""
-    numbered = re.fullmatch(_NUMBERED, os.path.basename(path))  # noqa: PTH119  start-up
-    if numbered:
-        return numbered[1]
+    if root := root_of(path):
+        return root
     found = re.search(_NAME, head)
     return (found[1] or found[2] or b"").decode("latin-1").strip() if found else ""

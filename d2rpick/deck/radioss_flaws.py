@@ -13,7 +13,7 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import in_rows
 from d2rpick.deck.mesh import KINDS, NOT_COUNTED, elements_of, nodes_of
-from d2rpick.deck.radioss_deck import Body, Start, Starter, number_of, reals
+from d2rpick.deck.radioss_deck import Start, Starter, number_of, reals
 from d2rpick.deck.radioss_files import AT_REST, NOT_FOLLOWED, THROUGH_WALL, Flaw
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.card import Card, Field
     from d2rpick.deck.mesh import Integers, Reals
+    from d2rpick.deck.radioss_rigid import Body
     from d2rpick.deck.radioss_run import Run
 
 _PENALTY_SINCE: Final = 2026  # version of the format from which on a wall has Iform

@@ -17,8 +17,9 @@ from d2rpick.deck.mesh import KINDS, NOT_COUNTED, Mesh, elements_of, nodes_of
 from d2rpick.deck.model import Formulation, Inventory, Material, PartData, Section
 from d2rpick.deck.radioss_deck import SOLIDS, Starter, below_title, blocks, kept_off, keyword, number_of, reals, whole
 from d2rpick.deck.radioss_flaws import flaws_of
-from d2rpick.deck.radioss_run import Run, find_run_windows, left_rigid
+from d2rpick.deck.radioss_run import Run, find_run_windows, left_rigid, parts_of_fixed_bodies, sensors_of_parts
 from d2rpick.deck.reader import cuts, holds_mesh
+from d2rpick.deck.unswitchable import unswitchable_of_radioss
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -67,8 +68,9 @@ def read(run: Run) -> Inventory:
     windows = find_run_windows(run).windows.windows if run.legs else ()
     joints = _joints(run, starter)
     switched = run.named if run.legs else {body.node.value for body in starter.bodies}  # all without an engine file
+    rigid = _always_rigid(windows) | parts_of_fixed_bodies(run)
     return Inventory(
-        "radioss", _parts(starter, mesh, _always_rigid(windows)), mesh.elements, mesh.coordinates, notes,
+        "radioss", _parts(starter, mesh, rigid), mesh.elements, mesh.coordinates, notes,
         not notes, joints=model.placed(joints.found, mesh.table), switched=model.placed(joints.switched, mesh.table),
         ties=joints.unknown, watched=mesh.table.known(_watched(starter)),
         moved=starter.transformed, files=tuple(run.deck.sources),
@@ -96,12 +98,15 @@ def _notes(run: Run, starter: Starter) -> Iterator[str]:
 
 def _parts(starter: Starter, mesh: Mesh, rigid: set[int]) -> Mapping[int, PartData]:
     materials, properties = dict(_materials(starter)), dict(_properties(starter))
-    kinds, unturned = mesh.kinds, starter.unturned
+    kinds, unturned, unswitchable = mesh.kinds, starter.unturned, unswitchable_of_radioss(starter)
+    sensors = sensors_of_parts(starter)
     found: dict[int, PartData] = {}
     for part, line in starter.parts.items():
         section = _section(properties.get(line.prop), kinds.get(part, set()), turns=part not in unturned)
         made_of = _material(materials.get(line.material), properties.get(line.prop), part in rigid)
-        found[part] = PartData(part, line.title, made_of, section)
+        by_sensor = f"the deck switches it by sensor {sensors[part]} already" if part in sensors else ""
+        why = unswitchable[part].reason if part in unswitchable else by_sensor
+        found[part] = PartData(part, line.title, made_of, section, why)
     return found
 
 

@@ -16,27 +16,20 @@ from typing import TYPE_CHECKING, NamedTuple
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import DeckError, are, in_rows, name_units
 from d2rpick.deck.card import Field, Value
-from d2rpick.deck.radioss_deck import (
-    Body,
-    Leg,
-    Starter,
-    active_spans,
-    blocks,
-    card_of,
-    inactive,
-    kept_off,
-    keyword,
-    read_legs,
-)
+from d2rpick.deck.radioss_deck import Leg, Starter, blocks, card_of, kept_off, keyword, read_legs
 from d2rpick.deck.radioss_files import ENGINE, HEAD, STARTER, recognises, run_files
+from d2rpick.deck.radioss_sensors import Course, active_spans, inactive, only_force
 from d2rpick.deck.reader import Deck, Unread, why_unread
 from d2rpick.deck.source import SourceFile
 from d2rpick.deck.switching import Event, Switched, SwitchSet, Unit, Window, Windows, follow
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+
+    Contacts = Callable[[Collection[int]], tuple[tuple[float, float], ...] | None]
 
     from d2rpick.deck.card import Card
+    from d2rpick.deck.radioss_rigid import Body
 
 
 @dataclass(eq=False, repr=False)
@@ -52,6 +45,17 @@ class Run:
     def named(self) -> frozenset[int]:
         """Main nodes that the legs switch."""
         return frozenset(node.value for leg in self.legs for _, _, nodes in leg.switched for node in nodes)
+
+    @cached_property
+    def resets(self) -> Mapping[int, float]:
+        """When each sensor is reset for the first time [time]: at the start of a leg with /SENS/RESET."""
+        found: dict[int, float] = {}
+        start = 0.0
+        for leg in self.legs:
+            for sensor in leg.resets:
+                found.setdefault(sensor, start)
+            start = leg.stop.value
+        return found
 
     @property
     def pushed(self) -> bool:
@@ -158,17 +162,18 @@ def in_order(legs: list[Leg]) -> bool:
     return numbers == list(range(1, len(legs) + 1)) and sorted_stops and not any(stop.problem for stop in stops)
 
 
-def find_run_windows(run: Run) -> RunWindows:
+def find_run_windows(run: Run, contacts: Contacts | None = None) -> RunWindows:
     """Follow every body that a leg or a sensor switches through the run.
 
     A body whose parts are not known is one unit, named by its main node.  Legs that are not in order have no windows.
+    ``contacts`` gives when something pushes some parts, for sensors of forces; None where no history shows it.
     """
     sets = tuple(_switches(run.legs)) if in_order(run.legs) else ()
     starter = None if run.starter and run.starter.moved else run.starter
     bodies = {body.node.value: body for body in starter.bodies} if starter else {}
     lines = [line.part for one in sets for line in one.switched]
     switched = {part.value for part in lines if part.value and not part.problem}
-    sensors = {node for node, body in bodies.items() if body.sensor and node not in switched}
+    sensors = {node for node, body in bodies.items() if body.sensor}  # whatever the legs say of them
     groups = {node: bodies[node].group for node in (*switched, *sensors) if node in bodies}
     parts = rigid_parts(starter, groups) if starter and groups else {}
     windows: list[Window] = []
@@ -177,7 +182,10 @@ def find_run_windows(run: Run) -> RunWindows:
             for unit in _units(node, parts):
                 windows += _follow(unit, node, sets, run.legs[0])
     for node in sorted(sensors):
-        windows += _by_sensor(run, bodies[node], parts)
+        windows += _by_sensor(run, bodies[node], parts, course_of(run, parts.get(node, ()), contacts))
+    for body in bodies.values():
+        if body.part and not body.sensor and body.node.value not in switched:
+            windows.append(_always(body))
     windows.sort(key=lambda window: (window.unit, window.tr))
     events = tuple(event for window in windows for event in (window.opened, window.closed) if event)
     return RunWindows(Windows(tuple(windows), (), events, frozenset(), frozenset()), sets, parts)
@@ -209,19 +217,33 @@ def _follow(unit: Unit, node: int, sets: tuple[LegSwitch, ...], first: Leg) -> l
     return [window for window in follow(unit, events)[0] if window.td is None or window.td > 0]
 
 
-def _by_sensor(run: Run, body: Body, parts: dict[int, set[int]]) -> Iterator[Window]:
-    """Windows of a body with a sensor of times: it is rigid while the sensor is not active."""
-    active = active_spans(run.starter, body.sensor) if run.starter else ""
+def course_of(run: Run, parts: Collection[int], contacts: Contacts | None) -> Course:
+    """Give what is known of the course of a run for sensors that switch some parts."""
+    known = contacts is not None and parts and run.starter is not None and only_force(run.starter)
+    return Course(run.resets, contacts(parts) if known and contacts else None)
+
+
+def _by_sensor(run: Run, body: Body, parts: dict[int, set[int]], course: Course) -> Iterator[Window]:
+    """Windows of a body with a sensor: it is rigid while the sensor is not active."""
+    active = active_spans(run.starter, body.sensor, course) if run.starter else ""
     if isinstance(active, str):
         return
+    end = run.legs[-1].stop.value if run.legs and in_order(run.legs) else math.inf
+    spans = [(start, stop if stop < end else math.inf) for start, stop in inactive(active) if start < end]
     for unit in _units(body.node.value, parts):
-        for span in inactive(active):
+        for span in spans:
             opened, closed = (
                 Event(unit, LegSwitch(body.card, "plain", None, (), (), at=at), Switched(body.node, False, rigid))
                 for at, rigid in zip(span, (True, False), strict=True)
             )
             ends = span[1] < math.inf
             yield Window(unit, span[0], span[1] if ends else None, opened, closed if ends else None)
+
+
+def _always(body: Body) -> Window:
+    """Window of a part that the starter makes a rigid body (Irigid), and that nothing switches."""
+    unit, by = Unit(body.part), LegSwitch(body.card, "plain", None, (), ())
+    return Window(unit, 0.0, None, Event(unit, by, Switched(body.node, False, True)), None)
 
 
 def rigid_parts(starter: Starter, bodies: Mapping[int, int]) -> dict[int, set[int]]:
@@ -258,6 +280,27 @@ def parts_off(run: Run) -> tuple[int, ...]:
     return tuple(sorted(set().union(*held.values())))
 
 
+def parts_of_fixed_bodies(run: Run) -> set[int]:
+    """Parts of the bodies that are on from the start to the end, since no leg and no sensor switches them.
+
+    Without engine files all bodies of /RBODY may be switched; those of parts with Irigid are rigid all the same.
+    """
+    bodies = run.starter.bodies if run.starter and not run.starter.moved else ()
+    fixed = [
+        body for body in bodies
+        if not body.sensor and body.node.value not in run.named and (run.legs or body.part)
+    ]  # fmt: skip
+    held = rigid_parts(run.starter, {body.node.value: body.group for body in fixed}) if run.starter and fixed else {}
+    return set().union(*held.values())
+
+
+def sensors_of_parts(starter: Starter) -> dict[int, int]:
+    """Give the sensors that switch the rigid bodies of parts, by part."""
+    sensors = {body.node.value: body for body in starter.bodies if body.sensor and not starter.moved}
+    held = rigid_parts(starter, {node: body.group for node, body in sensors.items()}) if sensors else {}
+    return {part: sensors[node].sensor for node, parts in held.items() for part in parts}
+
+
 class LeftRigid(NamedTuple):
     """Parts that lie whole in such bodies, where to put them off, what is wrong, and how it is mended."""
 
@@ -278,7 +321,18 @@ def left_rigid(run: Run, windows: Sequence[Window]) -> LeftRigid | None:
     if not held:
         return None
     places = [card.here for card, _, _ in run.legs[0].switched]
-    ids, mains = (in_rows(number) for number in ((body.id for body in bodies), (body.node.value for body in bodies)))
-    found = f"no leg switches /RBODY {', '.join(ids)}, so {name_units(held)} {are(held)} rigid from time 0 to the end"
+    mains = in_rows(body.node.value for body in bodies)
+    found = f"no leg switches {_names(bodies)}, so {name_units(held)} {are(held)} rigid from time 0 to the end"
     way_out = f"name main node{'s' * (len(bodies) > 1)} {', '.join(mains)} in the /RBODY/OFF of every leg"
+    if made := [body.node.value for body in bodies if body.node.field.text in ("", "0")]:
+        way_out += f" (the starter makes {name_units(made, 'node')}: see its listing)"
     return LeftRigid(tuple(held), places[0] if places else run.legs[0].run.here, found, way_out)
+
+
+def _names(bodies: Sequence[Body]) -> str:
+    """Name bodies: those of the deck by their ids, those of rigid parts by the parts."""
+    ids = [body.id for body in bodies if body.id]
+    parts = sorted(body.part for body in bodies if body.part)
+    named = [f"/RBODY {', '.join(in_rows(ids))}"] * bool(ids)
+    named += [f"the rigid {'bodies' if len(parts) > 1 else 'body'} of {name_units(parts)}"] * bool(parts)
+    return " and ".join(named)

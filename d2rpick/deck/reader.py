@@ -34,6 +34,13 @@ class Unread(NamedTuple):
     reason: str
 
 
+class Restart(NamedTuple):
+    """When a restart begins [time of the run], and where that is written."""
+
+    at: float
+    stop_field: Field
+
+
 def _asked_by(card: Card) -> Iterator[tuple[Field, Transform, tuple[Problem, ...]]]:
     """Names of the files that an ``*INCLUDE`` card asks for, the transform of each, and what of that is unreadable.
 
@@ -90,7 +97,7 @@ _KEPT: Final = (
     *("DEFORMABLE_TO_RIGID", "RIGID_DEFORMABLE", "CONTROL_TERMINATION", "DATABASE_GLSTAT", "DATABASE_MATSUM"),
     *("PART", "SET_PART", "MAT_", "ELEMENT_", "SECTION_", "NODE", "CONTACT_", "RIGIDWALL_"),
     *("SET_NODE", "CONSTRAINED_", "DATABASE_HISTORY_NODE", "BOUNDARY_SPC", "BOUNDARY_PRESCRIBED_MOTION"),
-    *("LOAD_BODY", "LOAD_GRAVITY", "DEFINE_CURVE"),
+    *("LOAD_BODY", "LOAD_GRAVITY", "DEFINE_CURVE", "SENSOR_CONTROL"),
 )
 _READ_INCLUDES: Final = ("INCLUDE", "INCLUDE_TRANSFORM")
 _PATHS: Final = ("INCLUDE_PATH", "INCLUDE_PATH_RELATIVE")  # both relative to the folder of the main deck
@@ -106,7 +113,7 @@ class Deck:
     """A deck as read: ``cards`` that matter, ``disabled`` ones (*COMMENT), encrypted blocks, includes.
 
     ``problems`` are numbers of includes that could not be read; ``ends`` the last block of each file that has no *END,
-    and whether that file is the main one.
+    and whether that file is the main one.  ``restarts`` are those that go on with its run.
     """
 
     path: str
@@ -120,6 +127,7 @@ class Deck:
     sources: list[SourceFile] = field(default_factory=list)
     ends: list[tuple[Block, bool]] = field(default_factory=list)
     long: bool = False  # whether the main file ends in long format
+    restarts: dict[str, Restart] = field(default_factory=dict)  # by file
 
     @property
     def files(self) -> list[str]:
@@ -352,9 +360,36 @@ def holds_mesh(block: Block) -> bool:
     return re.match(_MESH, block.head, re.IGNORECASE) is not None
 
 
+# Keywords of Radioss that values follow, in engine files: one of them without any is cut.
+_WITH_VALUES: Final = (
+    "RUN",
+    "RBODY",
+    "DT",
+    "DTIX",
+    "STOP",
+    "INIV",
+    "SENS",
+    "TFILE",
+    "VERS",
+    "BCS",
+    "BCSR",
+    "DEL",
+    "END",
+)
+
+
+def _is_whole(block: Block) -> bool:
+    """Whether nothing that matters can be missing from a last line without line end: a comment, or no values follow."""
+    *above, last = block.source.text(block.start, block.end).split("\n")
+    if last.startswith(("$", "#") if block.head.startswith("/") else "$"):
+        return True
+    first = block.head[1:].split("/")[0].strip().upper()
+    return block.head.startswith("/") and not above and not any(name.startswith(first) for name in _WITH_VALUES)
+
+
 def _sign_of_cut(block: Block, *, main: bool) -> str:
     mesh, radioss = holds_mesh(block), block.head.startswith("/")
-    if not block.source.ends_with_line():
+    if not block.source.ends_with_line() and not _is_whole(block):
         return f"the file ends within a line of {'its mesh' if mesh else block.head.strip()}"
     if main and mesh:
         return f"the {'starter' if radioss else 'main'} deck ends within its mesh, without {'/' if radioss else '*'}END"

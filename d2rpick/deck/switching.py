@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Final, Literal
 from d2rpick.base.caching import cached_property
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.deck.card import Field, Row, Value
-from d2rpick.deck.reader import SWITCHING, Deck
+from d2rpick.deck.reader import SWITCHING, Deck, Restart
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -88,10 +88,13 @@ class SwitchSet:
     values: tuple[Value[int] | Value[float] | Value[str], ...]
     count_problem: str = ""
     part: Value[int] | None = None  # of *DEFORMABLE_TO_RIGID_INERTIA
+    restart: Restart | None = None  # in which it stands, where it is known when that begins
 
     @cached_property
     def time(self) -> float | None:
         """When it switches [time of the whole deck]; None when that is not for a clock to say."""
+        if self.restart:
+            return self.restart.at
         if self.kind == "plain":
             return 0.0
         header = self.header
@@ -101,7 +104,9 @@ class SwitchSet:
 
     @property
     def time_field(self) -> Field:
-        """TIME1, or the keyword of a card without it."""
+        """TIME1, the end of the run before a restart, or the keyword of a card without either."""
+        if self.restart:
+            return self.restart.stop_field
         return self.header.time1.field if self.header else self.card.here
 
     @property
@@ -117,10 +122,11 @@ class SwitchSet:
 
 def read_switching(deck: Deck) -> tuple[SwitchSet, ...]:
     """Return all switching cards of a deck, in reading order."""
+    kinds = ((card, _KINDS.get(card.name)) for card in deck.cards)
     return tuple(
-        _automatic(card) if kind == "automatic" else _simple(card, kind)
-        for card in deck.cards
-        if (kind := _KINDS.get(card.name)) is not None
+        _automatic(card) if kind == "automatic" else _simple(card, kind, deck.restarts.get(card.file))
+        for card, kind in kinds
+        if kind is not None
     )
 
 
@@ -134,19 +140,21 @@ def misspelt(deck: Deck) -> Iterator[tuple[Card, str]]:
             yield card, f"*{get_close_matches(name, _KINDS, n=1, cutoff=0)[0]}"
 
 
-def _simple(card: Card, kind: Kind) -> SwitchSet:
+def _simple(card: Card, kind: Kind, restart: Restart | None) -> SwitchSet:
+    restart = restart if kind == "restart" else None
     rows = card.lines
     if kind == "inertia":
         part = [_moved(card.integer(rows[0], 0), card.transform.part)] if rows else []
         reals = [card.real(row, at) for row, count in zip(rows[1:], _REALS[kind], strict=False) for at in range(count)]
         missing = _INERTIA_ROWS[len(rows) :]
         problem = f"{' and '.join(missing)} {'are' if len(missing) > 1 else 'is'} missing" if missing else ""
-        return SwitchSet(card, kind, None, (), (*part, *reals), problem, *part)
+        return SwitchSet(card, kind, None, (), (*part, *reals), problem, next(iter(part), None))
     if card.name.endswith("_CONTROL"):
         values = [card.real(row, at) for row in rows[:1] for at in range(4)]
-        return SwitchSet(card, kind, None, (), tuple(values))
+        return SwitchSet(card, kind, None, (), tuple(values), restart=restart)
     to_rigid = not card.name.endswith("_R2D")
-    return _with(card, kind, None, [_line(card, row, to_rigid=to_rigid, ptype=kind == "plain") for row in rows])
+    lines = [_line(card, row, to_rigid=to_rigid, ptype=kind == "plain") for row in rows]
+    return replace(_with(card, kind, None, lines), restart=restart)
 
 
 def _automatic(card: Card) -> SwitchSet:

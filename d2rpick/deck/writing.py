@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import DeckError, name_units
 from d2rpick.base.files import write_whole
-from d2rpick.deck import radioss_deck
+from d2rpick.deck.engine_files import EngineFile, engine_lines, listed, off
 from d2rpick.deck.ls_dyna_parts import read_parts
-from d2rpick.deck.printing import EngineFile, engine_lines, listed, off
 from d2rpick.deck.radioss_deck import Leg, Starter, below_title, blocks, card_of, kept_off, keyword, numbers, read_legs
-from d2rpick.deck.radioss_files import run_files
+from d2rpick.deck.radioss_files import root_of, run_files
 from d2rpick.deck.radioss_run import Run, parts_off, read_run
+from d2rpick.deck.radioss_sensors import STOPS_SINCE
 from d2rpick.deck.reader import Deck, cure, cuts, read_deck
 from d2rpick.deck.source import Block, SourceFile
 from d2rpick.deck.switching import find_windows, read_switching
@@ -142,19 +142,22 @@ def _radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
         found = "no starter deck" if run.starter is None else f"{len(run.legs)} engine files"
         raise DeckError(f"{main}: the run has {found}; its starter deck and one engine file were expected")
     (leg,) = run.legs
-    _refuse_other_run(leg, printed)
     starter = run.starter.sources[0].name
+    root = root_of(starter) or leg.name  # the engine looks for a restart that begins like its own file
+    _refuse_other_run(leg, root, printed)
     _refuse_sensors(run.starter, card)
     main_text = with_cards(run.starter.sources[0], card.starter, blocks(run.starter.sources[0]))
-    yield Path(starter).name, _with_sensors(SourceFile(starter, main_text), card.sensors)
+    main_name = f"{root}_0000.rad"
+    yield main_name, _with_sensors(SourceFile(starter, main_text), card.sensors)
     further = list(blocks(leg.run.block.source))
-    for (name, text), mine in zip(card.files.items(), printed, strict=True):
+    names = [f"{root}_{mine.number:04d}.rad" for mine in printed]
+    for name, text, mine in zip(names, card.files.values(), printed, strict=True):
         kept = (text_of(block) for block in further if repeated(keyword(block), mine))
         named = {node.value for _, _, ids in mine.switched for node in ids} | card.sensors.keys()
         others = [node for node in kept_off(run.legs) if node not in named]  # else they would be rigid from time 0
         lines = listed(others) if mine.cap is None else off(others)  # its text ends with the bodies that it puts off
         yield name, (text + "".join(f"{line}\n" for line in lines)).encode() + b"".join(kept)
-    for name, content in copies(run.starter.sources[1:], starter, {Path(starter).name, *card.files}):
+    for name, content in copies(run.starter.sources[1:], starter, {main_name, *names}):
         yield name, _with_sensors(SourceFile(name, content), card.sensors)
 
 
@@ -182,7 +185,7 @@ def _edit(block: Block, sensors: Mapping[int, int]) -> Iterator[tuple[int, tuple
         text = lines[row.distance].rstrip(b"\r").decode("latin-1").ljust(20)
         first, second = (card.integer(row, place).value for place in (0, 1))
         if card.words[0] == "BEGIN":
-            new = f"{max(first, radioss_deck.STOPS_SINCE):10d}{text[10:]}"
+            new = f"{max(first, STOPS_SINCE):10d}{text[10:]}"
         elif first in sensors:
             if second:
                 raise DeckError(f"{row.field(1).at}: sensor {second} switches this /RBODY already; remove it first")
@@ -202,8 +205,8 @@ def _refuse_sensors(starter: Starter, card: PrintedCard) -> None:
         raise DeckError(f"{name_units(unknown, 'main node')}: no /RBODY of the deck has it; name main nodes of bodies")
 
 
-def _refuse_other_run(leg: Leg, printed: Sequence[Leg]) -> None:
-    if printed[0].name != leg.name:
+def _refuse_other_run(leg: Leg, root: str, printed: Sequence[Leg]) -> None:
+    if printed[0].name not in (leg.name, root):
         raise DeckError(f"the cards are for run {printed[0].name!r}, the run is {leg.name!r}; print it with that name")
     nodes = {node.value for one in printed for _, _, ids in one.switched for node in ids}
     for card, rigid, ids in leg.switched:

@@ -71,7 +71,7 @@ def as_table(checks: Checks, _: Shown) -> str:
     lines: list[str] = []
     for result in checks.results:
         lines.append(_shown(result.deck, checks.root))
-        if not result.cards:
+        if not result.cards and not result.windows:
             lines.append("  no switching cards")
         elif not result.windows and not result.findings:
             lines.append("  switching cards that switch nothing")
@@ -180,8 +180,9 @@ def _line(one: Finding) -> str:
 
 
 def _window_lines(windows: Sequence[CheckedWindow], root: str) -> Iterator[str]:
-    """Windows that the same cards make are one line."""
-    for group in grouped(((window.cards, window.unit.kind), window) for window in windows).values():
+    """Windows that the same cards make at the same times are one line."""
+    alike = (((window.cards, window.unit.kind, window.tr, window.td), window) for window in windows)
+    for group in grouped(alike).values():
         first = group[0]
         until = "the end" if first.td is None else f"{first.td:g}"
         names = name_units((window.unit.id for window in group), first.unit.kind)
@@ -300,7 +301,7 @@ def _example(title: str, example: Example, width: int) -> Iterator[str]:
     """A deck as it stands in its file, with what it includes and what it is checked against."""
     if example.history:
         yield f"{title}, with the history of"
-        yield tables.continued(f"  d2rpick replay {example.history} -o energy.csv", width)
+        yield tables.continued(f"  d2rpick {example.computed_by} {example.history} -o energy.csv", width)
         yield f"checked by d2rpick check {example.name} --history energy.csv {example.options}".rstrip() + ":"
     elif example.stdin:
         yield f"{title}, read by d2rpick check -:"

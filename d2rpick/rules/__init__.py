@@ -22,7 +22,7 @@ from d2rpick.rules.base import LS_DYNA, Case, Finding, RunCase, Severity
 from d2rpick.rules.rule import Rule
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Sequence
 
     from d2rpick.deck.card import Field
     from d2rpick.deck.switching import SwitchSet, Unit, Window
@@ -32,6 +32,13 @@ if TYPE_CHECKING:
 _MODULES = (reading, sets, times, switched_parts, runs)
 _ALL = (one for module in _MODULES for one in vars(module).values() if isinstance(one, Rule))
 _BY_HISTORY: Final = "D2R2"  # rules that an energy history alone can break
+_ALIKE: Final = 0.9  # of two ids, one of which has one sign more
+# What follows from one mistake of units is not reported beside it.
+_FOLLOW: Final = {
+    "D2R115": {"D2R101", "D2R205", "D2R206", "D2R207"},
+    "D2R207": {"D2R205", "D2R206"},
+    "D2R206": {"D2R205"},
+}
 RULES: Final[Mapping[str, Rule]] = {rule.id: rule for rule in sorted(_ALL, key=lambda rule: rule.id)}
 
 
@@ -87,8 +94,17 @@ def _expected_instead(name: str, known: Collection[str]) -> str:
     """What would have been a rule; the nearest one is named."""
     import difflib
 
-    near = difflib.get_close_matches(name.upper(), known, n=1)
+    asked = name.upper()
+    near = [rule for rule in sorted(known) if _signs_apart(rule, asked) == 1]
+    near = near or difflib.get_close_matches(asked, known, n=1, cutoff=_ALIKE)
     return "an id like D2R101 or its beginning was expected" + (f"; did you mean {near[0]}?" if near else "")
+
+
+def _signs_apart(one: str, other: str) -> int:
+    """Number of places at which two texts of one length differ; that length for others."""
+    if len(one) != len(other):
+        return max(len(one), len(other))
+    return sum(a != b for a, b in zip(one, other, strict=True))
 
 
 def read_configuration(table: Mapping[str, object], source: str = "", others: Collection[str] = ()) -> Configuration:
@@ -170,6 +186,7 @@ def check_deck(
     configuration: Configuration | None = None,
     judge: Judge | None = None,
     content: bytes | None = None,
+    restarts: Sequence[str] = (),
 ) -> Checked:
     """Read a deck with its includes, or a Radioss run with its legs, and apply the rules.
 
@@ -183,6 +200,8 @@ def check_deck(
         Judges the windows by an energy history; without one the energy rules find nothing.
     content : bytes, optional
         What the deck holds, where it does not lie in a file.
+    restarts : sequence of str, optional
+        Small restarts of LS-DYNA that go on with its run: their cards switch when they begin.
 
     Returns
     -------
@@ -198,14 +217,21 @@ def check_deck(
     """
     configuration = configuration or Configuration()
     configuration.verify(RULES)
-    case = _read(path, content, judge)
-    findings = list(_findings(case, configuration))
+    case = _read(path, content, judge, restarts)
+    findings = _without_what_follows(list(_findings(case, configuration)))
     order = {path: 0}  # the deck itself first, its includes as they come
     for finding in findings:
         order.setdefault(finding.file, len(order))
     findings.sort(key=lambda finding: (order[finding.file], finding.line, finding.column, finding.rule))
     windows, remarks = tuple(_told(case.windows.windows)), tuple(_remarks(case.deck))
-    return Checked(path, windows, tuple(findings), len(case.sets), tuple(case.deck.files), remarks, solver=case.solver)
+    return Checked(path, windows, tuple(findings), case.switching, tuple(case.deck.files), remarks, solver=case.solver)
+
+
+def _without_what_follows(findings: list[Finding]) -> list[Finding]:
+    """Leave out findings that follow from a mistake of units which another finding reports."""
+    causes = {finding.rule for finding in findings} & _FOLLOW.keys()
+    follow = set[str]().union(*(_FOLLOW[rule] for rule in causes))
+    return [finding for finding in findings if finding.rule not in follow]
 
 
 def _told(windows: Iterable[Window]) -> Iterator[CheckedWindow]:
@@ -235,8 +261,8 @@ def _findings(case: Case, configuration: Configuration) -> Iterator[Finding]:
             yield Finding(rule.id, severity, message, case.deck.path, place.file, place.line, place.column)
 
 
-def _read(path: str, content: bytes | None, judge: Judge | None) -> Case:
-    """Read a deck by what it is: a run of Radioss, or an LS-DYNA deck."""
+def _read(path: str, content: bytes | None, judge: Judge | None, restarts: Sequence[str]) -> Case:
+    """Read a deck by what it is: a run of Radioss, or an LS-DYNA deck with its restarts."""
     source = SourceFile(path, content)
     of_radioss = source.read(0, 1) != b"*" and recognises(source.read(0, HEAD))
     if of_radioss and (content is not None or os.path.isfile(path)):  # noqa: PTH113  a pipe gives its bytes once
@@ -244,7 +270,12 @@ def _read(path: str, content: bytes | None, judge: Judge | None) -> Case:
 
         run = read_run(path, content)
         return RunCase(run.deck, judge, run=run)
-    return Case(read_deck(path, source), judge)
+    deck = read_deck(path, source)
+    if restarts:
+        from d2rpick.deck.restarts import joined  # not above: start-up
+
+        deck = joined(deck, restarts)
+    return Case(deck, judge)
 
 
 def _remarks(deck: Deck) -> Iterator[str]:

@@ -19,11 +19,15 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_files import Flaw
     from d2rpick.deck.radioss_run import Run, RunWindows
     from d2rpick.deck.reader import Deck, Unread
+    from d2rpick.deck.unswitchable import Unswitchable
+    from d2rpick.rules.by_force import Forced
     from d2rpick.rules.judgement import HistoryJudge
 
 
 LS_DYNA, RADIOSS = "ls-dyna", "radioss"
 BOTH = (LS_DYNA, RADIOSS)
+
+_BY_FORCE = {1, 2, 3, 4}  # CODE
 
 K = TypeVar("K")
 V = TypeVar("V")
@@ -105,6 +109,11 @@ class Case:
         """All switching cards."""
         return read_switching(self.deck)
 
+    @property
+    def switching(self) -> int:
+        """Number of the cards that switch something."""
+        return len(self.sets)
+
     @cached_property
     def headers(self) -> tuple[tuple[SwitchSet, Header], ...]:
         """Switching cards that have a header, with it."""
@@ -112,8 +121,20 @@ class Case:
 
     @cached_property
     def windows(self) -> Windows:
-        """The switching windows of every part."""
-        return find_windows(self.sets, self.parts)
+        """The switching windows of every part, with those of switches by force that the history shows."""
+        timed = find_windows(self.sets, self.parts)
+        by_force = [window for one in self.forced for window in one.windows]
+        return timed._replace(windows=tuple(sorted((*timed.windows, *by_force), key=lambda one: (one.unit, one.tr))))
+
+    @cached_property
+    def forced(self) -> tuple[Forced, ...]:
+        """Switches by force, with what they do in the history; none without one."""
+        if self.judge is None or not any(header.code.value in _BY_FORCE for _, header in self.headers):
+            return ()
+        from d2rpick.rules.by_force import forced_switches  # not above: start-up
+
+        end = min(self.judge.end, self.end or self.judge.end)
+        return tuple(forced_switches(self.deck, find_windows(self.sets, self.parts).events, self.judge, end))
 
     @cached_property
     def constraints(self) -> Sequence[Constraint]:
@@ -161,6 +182,13 @@ class Case:
         return {part: f"ELFORM {one.elform}, {one.unturned}" for part, one in found if one and one.unturned}
 
     @cached_property
+    def unswitchable(self) -> Mapping[int, Unswitchable]:
+        """Parts that must not be switched."""
+        from d2rpick.deck.unswitchable import unswitchable_of_ls_dyna  # not above: start-up
+
+        return unswitchable_of_ls_dyna(self.deck, self.parts)
+
+    @cached_property
     def supporting(self) -> tuple[tuple[Card, Value[float]], ...]:
         """Numbers of other cards that the rules rely on: ENDTIM, and DT of the energy databases."""
         names = ("CONTROL_TERMINATION", "DATABASE_GLSTAT", "DATABASE_MATSUM")
@@ -184,7 +212,7 @@ class RunCase(Case):
         """Windows, and the parts of the bodies."""
         from d2rpick.deck.radioss_run import find_run_windows  # not above: start-up
 
-        return find_run_windows(self.run)
+        return find_run_windows(self.run, self.judge.contacts if self.judge else None)
 
     @cached_property
     def parts(self) -> Parts:
@@ -203,31 +231,57 @@ class RunCase(Case):
         return self.found.windows
 
     @cached_property
+    def forced(self) -> tuple[Forced, ...]:
+        """Bodies that a sensor of a force switches, with what it does in the history."""
+        from d2rpick.deck.radioss_run import course_of  # not above: start-up
+        from d2rpick.deck.radioss_sensors import waits_for_force
+        from d2rpick.rules.by_force import Forced
+
+        starter, found = self.run.starter, []
+        for body in starter.bodies if starter and self.judge else ():
+            parts = self.found.parts.get(body.node.value, set())
+            contacts = course_of(self.run, parts, self.judge.contacts if self.judge else None).contacts
+            own = tuple(one for one in self.windows.windows if one.opened.by.card is body.card)
+            if starter and contacts is not None and own and waits_for_force(starter, body.sensor):
+                found.append(Forced(body.card, (body.card,), own, contacts, "Tdelay of the sensor"))
+        return tuple(found)
+
+    @cached_property
     def end_time(self) -> Value[float] | None:
         """The end of the last leg as written."""
         return self.run.legs[-1].stop if self.run.legs else None
 
     @property
-    def unread(self) -> Sequence[Unread]:
-        """Includes that were not read, where a main node that is switched may stand in them."""
-        bodies = {body.node.value for body in self.run.starter.bodies} if self.run.starter else set()
-        return self.deck.unread if self.run.named - bodies - {0} else ()
+    def switching(self) -> int:
+        """Number of cards that switch something: of the legs, and of bodies with a sensor or of rigid parts."""
+        bodies = self.run.starter.bodies if self.run.starter else ()
+        return len(self.sets) + sum(bool(body.sensor or body.part) for body in bodies)
 
     @property
     def untimed(self) -> tuple[tuple[Field, str], ...]:
         """Bodies that a sensor switches whose time is not known."""
-        from d2rpick.deck.radioss_deck import active_spans  # not above: start-up
+        from d2rpick.deck.radioss_run import course_of  # not above: start-up
+        from d2rpick.deck.radioss_sensors import active_spans
 
         starter, legs = self.run.starter, [leg for leg in self.run.legs[:-1] if leg.sensor]
-        found = [(one, active_spans(starter, one.sensor)) for one in starter.bodies if one.sensor] if starter else []
-        told = [(one.node.field, f"rigid body {one.id} is switched by {why}") for one, why in found
-                if isinstance(why, str)]  # fmt: skip
+        sensed = [body for body in starter.bodies if body.sensor] if starter else []
+        contacts = self.judge.contacts if self.judge else None
+        courses = [(body, course_of(self.run, self.found.parts.get(body.node.value, ()), contacts)) for body in sensed]
+        spans = [(body, active_spans(starter, body.sensor, course)) for body, course in courses if starter]
+        told = [(body.node.field, f"{body.name} is switched by {why}") for body, why in spans if isinstance(why, str)]
         return *told, *((leg.run.here, f"leg {leg.number} ends when sensor {leg.sensor} is active") for leg in legs)
 
     @cached_property
     def unturned(self) -> Mapping[int, str]:
         """Parts of elements without a co-rotating frame."""
         return self.run.starter.unturned if self.run.starter else {}
+
+    @cached_property
+    def unswitchable(self) -> Mapping[int, Unswitchable]:
+        """Parts that must not be switched."""
+        from d2rpick.deck.unswitchable import unswitchable_of_radioss  # not above: start-up
+
+        return unswitchable_of_radioss(self.run.starter) if self.run.starter else {}
 
     @cached_property
     def flaws(self) -> tuple[Flaw, ...]:

@@ -16,6 +16,7 @@ from d2rpick.choice.question import Reference, Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, end_of_flight, end_of_load
 from d2rpick.deck import read_inventory
+from d2rpick.flight.contact_times import ContactTimes, contact_times
 from d2rpick.histories.digits import above, first_as_read, in_the_record
 from d2rpick.histories.surroundings import UNKNOWN
 
@@ -133,6 +134,17 @@ class HistoryJudge:
         if energies is None:
             return None
         return tuple(part.id for part, energy in zip(chosen, energies.T, strict=True) if energy.any())
+
+    def contacts(self, parts: Collection[int]) -> tuple[tuple[float, float], ...] | None:
+        """When something pushes some parts [time], by their momenta; None where the history does not show it."""
+        found = self.pushed(parts)
+        return found and found.spans
+
+    def pushed(self, parts: Collection[int]) -> ContactTimes | None:
+        """As `contacts`, with how well the times are known."""
+        chosen = [part for part in self.run.parts if part.id in parts]
+        momenta = next((one for one in self.run.momenta(chosen, None) if one.parts), None) if chosen else None
+        return contact_times(momenta) if momenta else None
 
     @property
     def _known(self) -> tuple[int, ...]:

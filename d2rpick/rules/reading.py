@@ -118,12 +118,14 @@ def _unreadable_members(case: Case) -> Iterator[Problem]:
 @rule("D2R003", ERROR, "an include file is missing or cannot be read", BOTH)
 def _includes(case: Case) -> Iterator[Objection]:
     """Looked for in the main deck's folder, in the *INCLUDE_PATH folders and in the including file's folder. A file
-    that includes itself or cannot be read is reported too; one that a Radioss starter deck asks for, only where a
-    main node that is switched was not found without it. Switching cards, parts or parameters may be in it, so the
-    other findings may be incomplete.
+    that includes itself or cannot be read is reported too, also one that a Radioss starter deck asks for (#include): a
+    rigid body with a sensor may stand in it. Switching cards, parts or parameters may be in it, so the other findings
+    may be incomplete.
     """
     for missing in case.unread:
         cure = _CURES.get(missing.reason, "correct it")
+        if case.solver != LS_DYNA and missing.reason in _CURES:
+            cure = "add the file"
         found = f"include {missing.name.text!r} was not read ({missing.reason})"
         yield missing.name, f"{found}; switching cards may hide in it: {cure}"
 
@@ -203,15 +205,21 @@ def _disabled(case: Case) -> Iterator[Objection]:
 )
 @rule("D2R302", INFO, "not judged by time: CODE 1-5, restart cards, plain *DEFORMABLE_TO_RIGID", BOTH)
 def _untimed(case: Case) -> Iterator[Objection]:
-    """CODE 1 to 4 switch by a contact or wall force, CODE 5 by a sensor, restart cards when the restart begins,
-    plain cards at the start, a Radioss body by a sensor other than /SENSOR/TIME: no time on the card can be compared
-    with an energy history.
+    """CODE 1 to 4 switch by a contact or wall force, CODE 5 by a sensor, restart cards when the restart begins, plain
+    cards at the start, a Radioss body by a sensor other than /SENSOR/TIME: no time on the card can be compared with an
+    energy history. If a history has the momenta of the parts, and the deck has one contact or wall, the times at which
+    a force switches are found from them and judged. Restarts that are checked together with their main deck have
+    times: each begins at the ENDTIM of the run before it.
     """
     for place, how in case.untimed:
         yield place, f"{how}; not judged by time"
     for card in case.sets:
         reason = _reason(card) if case.solver == LS_DYNA else ""
-        if reason:
+        forced = next((one for one in case.forced if card.card in one.cards), None)
+        if reason and forced:
+            times = f"by the momenta of the history {forced.switches} times, first at {forced.times[0][0]:.6g}"
+            yield card.card.here, f"*{card.card.name} {reason}: {times}"
+        elif reason:
             yield card.card.here, f"*{card.card.name} {reason}; not judged by time"
 
 
@@ -261,8 +269,12 @@ def _without_parts(case: Case) -> Iterator[Objection]:
 
 
 def _reason(card: SwitchSet) -> str:
+    if card.restart:
+        return ""
     if card.kind == "restart":
         return "acts at the restart, whose time is the end of the run before"
+    if card.kind == "plain" and not card.switched and not card.count_problem:
+        return ""  # it only lets restarts switch
     if card.kind == "plain":
         return "acts at the start of the run"
     if card.header is None or card.header.code.problem or card.header.code.value not in _CODES:

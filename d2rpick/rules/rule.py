@@ -20,8 +20,8 @@ MAIN_DECK: Final = "main.k"  # of an example that has no other name
 class Example(NamedTuple):
     """A deck, and the files it includes, or that belong to it, by name; ``name`` is that of the deck itself.
 
-    ``history`` are arguments of ``d2rpick replay`` that write the energy history it is checked with, ``options``
-    further ones of ``d2rpick check``.  ``stdin`` tells that it is read from standard input.
+    ``history`` are arguments of ``d2rpick replay``, or of the command ``computed_by``, that write the history it is
+    checked with, ``options`` further ones of ``d2rpick check``.  ``stdin`` tells that it is read from standard input.
     """
 
     deck: str
@@ -30,6 +30,7 @@ class Example(NamedTuple):
     options: str = ""
     stdin: bool = False
     name: str = MAIN_DECK
+    computed_by: str = "replay"
 
 
 class Rule(NamedTuple):

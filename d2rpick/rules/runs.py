@@ -1,4 +1,4 @@
-"""D2R307, D2R401-409, D2R411: the legs of a Radioss run, and its rigid bodies.
+"""D2R307, D2R401-409, D2R411-412: the legs of a Radioss run, and its rigid bodies.
 
 Bodies may go through walls, begin at rest, or be rigid all along.
 """
@@ -109,13 +109,15 @@ def _order(case: RunCase) -> Iterator[Objection]:
 @rule("D2R402", ERROR, "/RBODY/ON or /RBODY/OFF names what is not a main node", (RADIOSS,))
 def _main_nodes(case: RunCase) -> Iterator[Objection]:
     """The engine takes the main nodes of rigid bodies, not the ids of bodies, and skips an unknown one without a
-    message: the part stays as it was. 0 names nothing and is not reported. Judged only when the starter deck and its
-    includes could be read. Source: Altair's help and the published source of OpenRadioss.
+    message: the part stays as it was. It skips the main node of a body that /MERGE/RBODY joins to another, too. 0
+    names nothing and is not reported. Judged only when the starter deck and its includes could be read. Source:
+    Altair's help and the published source of OpenRadioss.
     """
     if case.run.starter is None or case.run.starter.moved or case.unread:
         return
     bodies = {body.node.value: body for body in case.run.starter.bodies}
-    by_id = {body.id: body for body in bodies.values()}
+    by_id = {body.id: body for body in bodies.values() if body.id}
+    joined_to = case.run.starter.rigid.joined_to
     for leg in case.run.legs:
         for _, _, nodes in leg.switched:
             for node in nodes:
@@ -123,6 +125,8 @@ def _main_nodes(case: RunCase) -> Iterator[Objection]:
                     continue
                 mixed = by_id.get(node.value)
                 hint = f"it is the id of rigid body {mixed.id}, whose main node is {mixed.node.value}" if mixed else ""
+                if main := joined_to.get(node.value):
+                    hint = f"its body is merged into {main.name}, whose main node is {main.node.value}"
                 there = ", ".join(map(str, sorted(bodies)[:_MOST_LISTED])) or "none"
                 found = f"{node.value} is not the main node of a rigid body, so it is skipped without a message"
                 yield node.field, f"{found}; {hint or f'main nodes here: {there}'}"
@@ -133,11 +137,14 @@ def _main_nodes(case: RunCase) -> Iterator[Objection]:
 @rule("D2R403", WARNING, "/RBODY/ON in a later leg for a body that was rigid from the start", (RADIOSS,))
 def _never_off(case: RunCase) -> Iterator[Objection]:
     """A rigid body is on by default in the first leg. Where no leg before says /RBODY/OFF the part is rigid from
-    time 0 on, through the load as well. Source: Altair's help for /RBODY in engine files.
+    time 0 on, through the load as well. A node that D2R402 reports is not reported here. Source: Altair's help for
+    /RBODY in engine files.
     """
     if not case.run.legs or case.run.legs[0].number != 1:
         return
-    said: set[int] = set()
+    starter = case.run.starter
+    known = starter is not None and not starter.moved and not case.unread
+    said = {*case.run.named} - {body.node.value for body in starter.bodies} if starter and known else set[int]()
     for leg in case.run.legs:
         for card, rigid, nodes in leg.switched:
             late = [node.value for node in nodes if node.value and node.value not in said]
@@ -303,3 +310,25 @@ def _d2r407(case: RunCase) -> Iterator[Objection]:
     that begin later (tstart, a sensor) are not judged. Source: runs computed with OpenRadioss.
     """
     return _flaws(case, code=AT_REST)
+
+
+def _sensed(*lines: str) -> Example:
+    """Let a sensor of time switch the body, with these lines below its title."""
+    deck = starter_deck().replace(_row(1808, 0)[:-1], _row(1808, 5)[:-1])
+    return run_of(engine_files(("0.2", "")), deck.replace("/END", f"/SENSOR/TIME/5\nclock\n{''.join(lines)}/END"))
+
+
+@passes(GOOD_RUN, _sensed(_row(0.02, width=20), _row(0.09, width=20)))
+@fails(_sensed(_row(0.02, 0.09, width=20)))
+@rule("D2R412", WARNING, "a /SENSOR/TIME with a second number on the line of Tdelay", (RADIOSS,))
+def _d2r412(case: RunCase) -> Iterator[Objection]:
+    """Tstop has a line of its own below Tdelay. A number that stands behind Tdelay is not read, so the sensor stays
+    active to the end, and the body that it switches deformable. Source: the format files of OpenRadioss, and runs
+    computed with it.
+    """
+    for card in case.run.starter.named("SENSOR") if case.run.starter else ():
+        rows = card.rows[1:2] if card.words[1:2] == ("TIME",) else ()
+        for row in rows:
+            if stop := row.text[20:40].strip():
+                found = f"{stop} stands behind Tdelay, where nothing is read, so the sensor has no Tstop"
+                yield row.field(2), f"{found}; put it on a line of its own"

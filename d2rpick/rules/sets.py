@@ -1,4 +1,4 @@
-"""D2R004-010: switch sets among each other, and switches by the force of a contact or rigid wall."""
+"""D2R004-010, D2R012, D2R208: switch sets among each other, and switches by the force of a contact or rigid wall."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ from functools import partial
 from typing import TYPE_CHECKING, Final, Literal
 
 from d2rpick.base.errors import listing
+from d2rpick.deck.force_switching import delay_without_chatter
 from d2rpick.deck.ls_dyna_parts import Entities, read_entities
-from d2rpick.deck.switching import BY_TIME, Header, SwitchSet, Unit
-from d2rpick.rules.base import ERROR, WARNING, Case, Objection
+from d2rpick.deck.switching import BY_SENSOR, BY_TIME, Header, SwitchSet, Unit
+from d2rpick.rules.base import BOTH, ERROR, WARNING, Case, Objection
 from d2rpick.rules.rule import BACK, PASS, THERE, Example, automatic, deck, fails, passes, rule
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from d2rpick.deck.card import Card
 
 
 _OF_WALL: Final = {1, 3}
@@ -170,9 +173,12 @@ def _there(case: Case) -> Iterator[Objection]:
             continue
         for header in headers:
             if entities.named(header.entno.value) is None:
-                there = f"has {_listed(entities)}" if entities.found else "has none"
-                found = f"ENTNO is {header.entno.value}, but no {what} has this number: the deck {there}"
-                yield header.entno.field, f"{found}; the switch never comes: give the number of one of them"
+                number = f"ENTNO is {header.entno.value}, but"
+                if entities.found:
+                    found = f"{number} no {what} has this number: the deck has {_listed(entities)}"
+                    yield header.entno.field, f"{found}; the switch never comes: give the number of one of them"
+                else:
+                    yield header.entno.field, f"{number} the deck has no {what}, so the switch never comes; add one"
 
 
 @passes(_with_floor(4, 7), _force(2, 1, contact=_BY_ORDER), _force(3, 7, contact=_contact("GENERAL") + _WALL))
@@ -201,16 +207,56 @@ def _listed(entities: Entities) -> str:
     return listing(texts, most=_MOST_LISTED)
 
 
-@passes(PASS, _with_floor(4, 7))
-@fails(_with_floor(4, 7, "0.0"), _with_floor(2, 7, "0.0"))
+_CONTROL: Final = "*SENSOR_CONTROL\n         5   DEF2RIG{:10d}        ON\n         3\n"
+
+
+def _sensed(control: str) -> Example:
+    return deck(control + automatic(20, "0.0", rigid=["1"], code=BY_SENSOR))
+
+
+@passes(PASS, _sensed(_CONTROL.format(20)), _sensed("*SENSOR_CONTROL_TITLE\nby force\n" + _CONTROL.format(20)[16:]))
+@fails(_sensed(""), _sensed(_CONTROL.format(21)), _sensed(_CONTROL.format(20).replace("DEF2RIG", " AIRBAG")))
+@rule("D2R012", ERROR, "CODE 5 without a *SENSOR_CONTROL that switches the set")
+def _uncontrolled(case: Case) -> Iterator[Objection]:
+    """A set with CODE 5 is switched by a *SENSOR_CONTROL with TYPE DEF2RIG whose TYPEID is its SWSET. Without one it
+    never switches. Judged only when all of the deck could be read and it has parts. When the sensor switches is not
+    followed (D2R302). Source: vendor keyword data.
+    """
+    if not case.whole:
+        return
+    controlled = {number for card in case.deck.named("SENSOR_CONTROL") for number in _controlled(card)}
+    for _, header in case.headers:
+        if header.code.value == BY_SENSOR and not header.code.problem and header.swset.value not in controlled:
+            found = f"no *SENSOR_CONTROL of type DEF2RIG has TYPEID {header.swset.value}, so set {header.swset.value}"
+            yield header.code.field, f"{found} never switches; add one, or choose another CODE"
+
+
+def _controlled(card: Card) -> Iterator[int]:
+    """Switch sets that a *SENSOR_CONTROL switches."""
+    for row in card.data[:1]:
+        if card.word(row, 1).value == "DEF2RIG":
+            yield card.integer(row, 2).value + card.transform.rest
+
+
+def _delayed(wait: str) -> Example:
+    """Write a pair of sets, of which the one that makes parts deformable waits before the other may act again."""
+    there = automatic(1, "0.0", rigid=["1"], code=2, pair=(2, 1))
+    again = automatic(2, "0.0", deformable=["1"], code=4, pair=(1, -1))
+    old = f"{'0.0':>10s}{'0.0':>10s}{'0.0':>10s}"
+    return deck(there + again.replace(old, f"{'0.0':>10s}{'0.0':>10s}{wait:>10s}", 1))
+
+
+@passes(PASS, _with_floor(4, 7), _delayed("0.01"))
+@fails(_with_floor(4, 7, "0.0"), _with_floor(2, 7, "0.0"), _delayed("0.0"))
 @rule("D2R009", WARNING, "TIME3 is 0 with a contact CODE")
 def _delay(case: Case) -> Iterator[Objection]:
     """TIME3 is how long after a switch no other one of the set is made. With 0 the next step may switch back: the
-    force of a contact is zero and not zero many times in one impact, and the parts chatter. Source: vendor keyword
-    data for the meaning; a public drop tool reports the chatter.
+    force of a contact is zero and not zero many times in one impact, and the parts chatter. Of a pair one set has to
+    wait. Source: vendor keyword data for the meaning; a public drop tool reports the chatter.
     """
+    waiting = {header.swset.value for _, header in case.headers if header.time3.value > 0}
     for header in _by_force(case, _OF_CONTACT):
-        if not header.time3.problem and header.time3.value == 0:
+        if not header.time3.problem and header.time3.value == 0 and header.relsw.value not in waiting:
             found = f"TIME3 is 0 with CODE {header.code.value}: the parts may switch back and forth in every contact"
             yield header.time3.field, f"{found}; set it to a time in which the contact settles"
 
@@ -227,3 +273,30 @@ def _unnamed(case: Case) -> Iterator[Objection]:
             what = "a contact" if header.code.value in _OF_CONTACT else "a rigid wall"
             found = f"ENTNO is 0 with CODE {header.code.value}, which waits for the force of {what}"
             yield header.entno.field, f"{found}; give its number"
+
+
+# A box that lands on its edge, and rattles.
+_LANDING: Final = "--drop 0.2 --tilt 20 --mesh 4 --ground-stiffness 2e6 --t-end 0.7 --dt 5e-4 --write-as matsum"
+
+
+def _landed(wait: str) -> Example:
+    landed = _delayed(wait).deck.replace("       0.2", "       0.7", 1)  # ENDTIM
+    return Example(landed, history=_LANDING, computed_by="rollover")
+
+
+@passes(PASS, _landed("0.07"))
+@fails(_landed("0.0"))
+@rule("D2R208", WARNING, "a switch by force that chatters in the history", BOTH)
+def _chatters(case: Case) -> Iterator[Objection]:
+    """A force comes and goes many times in one impact. If the history has the momenta of the parts, and the deck has
+    one contact or wall, the switches are followed through it: windows below a tenth of the longest are no flight. A
+    TIME3 of the set that makes the parts deformable (Radioss: Tdelay of the sensor) that lasts longer than the contact
+    keeps them out. A force that comes and goes within one interval of the history is not seen.
+    """
+    for one in case.forced:
+        short = len(one.times) - len(one.lasting)
+        if short:
+            wait = delay_without_chatter(one.lasting, one.contacts)
+            cure = f"; {wait:.3g} or more as {one.wait} leaves {len(one.lasting)}" if wait else ""
+            found = f"{one.switches} switches by the history, in {len(one.times)} windows"
+            yield one.place.here, f"{found}, {short} of which are below a tenth of the longest{cure}"

@@ -1,4 +1,4 @@
-"""D2R103, D2R104, D2R106-108, D2R112, D2R113, D2R116: the parts that are switched, and what holds on to them."""
+"""D2R103, D2R104, D2R106-108, D2R112, D2R113, D2R116-119: the parts that are switched, and what holds on to them."""
 
 from __future__ import annotations
 
@@ -90,6 +90,25 @@ def _never_rigid(case: Case) -> Iterator[Objection]:
         yield place, f"{named} switched back, but no card makes it rigid before; add the D2R line or remove this"
 
 
+_RESTART: Final = "*RIGID_DEFORMABLE_D2R\n{:10d}\n*RIGID_DEFORMABLE_R2D\n{:10d}\n"
+
+
+@passes(PASS, Example(_RESTART.format(1, 2)))
+@fails(Example(_RESTART.format(1, 1)))
+@rule("D2R117", ERROR, "a part made rigid and deformable in one restart")
+def _both_ways(case: Case) -> Iterator[Objection]:
+    """*RIGID_DEFORMABLE_D2R and _R2D of a restart act together, when it begins: a part that both name is not rigid
+    for any time, or rigid to the end, and nobody knows which.
+    """
+    of_restarts = [event for event in case.windows.events if event.by.kind == "restart"]
+    for file, events in grouped((event.by.card.file, event) for event in of_restarts).items():
+        rigid = {event.unit for event in events if event.line.to_rigid}
+        both = [event for event in events if not event.line.to_rigid and event.unit in rigid]
+        for _, place, named in _by_card(both):
+            found = f"{named} made rigid and deformable when the restart {file} begins"
+            yield place, f"{found}; one of them belongs into another restart"
+
+
 @fails(deck(THERE), deck("*DEFORMABLE_TO_RIGID\n         1\n"))
 @rule("D2R104", INFO, "a part made rigid and never switched back", BOTH)
 def _never_back(case: Case) -> Iterator[Objection]:
@@ -174,7 +193,7 @@ def _always_rigid(case: Case) -> Iterator[Objection]:
 
 @passes(_both("1", "         2         1      PART"))
 @fails(_both("1", "2"), _LAYERS, _BEAMS)
-@rule("D2R108", WARNING, "several parts made rigid with LRB 0 although they share nodes")
+@rule("D2R108", ERROR, "several parts made rigid with LRB 0 although they share nodes")
 def _torn(case: Case) -> Iterator[Objection]:
     """With LRB 0 each part becomes a rigid body of its own, and the bodies fight over the nodes they share. Merge
     them: the lead part with LRB 0, the others with LRB = the lead.
@@ -265,6 +284,41 @@ def _unturned(case: Case) -> Iterator[Objection]:
         found = f"{name_units(part for part, _ in those)} of solids that do not co-rotate ({form})"
         why = "the stresses locked in do not turn with the rigid body"
         yield those[0][1], f"{found}: {why}; expect an error after a large rotation"
+
+
+def _unswitchable(case: Case, *, flows: bool) -> Iterator[Objection]:
+    """Parts that are switched, by cards that act at any time, and must not be."""
+    kept = {part: why.reason for part, why in case.unswitchable.items() if why.flows == flows} if case.sets else {}
+    opened = [event for event in case.windows.events if event.line.to_rigid and event.unit.part in kept]
+    first = {event.unit.id: event for event in reversed(opened)}
+    for reason, parts in grouped((kept[part], part) for part in sorted(first)).items():
+        yield first[parts[0]].line.part.field, f"{name_units(parts)}: {reason}; do not switch it"
+
+
+def _of_law(law: str) -> Example:
+    return deck(f"{law}\n         1     1.0e-9       1.0       0.3\n" + THERE + BACK)
+
+
+@passes(PASS, _solid("1"))
+@fails(_solid("5"), _solid("11"), _solid("12"))
+@rule("D2R118", ERROR, "a switched part whose material flows through its mesh", BOTH)
+def _flows(case: Case) -> Iterator[Objection]:
+    """ALE and Eulerian elements (LS-DYNA: ELFORM 5, 6, 7, 11, 12; Radioss: /ALE/MAT, /EULER/MAT) hold whatever flows
+    through them: there is no body to be made rigid. Source: the vendor's keyword data, Altair's help.
+    """
+    return _unswitchable(case, flows=True)
+
+
+@passes(PASS, _of_law("*MAT_ELASTIC"))
+@fails(_of_law("*MAT_MOONEY-RIVLIN_RUBBER"), _of_law("*MAT_077_O"), _of_law("*MAT_ORTHOTROPIC_ELASTIC"))
+@rule("D2R119", WARNING, "a switched part whose law keeps a stress-free reference", BOTH)
+def _with_reference(case: Case) -> Iterator[Objection]:
+    """Hyperelastic and total Lagrangian laws compute the stress from the deformation since the start, and not from
+    what was stored when the part was made rigid: it may come back with a stress that it did not have. Source: the
+    theory of the laws, and a report of 2026 on LS-DYNA R14 in which a hyperelastic solid did; not tried with the
+    solver. Radioss: hyperelastic laws, and solids with Ismstr 10 to 12.
+    """
+    return _unswitchable(case, flows=False)
 
 
 @passes(PASS, _constrained(_NODAL, "         1         0"), _constrained(_NODAL.replace("   5\n", "   6\n")))

@@ -10,14 +10,16 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import ArgumentError, DeckError, name_units
 from d2rpick.deck import read_inventory
+from d2rpick.deck.engine_files import capped, listed, off
 from d2rpick.deck.ls_dyna_parts import read_entities
 from d2rpick.deck.pieces import inner_period, supports_of
 from d2rpick.deck.printed_card import PHYSICS, PrintedCard, Printing, check_ids, comments, shortest
-from d2rpick.deck.printing import Waiting, capped, header, listed, off, to_deformable, to_rigid
 from d2rpick.deck.radioss_bodies import bodies_for
 from d2rpick.deck.radioss_deck import kept_off, number_of
 from d2rpick.deck.radioss_run import parts_off, read_run
+from d2rpick.deck.radioss_sensors import WITHOUT_FORCE
 from d2rpick.deck.reader import read_deck
+from d2rpick.deck.switch_sets import Waiting, header, to_deformable, to_rigid
 from d2rpick.running.inner_motion import Wait, check_wait, wait_of_deck
 
 if TYPE_CHECKING:
@@ -33,7 +35,6 @@ _MOST_LEGS: Final = 9
 _CAP_SHARE: Final = 300
 # LS-DYNA: how long after it becomes rigid the first contact may not release it, of the wait.
 _SHORT: Final = 100
-_NO_FORCE: Final = {"TYPE1", "TYPE2", "TYPE9", "TYPE12", "TYPE18", "SUB"}  # ties, fluids, and parts of other contacts
 _LOADS: Final = ("CLOAD", "PLOAD", "MONVOL", "LOAD", "PRELOAD", "LASER", "PFLUID")
 _OF_ALL: Final = (
     "A first run: no reference tells the level at td, so that none is matched.",
@@ -44,9 +45,6 @@ _OF_RADIOSS: Final = (
     "No window keeps a margin: each rigid leg ends in the first step of a contact, {cap:g} at most into it.",
     "A contact of the parts with themselves counts: while it pushes, they do not fly.",
     "Legs behind the end of the run take one step.",
-)
-_OF_WALLS: Final = (
-    "The sensor of a rigid wall stays active once it was: behind the first push of one nothing becomes rigid."
 )
 _OF_LS_DYNA: Final = (
     "CODE 2 has no wait: parts become rigid without force after TIME1, also before a push and between two of them.",
@@ -149,7 +147,7 @@ def _radioss(path: str, inventory: Inventory, parts: Sequence[int], wait: Wait, 
         files[f"{leg.name}_{number:04d}.rad"] = "\n".join(lines) + "\n"
     how = f"at rest in free fall: rigid from 0; then {_waited(wait)}" if at_rest else _waited(wait)
     told = (note.format(cap=cap) for note in _OF_RADIOSS)
-    notes = (how, *bodies.notes, *_OF_ALL, *told, *((_OF_WALLS,) if run.starter.named("RWALL") else ()))
+    notes = (how, *bodies.notes, *_OF_ALL, *told)
     head = "".join(f"# {line}\n" for line in comments([*notes, *PHYSICS]))
     return First(PrintedCard(head, (), files, starter=bodies.cards + sensors), wait, notes)
 
@@ -162,7 +160,7 @@ def _refuse_loads(starter: Starter) -> None:
 def _forces(starter: Starter) -> Iterator[tuple[str, int]]:
     """Kind of sensor and id of each contact and rigid wall."""
     for card in starter.named("INTER"):
-        if card.words[1:] and card.words[1] not in _NO_FORCE:
+        if card.words[1:] and card.words[1] not in WITHOUT_FORCE:
             yield "INTER", next(number for at in (2, 3) if (number := number_of(card, at)) or at == 3)
     for card in starter.named("RWALL"):
         yield "RWALL", number_of(card, -1)

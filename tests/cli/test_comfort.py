@@ -131,8 +131,9 @@ def test_early_times_that_are_meant_are_kept(in_ms: str) -> None:
 def test_a_deck_in_s_is_not_judged_by_a_history_in_ms(in_ms: str) -> None:
     result = run("check", str(ROOT / "sample_data/switching.k"), "--history", in_ms)
     assert result.exit_code == 1
-    assert "D2R205" in result.stdout
-    assert "is the deck in s and the history not? 64 lies in it too" in result.stdout
+    assert "error D2R207" in result.stdout  # one finding for one mistake
+    assert "about 1000 times earlier: seconds for milliseconds" in result.stdout
+    assert "1 error, 0 warnings" in result.stdout
 
 
 def test_ndjson_is_the_json_in_one_line() -> None:

@@ -18,7 +18,8 @@ from tests.command import refused, run
 from tests.decks import found, read, spans, write
 
 TIMES = st.floats(1e-9, 1e9)
-ALL = Printing(part=(11,), node=(1001,), end=1e6)
+# Something pushes from the end of each window in the test to the next one.
+ALL = Printing(part=(11,), node=(1001,), end=1e6, contact=3, pushed=((0.09, 0.2), (0.3, 0.5), (0.75, 0.8)))
 
 
 @given(st.integers(-9999, 99999), st.integers(-3, 3))

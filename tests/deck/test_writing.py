@@ -140,6 +140,20 @@ def test_a_run_gets_the_legs_with_its_own_keywords(tmp_path: Path) -> None:
     assert all(text.count("/DTIX") == text.count("/RUN") == 1 for text in texts)
 
 
+def test_legs_are_named_after_the_files_of_the_run_by_which_the_engine_finds_its_restart(tmp_path: Path) -> None:
+    """Source: runs computed with OpenRadioss, whose engine looks for NAME_0001.rst beside NAME_0002.rad."""
+    main = radioss_run(tmp_path / "ref")
+    for file in (tmp_path / "ref").iterdir():
+        file.rename(file.with_name(file.name.replace("box_", "heavy_box_")))
+    main = main.replace("box_0000", "heavy_box_0000")
+    for name in ("box", "heavy_box"):  # that in /RUN, or that of the files
+        card = cards(WINDOWS, Printing(node=(1808,), end=0.4, name=name), "radioss")
+        names = [Path(one).name for one in write_deck(main, card, str(tmp_path / name))]
+        assert names == [f"heavy_box_{number:04d}.rad" for number in range(6)]
+    card = cards(WINDOWS, Printing(node=(1808,), end=0.4, name="other"), "radioss")
+    refused(main, card, "the cards are for run 'other', the run is 'box'")
+
+
 def test_bodies_that_the_run_keeps_off_stay_off_in_every_leg(tmp_path: Path) -> None:
     """Else they would be rigid from time 0: the loose wheels of a car whose body alone is switched."""
     engine = ENGINE.replace("1808\n", "1808 1809\n1810\n") + "/END\nleft over\n"

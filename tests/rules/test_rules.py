@@ -25,16 +25,16 @@ def names(examples: list[tuple[Rule, Example]]) -> list[str]:
 
 
 @cache
-def history(arguments: str) -> bytes:
-    """The energy history that ``d2rpick replay`` writes."""
-    return run("replay", *shlex.split(arguments)).stdout_bytes
+def history(command: str, arguments: str) -> bytes:
+    """The energy history that ``d2rpick replay`` writes, or another command."""
+    return run(command, *shlex.split(arguments)).stdout_bytes
 
 
 def findings(folder: Path, rule: Rule, example: Example) -> list[dict[str, Any]]:
     """What the rule finds in an example, checked as `d2rpick rule` says."""
     options = shlex.split(example.options)
     if example.history:
-        (folder / "energy.csv").write_bytes(history(example.history))
+        (folder / "energy.csv").write_bytes(history(example.computed_by, example.history))
         options += ["--history", str(folder / "energy.csv")]
     path = write(folder, example.deck, example.files, example.name)
     if example.stdin:

@@ -38,7 +38,7 @@ def test_legs_end_by_sensors_of_flight_and_of_contact(tmp_path: Path) -> None:
     found = d2.first(radioss(tmp_path / "ref", CONTACT + WALL + TIED + THROWN), tmp_path / "next", parts="1-2")
     assert found.wait == pytest.approx(PERIOD / 2, rel=1e-2)
     assert "springs" in found.reason
-    assert any("rigid wall stays active" in note for note in found.notes)
+    assert not any("stays active" in note for note in found.notes)  # it goes off: runs computed with OpenRadioss
     starter = Path(found.files[0]).read_text()
     kinds = re.findall(r"/SENSOR/(\w+)/(\d+)", starter)
     assert kinds == [("INTER", "1"), ("RWALL", "2"), ("OR", "3"), ("NOT", "4"), ("TIME", "5"), ("AND", "6")]

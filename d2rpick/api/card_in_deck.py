@@ -1,0 +1,45 @@
+"""What ``check`` says of a card in the deck of its run, before anybody pastes it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from d2rpick.base.errors import Caution, DeckError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from d2rpick.api.asked import Asked
+    from d2rpick.deck.printed_card import PrintedCard
+
+OBJECTION: Final = "card-objection"
+UNJOINED: Final = "parts-not-joined"
+
+
+def objections(card: PrintedCard, asked: Asked, parts: int) -> Iterator[Caution]:
+    """Say what ``check`` has against a deck with the card in it; without a deck, what nobody knows of its parts.
+
+    ``parts`` is how many the card switches by their ids.
+    """
+    if asked.deck is None:
+        if parts > 1:
+            told = "no deck of the run was read, so nobody knows whether these parts share nodes"
+            yield Caution(UNJOINED, f"{told}; name the main deck with `deck`, or merge the parts with `merge`")
+        return
+    from tempfile import TemporaryDirectory
+
+    from d2rpick.deck.writing import write_deck
+    from d2rpick.rules import check_deck
+    from d2rpick.rules.base import INFO
+
+    with TemporaryDirectory() as folder:
+        try:
+            checked = check_deck(write_deck(asked.deck, card, folder)[0])
+        except DeckError as error:
+            yield Caution(OBJECTION, f"the card does not go into the deck: {error}")
+            return
+        for one in checked.findings:
+            if one.severity is not INFO:
+                place = one.file.removeprefix(f"{folder}/")
+                told = f"{one.rule} ({one.severity}): {one.message.replace(f'{folder}/', '')}"
+                yield Caution(OBJECTION, f"check of the deck with this card, {place}:{one.line}: {told}")

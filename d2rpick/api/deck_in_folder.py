@@ -1,0 +1,46 @@
+"""The main deck in the folder of a run: with it a folder alone tells which parts become one rigid body."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final
+
+from d2rpick.base.errors import ArgumentError, Caution, listing
+
+if TYPE_CHECKING:
+    from d2rpick.api.request import Request
+
+FOUND: Final = "deck-in-folder"
+
+
+def with_deck_in_folder(request: Request) -> Request:
+    """Take the main deck in the folder of the run, unless a deck is named or none is wanted.
+
+    Raises
+    ------
+    ArgumentError
+        If the folder has several main decks, or what is asked needs a deck and there is none.
+    """
+    folder = request.folder
+    if folder is None:
+        return request
+    from d2rpick.deck import decks_of_run  # not above: most runs are files
+
+    decks = decks_of_run(folder)
+    if len(decks) > 1:
+        raise ArgumentError(
+            f"{folder}: {len(decks)} main decks ({listing(decks, most=5)}); name the deck of the run with `deck`,"
+            " or use none with `no_deck`"
+        )
+    if not decks:
+        request.check_deck()
+        return request
+    return replace(request, deck=decks[0], deck_in_folder=True)
+
+
+def naming(request: Request) -> tuple[Caution, ...]:
+    """Name the deck that was found in the folder of the run."""
+    if not request.deck_in_folder:
+        return ()
+    told = f"{request.deck} is the main deck in the folder of the run and was read; `no_deck` does without it"
+    return (Caution(FOUND, told),)

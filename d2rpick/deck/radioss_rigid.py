@@ -1,0 +1,142 @@
+"""Rigid bodies as the starter of Radioss makes them: with a main node each, and merged as /MERGE/RBODY asks for.
+
+Source: the published source of OpenRadioss at bd4557ba7 (hm_read_merge.F, hm_rbodies_add_main_node.F90), and runs
+computed with it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from d2rpick.base.graph import reached
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from d2rpick.deck.card import Card, Value
+
+    Group = tuple[str, tuple[int, ...]]  # what it is made of, and the ids of that
+
+# What a line of /MERGE/RBODY names: a body by its id, a node, a group of nodes, the body of a part with Irigid.
+BODY, NODE, GROUP, OF_PART = 1, 2, 3, 4
+MADE_HERE: Final = 10**10  # ids from here on are beyond those of a deck: groups of nodes that are made here
+
+
+class Body(NamedTuple):
+    """A rigid body: its id, main node, sensor and group of nodes (0: none).
+
+    ``stays``: its nodes are to stay in rigid walls (Ikrem 1, or a sensor).  ``part`` is the part of which the starter
+    makes the body (Irigid); such a body has no id in the deck.
+    """
+
+    id: int
+    node: Value[int]
+    sensor: int
+    group: int
+    card: Card
+    stays: bool
+    part: int = 0
+
+    @property
+    def name(self) -> str:
+        """What to call it."""
+        return f"/RBODY {self.id}" if self.id else f"the rigid body of part {self.part}"
+
+
+class Merge(NamedTuple):
+    """A line of /MERGE/RBODY: the main body, and what is joined to it, each with the kind of its id."""
+
+    main_kind: int
+    main: int
+    kind: int
+    other: int
+
+
+class RigidBodies(NamedTuple):
+    """Bodies that the engine knows by their main nodes.
+
+    ``joined_to`` are those of them to which others were merged, by the main nodes of these, which the engine does not
+    know.  ``groups`` are groups of nodes that hold merged bodies.
+    """
+
+    bodies: tuple[Body, ...]
+    joined_to: Mapping[int, Body]
+    groups: Mapping[int, Group]
+
+
+def rigid_bodies(written: Sequence[Body], merges: Sequence[Merge], last_node: Callable[[], int]) -> RigidBodies:
+    """Give the bodies of a deck as the engine has them.
+
+    Parameters
+    ----------
+    written : sequence of Body
+        As the deck has them, those that are made of parts last.
+    merges : sequence of Merge
+        All lines of /MERGE/RBODY.
+    last_node : callable
+        Gives the highest id of a node; asked only if a body has no main node.
+    """
+    bodies = [*_with_main_nodes(written, last_node)]
+    if not merges:
+        return RigidBodies(tuple(bodies), {}, {})
+    named = {(OF_PART, body.part) if body.part else (BODY, body.id): body for body in bodies}
+    mains: dict[int, int] = {}
+    further: dict[int, list[Group]] = {}
+    for merge in merges:
+        main, other = named.get((merge.main_kind, merge.main)), named.get((merge.kind, merge.other))
+        if main is None:
+            continue
+        if other and other is not main:
+            mains[other.node.value] = main.node.value
+        elif merge.kind in (NODE, GROUP):
+            group = "GRNOD" if merge.kind == GROUP else "NODE"
+            further.setdefault(main.node.value, []).append((group, (merge.other,)))
+
+    def top(node: int) -> int:
+        return reached([node], lambda one: [mains[one]] if one in mains else [])[-1]
+
+    members: dict[int, list[Group]] = {}
+    for body in bodies:
+        own = [("GRNOD", (body.group,))] if body.group else []
+        members.setdefault(top(body.node.value), []).extend([*own, *further.get(body.node.value, ())])
+    groups: dict[int, Group] = {}
+    found: dict[int, Body] = {}
+    for body in bodies:
+        node = body.node.value
+        if node not in mains:
+            found[node] = body._replace(group=_united(members[node], groups))
+    joined_to = {node: found[top(node)] for node in mains if top(node) in found}
+    return RigidBodies(tuple(found.values()), joined_to, groups)
+
+
+def _with_main_nodes(written: Sequence[Body], last_node: Callable[[], int]) -> Iterator[Body]:
+    """Number the main nodes that the starter makes: above all nodes, by the ids of the bodies, those of parts last."""
+    lacking = sorted((body for body in written if not body.node.value), key=lambda body: (body.part, body.id))
+    first = last_node() + 1 if lacking else 0
+    numbers = {body: number for number, body in enumerate(lacking, start=first)}
+    for body in written:
+        number = numbers.get(body)
+        yield body if number is None else body._replace(node=replace(body.node, value=number))
+
+
+def _united(members: Sequence[Group], groups: dict[int, Group]) -> int:
+    """Give the id of a group that has all members, and add it, and those of single nodes, to ``groups``."""
+    if not members:
+        return 0
+    if len(members) == 1 and members[0][0] == "GRNOD":
+        return members[0][1][0]
+    ids: list[int] = []
+    for kind, numbers in members:
+        if kind == "NODE":
+            ids.append(_added((kind, numbers), groups))
+        else:
+            ids += numbers
+    return _added(("GRNOD", tuple(ids)), groups)
+
+
+def _added(group: Group, groups: dict[int, Group]) -> int:
+    """Add a group under an id that no other has, and give that; those of parts lie below twice `MADE_HERE`."""
+    number = 2 * MADE_HERE + len(groups)
+    groups[number] = group
+    return number

@@ -1,0 +1,87 @@
+"""Lines of a switch set of LS-DYNA, *DEFORMABLE_TO_RIGID_AUTOMATIC: its two first lines, and those of its parts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from d2rpick.deck.part_sets import NO_SETS, PartSets, named
+from d2rpick.deck.printed_card import shortest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from d2rpick.deck.printed_card import Printing
+
+_SET_HEAD = "$#   swset      code     time1     time2     time3     entno     relsw    paired"
+_COUNT_HEAD = "$#    nrbf      ncsf       rwf     dtmax       d2r       r2d    offset"
+
+
+def to_rigid(ids: Sequence[int], printing: Printing, part_sets: PartSets = NO_SETS) -> Iterator[str]:
+    """Write the parts that become rigid, those that lead first, or the sets that they make up."""
+    yield "$#     pid       lrb     ptype"
+    for lead, some in groups_by_lead(ids, printing).items():
+        yield from (f"{name:10d}{lead:10d}{kind:>10}" for name, kind in named(some, part_sets))
+
+
+def to_deformable(ids: Sequence[int], part_sets: PartSets = NO_SETS) -> Iterator[str]:
+    """Write the parts that become deformable, or their set."""
+    yield "$#     pid     ptype"
+    yield from (f"{name:10d}{kind:>10}" for name, kind in named(ids, part_sets))
+
+
+def groups_by_lead(ids: Sequence[int], printing: Printing) -> dict[int, list[int]]:
+    """Give the parts by their lead, those without one first, under 0."""
+    leads = _leads(ids, printing)
+    found: dict[int, list[int]] = {}
+    for part in sorted(ids, key=lambda part: part in leads):
+        found.setdefault(leads.get(part, 0), []).append(part)
+    return found
+
+
+def _leads(ids: Sequence[int], printing: Printing) -> dict[int, int]:
+    """Give the lead of each part that is merged into another."""
+    if printing.merge is not None:
+        return {part: printing.merge for part in ids if part != printing.merge}
+    bodies = [[part for part in body if part in ids] for body in printing.bodies]
+    return {part: body[0] for body in bodies for part in body[1:]}
+
+
+class Waiting(NamedTuple):
+    """What a switch waits for: its CODE, the contact, the delay after it [time], the set of its pair, and its place.
+
+    ``latest``: it does not switch after that [time]; ``offset``: it switches at so large a gap before a contact.  0 for
+    none.
+    """
+
+    code: int = 0
+    contact: int = 0
+    delay: float = 0.0
+    other: int = 0
+    paired: int = 0
+    latest: float = 0.0
+    offset: float = 0.0
+
+
+def header(
+    swset: int,
+    time: str,
+    step_cap: str,
+    counts: tuple[int, int],
+    waits: Waiting | None = None,
+    constraints: Sequence[int] = (0, 0),
+) -> Iterator[str]:
+    """Write the lines of a switch set down to its parts: at a ``time``, or from then on where it waits.
+
+    ``counts`` are D2R and R2D, ``constraints`` NRBF and NCSF: 0 leaves constraints as they are, 1 deletes them and 2
+    activates them.
+    """
+    on = waits or Waiting()
+    yield "*DEFORMABLE_TO_RIGID_AUTOMATIC"
+    yield _SET_HEAD
+    yield (
+        f"{swset:10d}{on.code:10d}{time:>10s}{shortest(on.latest):>10s}{shortest(on.delay):>10s}"
+        f"{on.contact:10d}{on.other:10d}{on.paired:10d}"
+    )
+    yield _COUNT_HEAD
+    nrbf, ncsf = constraints
+    yield f"{nrbf:10d}{ncsf:10d}{0:10d}{step_cap:>10s}{counts[0]:10d}{counts[1]:10d}{shortest(on.offset):>10s}"

@@ -1,0 +1,97 @@
+"""Parts that must not be made rigid and deformable again, whatever their energy says, and why.
+
+Material that flows through its mesh is no body.  A law that computes its stress from the deformation since the start
+keeps that start as its stress-free reference: what the part was given as a rigid body (a stress that was zeroed, or a
+motion that is not its own) is a deformation for it once it is switched back.
+
+Source: the vendor's keyword data for ELFORM, the theory of the laws, Altair's public help for /ALE/MAT, /EULER/MAT,
+/PROP/SOLID and the laws, and a report of 2026 on LS-DYNA R14 (a hyperelastic solid that came back with stress).  Not
+tried with LS-DYNA.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from d2rpick.deck.ls_dyna_parts import Parts, material_of, read_sections
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from d2rpick.deck.radioss_deck import Starter
+    from d2rpick.deck.reader import Deck
+
+
+class Unswitchable(NamedTuple):
+    """Why a part must not be switched; ``flows``: its material flows through the mesh, else it keeps a reference."""
+
+    flows: bool
+    reason: str
+
+
+# ELFORM of *SECTION_SOLID.
+_FLOWING: Final = {5: "ALE", 6: "Eulerian", 7: "Eulerian", 11: "ALE", 12: "ALE"}
+# Names and numbers of *MAT keywords; a number may have zeros in front.
+_REFERENCE_BY_NAME: Final = re.compile(
+    r"MAT_(BLATZ-KO|MOONEY-RIVLIN|FRAZER_NASH|FRAZER-NASH|HYPERELASTIC|OGDEN|ARRUDA_BOYCE|SIMPLIFIED_RUBBER"
+    r"|SOFT_TISSUE|LOW_DENSITY_FOAM|FU_CHANG_FOAM|ORTHOTROPIC_ELASTIC|ANISOTROPIC_ELASTIC)"
+)
+_REFERENCE_BY_NUMBER: Final = re.compile(r"MAT_0*(2|7|27|31|57|77|77_[HO]|83|91|92|127|181)(_|\Z)")
+_LAWS_WITH_REFERENCE: Final = {
+    *("LAW42", "OGDEN", "LAW62", "VISC_HYP", "LAW69", "LAW82", "LAW88", "TABULATED", "LAW92", "ARRUDA_BOYCE"),
+    *("LAW94", "YEOH", "LAW95", "BERGSTROM_BOYCE", "LAW100", "MNF", "LAW111", "MARLOW"),
+}
+_TOTAL_STRAIN: Final = {10, 11, 12}  # Ismstr of solids
+_ISMSTR: Final = 1  # its place in the first line of the property
+_GAINS: Final = "so it may gain stress when it is switched back"
+
+
+def unswitchable_of_ls_dyna(deck: Deck, parts: Parts) -> dict[int, Unswitchable]:
+    """Find the parts of a deck that must not be switched, by their sections and materials."""
+    sections = read_sections(deck)
+    laws = {material_of(card, card.data[0], 0): card.name for card in deck.named("MAT") if card.data}
+    found: dict[int, Unswitchable] = {}
+    for part, material in parts.materials.items():
+        section, law = sections.get(parts.sections.get(part, 0)), laws.get(material, "").removesuffix("_TITLE")
+        if section and section.kind == "SOLID" and section.elform in _FLOWING:
+            found[part] = _flowing(f"{_FLOWING[section.elform]}, ELFORM {section.elform}")
+        elif _REFERENCE_BY_NAME.match(law) or _REFERENCE_BY_NUMBER.match(law):
+            found[part] = _with_reference(f"*{law}")
+    return found
+
+
+def unswitchable_of_radioss(starter: Starter) -> dict[int, Unswitchable]:
+    """Find the parts of a starter deck that must not be switched, by their materials and properties."""
+    from d2rpick.deck.radioss_deck import number_of  # not above: a deck of LS-DYNA does without
+
+    flowing = {
+        number_of(card, 2): card.words[0] for card in starter.named("ALE", "EULER") if card.words[1:2] == ("MAT",)
+    }
+    laws = {number_of(card, 2): card.words[1] for card in starter.named("MAT") if card.words[2:]}
+    strains = _strains(starter)
+    found: dict[int, Unswitchable] = {}
+    for part, line in starter.parts.items():
+        if line.material in flowing:
+            found[part] = _flowing(f"/{flowing[line.material]}/MAT/{line.material}")
+        elif laws.get(line.material) in _LAWS_WITH_REFERENCE:
+            found[part] = _with_reference(f"/MAT/{laws[line.material]}")
+        elif strains.get(line.prop, 0) in _TOTAL_STRAIN:
+            found[part] = _with_reference(f"Ismstr {strains[line.prop]}")
+    return found
+
+
+def _strains(starter: Starter) -> Mapping[int, int]:
+    """Give Ismstr of the properties of solids, by their ids."""
+    from d2rpick.deck.radioss_deck import SOLIDS, below_title, number_of
+
+    solids = [card for card in starter.named("PROP") if card.words[2:] and card.words[1] in SOLIDS]
+    return {number_of(card, 2): card.integer(row, _ISMSTR).value for card in solids for row in below_title(card)[:1]}
+
+
+def _flowing(how: str) -> Unswitchable:
+    return Unswitchable(True, f"its material flows through the mesh ({how})")
+
+
+def _with_reference(how: str) -> Unswitchable:
+    return Unswitchable(False, f"its law keeps a stress-free reference ({how}), {_GAINS}")

@@ -1,0 +1,73 @@
+"""When a force acts on parts that gravity alone moves otherwise, interval by interval of the record, by their momenta.
+
+Between two states the momentum of what flies changes by gravity alone.  The longest flight shows by how much; where it
+changes by more than that, and by more than the numbers leave open, something pushes.  A force that comes and goes
+within one interval is one force.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from d2rpick.flight.momentum import all_flights
+from d2rpick.histories.samples import stretches, window
+
+if TYPE_CHECKING:
+    from d2rpick.histories.history import Momenta
+
+# A force changes the momentum by so many times what digits and the solver's own errors do in the longest flight.
+_SEEN: Final = 4.0
+# A force below this share of the weight is not seen: momenta of the first state are those of half a step before.
+_OF_WEIGHT: Final = 0.1
+# States at each end of the longest flight, in which the force before or after it may begin.
+_EDGE: Final = 1
+_FEWEST: Final = 2  # intervals between these ends
+
+
+class ContactTimes(NamedTuple):
+    """When something pushes: ``spans`` (from, to) [time], each known within ``interval``, that of the record there.
+
+    ``speed``: how fast the parts move at the end of the longest flight [length/time]; None without masses.
+    """
+
+    spans: tuple[tuple[float, float], ...]
+    interval: float
+    speed: float | None = None
+
+
+def contact_times(momenta: Momenta) -> ContactTimes | None:
+    """Find when a force other than gravity acts on the chosen parts and what flies with them.
+
+    Returns
+    -------
+    ContactTimes or None
+        None where no flight shows what gravity does, or states are too few to tell.
+    """
+    flights = all_flights(momenta)
+    if not flights:
+        return None
+    longest = max(flights, key=lambda flight: flight.end - flight.start)
+    members = _members(momenta, longest.parts)
+    time, momentum = momenta.time, momenta.of(members)
+    flight = window(time, longest.start, longest.end)
+    first, last = flight.start + _EDGE, flight.stop - 1 - _EDGE
+    if last - first < _FEWEST:
+        return None
+    gravity = (momentum[last] - momentum[first]) / (time[last] - time[first])
+    pushes = np.diff(momentum, axis=0) - gravity * np.diff(time)[:, np.newaxis]
+    sizes = np.linalg.norm(pushes, axis=1)
+    least = _SEEN * max(2 * momenta.noise(members), float(sizes[first:last].max()))
+    room = np.maximum(least, _OF_WEIGHT * float(np.linalg.norm(gravity)) * np.diff(time))
+    spans = tuple((float(time[part.start]), float(time[part.stop])) for part in stretches(sizes > room))
+    mass = momenta.mass(members)
+    speed = float(np.linalg.norm(momentum[last])) / mass if mass > 0 else None
+    return ContactTimes(spans, float(np.diff(time).max()), speed)
+
+
+def _members(momenta: Momenta, parts: object) -> tuple[int, ...]:
+    """Give the places of the parts that fly; those of the chosen ones where the momentum is that of the model."""
+    flying = {part.id for part in parts} if isinstance(parts, tuple) else set()
+    places = tuple(place for place, part in enumerate(momenta.parts or ()) if part.id in flying)
+    return places or momenta.chosen

@@ -1,0 +1,59 @@
+"""When something pushes, by momenta that fall and bounce as computed here."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given as over, settings, strategies as st
+
+from d2rpick.flight.contact_times import contact_times
+from d2rpick.histories.history import EXACT, Momenta
+from d2rpick.histories.names import Part
+from d2rpick.histories.surroundings import Surroundings
+
+MASS, GRAVITY = 2.0, 9.81
+
+
+def bouncing(contacts: list[tuple[float, float]], end: float, interval: float, gravity: float = GRAVITY) -> Momenta:
+    """Momentum of a part that a constant force turns back in each contact; times of states are not those of forces."""
+    time = np.arange(0.0, end + interval / 2, interval)
+    impulses = [40.0 * MASS * (0.05 + 0.02 * at) for at in range(len(contacts))]
+    given = zip(contacts, impulses, strict=True)
+    impulse = sum(size * (np.clip(time, *span) - span[0]) / (span[1] - span[0]) for span, size in given)
+    values = np.zeros((time.size, 1, 3))
+    values[:, 0, 2] = -MASS * gravity * time + impulse - 1.0
+    values[:, 0, 0] = 3.0
+    part = (Part(1, "ball"),)
+    return Momenta(time, values, part, EXACT, (0,), masses=np.array([MASS]), surroundings=Surroundings())
+
+
+@settings(max_examples=15)
+@over(st.floats(0.0, 1.0), st.floats(0.2, 3.0))
+def test_every_contact_is_seen_within_an_interval(shift: float, length: float) -> None:
+    interval = 1e-3
+    contacts = [(0.1 + shift * interval, 0.1 + (shift + length) * interval), (0.3037, 0.3115)]
+    found = contact_times(bouncing(contacts, 0.6, interval))
+    assert found is not None
+    assert len(found.spans) == 2
+    for span, contact in zip(found.spans, contacts, strict=True):
+        assert span[0] <= contact[0] + 1e-9 <= span[0] + interval + 2e-9
+        assert span[1] - interval - 2e-9 <= contact[1] - 1e-9 <= span[1]
+    assert found.interval == pytest.approx(interval)
+
+
+def test_without_gravity_a_push_is_seen_too() -> None:
+    found = contact_times(bouncing([(0.1, 0.11)], 0.5, 1e-3, gravity=0.0))
+    assert found is not None
+    assert np.array(found.spans) == pytest.approx(np.array([[0.1, 0.11]]), abs=1.1e-3)
+
+
+def test_the_speed_is_that_at_the_end_of_the_longest_flight() -> None:
+    found = contact_times(bouncing([(0.1, 0.11)], 0.5, 1e-3, gravity=0.0))
+    assert found is not None
+    assert found.speed == pytest.approx(np.hypot(1.5, 40.0 * 0.05 - 0.5))
+
+
+def test_of_what_never_flies_nothing_is_known() -> None:
+    momenta = bouncing([], 0.5, 1e-3)
+    shaken = momenta.values + 5 * np.sin(momenta.time * 300)[:, np.newaxis, np.newaxis]
+    assert contact_times(replace(momenta, values=shaken)) is None
