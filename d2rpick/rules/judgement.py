@@ -44,6 +44,7 @@ _KEPT: Final = (
     "flight-from-energy",
     "flight-sources-disagree",
     "plastic-or-preload",
+    "few-states",
     WRONG_ENERGY,
 )
 _UNKNOWN: Final = "nothing in the history shows when the load is over; give that time as `after`"
