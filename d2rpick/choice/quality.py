@@ -109,7 +109,7 @@ _BAND: Final = 0.25
 # Decimals of a share that people read.
 _READ: Final = 2
 _NOT_CERTAIN: Final = "the flight is not certain"
-_UNKNOWN_LOAD: Final = "kinetic and internal energy change together, by gravity or by another load"
+_UNKNOWN_LOAD: Final = "momentum or energy changes in the flight, by gravity or by another load"
 
 
 class Quality(NamedTuple):

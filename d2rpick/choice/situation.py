@@ -14,7 +14,7 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import RangeError
-from d2rpick.flight.flight import Flight, Seen, find_flight, landed, seen_flight
+from d2rpick.flight.flight import Described, Flight, Seen, find_flight, landed, seen_flight
 from d2rpick.flight.internal_energy import largest, round_off
 from d2rpick.flight.margin import margin_before_contact
 from d2rpick.histories.digits import sum_as_read
@@ -331,12 +331,13 @@ def _resolved(history: History, fit: Identification, fits: Fits) -> Identificati
     return fits.once(("resolved", fit.start, fit.end, fit.rms), lambda: resolved(*window, fit))
 
 
-def _settled(history: History, fit: Identification | None, span: Span | None) -> Span | None:
+def _settled(history: History, fit: Identification | None, span: Span | None) -> Described | None:
     """Give the window of an oscillator without its first quarter of a period, unless the record begins with it.
 
     While the deformation passes through zero its energy hardly shows that a load still moves it, by a tenth of its
     amplitude and more; where it is largest a hundredth shows.  Each quarter of a period has one of both.
     """
-    if span is None or fit is None or fit.mode is None or span.start <= history.time[0]:
-        return span
-    return Span(min(span.start + np.pi / 2 / fit.mode.omega, span.end), span.end)
+    if span is None or fit is None or fit.mode is None:
+        return None
+    quarter = np.pi / 2 / fit.mode.omega if span.start > history.time[0] else 0.0
+    return Described(min(span.start + quarter, span.end), span.end, fit.mode)

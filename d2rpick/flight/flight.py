@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cache, partial
-from math import isinf, isnan, nan
+from math import isfinite, isinf, isnan, nan
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from d2rpick.flight.window import FreeFlight
     from d2rpick.histories.history import Balance, History, Momenta, Samples
     from d2rpick.histories.names import Part
+    from d2rpick.vibration.modes import Mode, Modes
 
 # Where a flight may be known from, best first.
 SOURCES: Final = ("given", "momentum", "contact-energy", "energy-balance", "oscillator", "energy", None)
@@ -68,9 +69,8 @@ class Flight(NamedTuple):
 
     @property
     def unknown_load(self) -> bool:
-        """Whether energies alone show it, while a load acts that may be gravity, or a pull, or friction."""
-        lost = isnan(self.gravity) and not self.described
-        return (lost or isinf(self.gravity)) and self.source in (*_BY_ENERGIES, "energy")
+        """Whether a load acts in it that may be gravity, or a pull, or friction, and nothing tells which."""
+        return self.source != "given" and not isfinite(self.gravity)
 
     @property
     def certain(self) -> bool:
@@ -79,9 +79,7 @@ class Flight(NamedTuple):
         A fixed rigid wall does no work and has no contact energy: without the momentum, only an oscillator that swings
         on tells a flight from a crash into it.
         """
-        if self.source in _BY_ENERGIES:
-            return self.described and not self.unknown_load
-        return self.source in _SURE and not isnan(self.gravity)
+        return not self.unknown_load and (self.source in _SURE or (self.source in _BY_ENERGIES and self.described))
 
 
 class Witness(NamedTuple):
@@ -144,39 +142,51 @@ def landed(flight: Flight, landing: float | None) -> Flight:
     return flight if known else flight._replace(end=landing)
 
 
-def find_flight(
-    history: History, td: float, after: float | None, seen: Seen, span: tuple[float, float] | None
-) -> Flight:
+class Described(NamedTuple):
+    """Window that a vibration describes, from its first sample to its last [time]."""
+
+    start: float
+    end: float
+    vibration: Mode | Modes
+
+
+def find_flight(history: History, td: float, after: float | None, seen: Seen, described: Described | None) -> Flight:
     """Choose the best answer to when the load is over: given, seen, by the oscillator, by the energy.
 
-    ``after`` is given as the end of the load [time]; ``seen`` what the evidence shows; ``span`` the window that an
-    oscillator describes, from its first sample to its last.
+    ``after`` is given as the end of the load [time]; ``seen`` is what the evidence shows, ``described`` what an
+    oscillator does.
     """
     if seen.held:
         return Flight(refusal=seen.refusal)
     if seen.flight:
         first, last, parts, end_seen, damping, gravity = seen.flight
+        if described and seen.source in _BY_ENERGIES and isnan(gravity):
+            gravity = _load_beside(history, first, last, described.vibration)
         given = after is not None and not (seen.refusal and first > td)
         start, source = (after, "given") if given else (first, seen.source)
         if given and start is not None and start >= last:
             landed = f"the {_spoken(seen.source)} shows that the flight had ended at {last:.6g}, before `after`"
             return Flight(refusal=seen.refusal or landed, doubts=seen.doubts)
         end = last if end_seen else None
+        by_oscillator = described is not None
         return Flight(
-            start, end, source, parts, damping, seen.refusal, seen.doubts, gravity=gravity, described=span is not None
+            start, end, source, parts, damping, seen.refusal, seen.doubts, gravity=gravity, described=by_oscillator
         )
     if after is not None:
-        if span is None:  # many td have the same one
+        if described is None:  # many td have the same one
             end = history.known.once(("landing", after), lambda: landing_after(history, after))
         else:
-            end = span[1] if span[1] < history.time[-1] else None
+            end = described.end if described.end < history.time[-1] else None
         return Flight(after, None if seen.refusal else end, "given", refusal=seen.refusal, doubts=seen.doubts)
     if seen.refusal:
         return Flight(refusal=seen.refusal, doubts=seen.doubts)
-    if span:
-        refusal = _fed(history, *span)
-        end = span[1] if span[1] < history.time[-1] else None
-        return Flight(refusal=refusal) if refusal else Flight(span[0], end, "oscillator", described=True)
+    if described:
+        refusal = _fed(history, described.start, described.end)
+        if refusal:
+            return Flight(refusal=refusal)
+        end = described.end if described.end < history.time[-1] else None
+        load = _load_beside(history, *described)
+        return Flight(described.start, end, "oscillator", gravity=load, described=True)
     quiet = quiet_time(history, td)
     if quiet is None:
         return Flight()
@@ -185,6 +195,14 @@ def find_flight(
     end = quiet.end if quiet.end is not None and quiet.end < history.time[-1] else None
     known = history.balance is not None and history.balance.kinetic_and_internal is not None
     return Flight(quiet.start, end, "energy", settled=quiet.settled, gravity=nan if known else 0.0)
+
+
+def _load_beside(history: History, start: float, end: float, vibration: Mode | Modes) -> float:
+    """Give NaN if energies change in a window by more than the damping of a vibration takes, else 0."""
+    from d2rpick.flight.work import taken_by_damping
+
+    taken = None if history.balance is None else taken_by_damping(history.balance, start, end, vibration)
+    return nan if taken is False else 0.0
 
 
 def _fed(history: History, start: float, end: float) -> str | None:

@@ -204,12 +204,14 @@ class Laws:
             return None if self._carried else 0.0
         if self._is_gravity(force / mass, _ALIKE + _REACH_OF_DIGITS * self.noise / (force * (end - start))):
             return None if self._slowed(window, vector) else force / mass
+        if self.velocity:  # what changes it is an acceleration already
+            return None
         found = None
         if self.balance is not None:
             found = acceleration_by_work(self.balance, self.fit.time, self.fit.momentum @ (vector / force), start, end)
         if found is None:
-            return float("nan") if self._may_fall and (self.velocity or np.isnan(mass)) else None
-        return found if self._is_gravity(found) or (self._may_fall and self.velocity and found > 0) else None
+            return float("nan") if self._may_fall and np.isnan(mass) else None
+        return found if self._is_gravity(found) else None
 
     def _slowed(self, window: tuple[int, int], force: Samples) -> bool:
         """Whether a constant force (3,) is rather friction than gravity: all it does is to slow down.

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from d2rpick.histories.history import Balance, Samples
+    from d2rpick.vibration.modes import Mode, Modes
 
 
 # States from which a load can be told from gravity and damping: twice the unknowns.
@@ -151,6 +152,24 @@ def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
     return FreeFlight.of(time, found, gravity=_unexplained(balance, *found) or (np.nan if rings else 0.0))
 
 
+def taken_by_damping(balance: Balance, start: float, end: float, vibration: Mode | Modes) -> bool | None:
+    r"""Whether kinetic and internal energy together change between two times [time] as a vibration is damped.
+
+    Damping within the body takes energy of the vibration alone: :math:`K + E - V` is constant.  Damping proportional
+    to mass takes the motion of the body as well, at the rate :math:`\alpha` of its vibration:
+    :math:`K + E + 2 \alpha \int K dt` is constant.  Nothing is fitted, so that no load is taken for either
+    (docs/choosing.md, "Energies that look like flight").  None where one of the energies is not written.
+    """
+    inside = window(balance.time, start, end)
+    whole, kinetic, time = balance.kinetic_and_internal, balance.kinetic, balance.time[inside]
+    if whole is None or kinetic is None or not time.size:
+        return None
+    of_body = float((kinetic[inside] - vibration.kinetic_energy(time)).max())
+    within_body = whole[inside] - vibration.vibration_energy(time)
+    by_mass = whole[inside] + 2 * vibration.alpha * integral(time, kinetic[inside])
+    return min(float(np.ptp(within_body)), float(np.ptp(by_mass))) <= _LITTLE * of_body
+
+
 def _unexplained(balance: Balance, first: int, last: int) -> float:
     """What stands for gravity in a window: 0 where energies change by nothing or damping alone, else of unknown size.
 
@@ -240,4 +259,4 @@ def plateau_around(balance: Balance, td: float) -> FreeFlight | None:
     states = lasting_window(law, td, float(np.ptp(energy)), balance.precision.noise(energy))
     if states is None or (states[0] == 0 and balance.external_work is None):
         return None
-    return FreeFlight.of(time, states)
+    return FreeFlight.of(time, states, gravity=_unexplained(balance, *states))

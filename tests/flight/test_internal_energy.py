@@ -125,6 +125,35 @@ def test_a_constant_force_is_gravity_only_if_it_is_as_large(acceleration: float,
     assert flight_around(momenta(push - mass * 9.81 * TIME, masses=(mass,)), 0.6)
 
 
+@pytest.mark.parametrize("acceleration", [0.1, 0.4, 1.0, 1.62, 3.71, 5.0, 8.87, 15.0, 20.0])
+@pytest.mark.parametrize("falling", [False, True])
+def test_a_velocity_of_the_model_shows_no_gravity_but_that_of_earth(acceleration: float, falling: bool) -> None:
+    """Friction and other planets: kinetic energy follows any constant force, so the acceleration itself decides."""
+    assert not flights_of(accelerated(acceleration if falling else -acceleration), PLAIN)
+    assert flights_of(accelerated(9.81), PLAIN)
+
+
+def accelerated(acceleration: float) -> History:
+    """Velocity and energies of a model of 10 that is accelerated, in a glstat with six digits."""
+    velocity = np.zeros((TIME.size, 1, 3))
+    velocity[:, 0, 0] = 30 + acceleration * TIME
+    velocity = printed(velocity.ravel()).reshape(velocity.shape)
+    ringing = 10 * np.sin(90 * TIME) ** 2
+    kinetic = printed(5 * (30 + acceleration * TIME) ** 2 + 10 - ringing)
+    energies = Balance(TIME, ringing, kinetic, velocity=velocity[:, 0], precision=Precision(6))
+    whole = Momenta(TIME, velocity, None, Precision(6), (0,), masses=np.array([np.nan]), velocity=True)
+    return table(TIME, ringing, whole, balance=energies)
+
+
+def test_a_constant_force_on_an_unknown_mass_makes_a_pair_poor() -> None:
+    """Without the mass and without energies nothing shows whether the force is gravity."""
+    falling = momenta(200 - 50 * TIME - 100 * np.exp(-TIME / 0.02), masses=(np.nan,))
+    whole = Momenta(TIME, falling.values, None, EXACT, (0,), masses=np.array([np.nan]))
+    answer = suggest(table(TIME, 5 + 5 * np.sin(60 * TIME) ** 2, whole), 0.8, Settings())
+    assert sure(answer.quality).grade == "poor"
+    assert "gravity-assumed" in {caution.code for caution in answer.cautions}
+
+
 def test_what_is_carried_does_not_fly_and_does_not_hide_what_falls() -> None:
     falling = np.where(TIME < 0.1, -2e3 * TIME, -200 - 40 * 9.81 * (TIME - 0.1))
     carried = 30 + 20 * np.sin(np.minimum(TIME, 0.3) * 40)
@@ -240,9 +269,23 @@ def test_what_damping_takes_of_a_body_and_its_vibration_is_no_load() -> None:
     alpha = 0.3
     kinetic = 60 * np.exp(-2 * alpha * TIME) + 20 * np.exp(-alpha * TIME) * np.cos(60 * TIME) ** 2
     whole = 80 - 2 * alpha * integral(TIME, kinetic)
-    flight = suggest(totals(whole - kinetic, kinetic), 0.8, PLAIN).situation.flight
-    assert np.isnan(flight.gravity)  # it is lost as damping takes it: no load, where an oscillator describes the rest
-    assert not flight._replace(described=True).unknown_load
+    record = totals(whole - kinetic, kinetic)
+    assert suggest(record, 0.8, PLAIN).situation.flight.unknown_load
+    flight = suggest(record, 0.8, Settings()).situation.flight  # the oscillator is damped at the same rate
+    assert flight.certain
+    assert flight.described
+
+
+@pytest.mark.parametrize("lost", [0.0, 0.02, 0.3])
+def test_an_oscillator_makes_no_flight_certain_in_which_the_body_loses_energy(lost: float) -> None:
+    """Drag slows the body down while the spring in it swings on as one oscillator."""
+    decay = np.exp(-0.2 * TIME)  # damping within the body, which the energies show as well
+    ringing, moving = 20 * decay * np.cos(60 * TIME) ** 2, 60 * (1 - lost * TIME)
+    internal = 20 * decay - ringing
+    flight = suggest(totals(internal, moving + ringing), 0.8, Settings()).situation.flight
+    assert flight.described
+    assert flight.certain is (lost == 0)
+    assert flight.unknown_load is (lost > 0)
 
 
 def test_no_flight_is_certain_in_which_energies_show_a_load() -> None:
