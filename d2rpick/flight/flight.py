@@ -315,7 +315,7 @@ def _first(history: History, momenta: Sequence[Momenta], td: float) -> FreeFligh
     for one in momenta:
         found = flight_around(one, td, history.balance)
         if found:
-            return found if one.parts is not None or one.flying else _keeping_level(history, found, td)
+            return found if one.parts is not None or one.flying else _keeping_level(history, found, td, one)
     return None
 
 
@@ -333,20 +333,28 @@ def _by_energies(
     return unheld(history.surroundings, found, history.parts, td)
 
 
-def _keeping_level(history: History, flight: FreeFlight | None, td: float) -> FreeFlight | None:
-    """Give what of a flight of the whole model the internal energy keeps its level in, or None where td is before."""
+def _keeping_level(
+    history: History, flight: FreeFlight | None, td: float, momenta: Momenta | None = None
+) -> FreeFlight | None:
+    """Give what of a flight of the whole model the internal energy keeps its level in, or None where td is before.
+
+    ``momenta`` are those that show the flight.
+    """
     if flight is None:
         return None
-    balance, whole, time, energy = history.balance, None, history.time, history.energy
+    balance, damped, time, energy, unseen = history.balance, None, history.time, history.energy, 0.0
     if balance and balance.kinetic_and_internal is not None and balance.internal is not None:
-        whole = np.interp(time, balance.time, balance.kinetic_and_internal)
+        from d2rpick.flight.work import lowered_by_damping
+
+        sums, unseen = lowered_by_damping(balance, flight, momenta)
+        damped = np.stack([np.interp(time, balance.time, one) for one in sums]) if sums else None
         if history.parts is not None:
             energy = np.interp(time, balance.time, balance.internal)
-    start = settled_from(time, energy, whole, flight.start, flight.end)
+    start = settled_from(time, energy, damped, flight.start, flight.end, unseen)
     if start is None or start > td or flight.end - start < SHORTEST * (time[-1] - time[0]):
         return None
-    if whole is not None and not flight.gravity:
-        first, last = np.interp((flight.start, start), time, whole)
+    if damped is not None and not flight.gravity:
+        first, last = np.interp((flight.start, start), time, damped[0])
         if last - first > MOST_WORK * float(np.abs(energy).max()):
             return None  # forces that cancel worked on it, as where it is held and moved, and they may still act
     return flight._replace(start=start)

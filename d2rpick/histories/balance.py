@@ -30,7 +30,11 @@ _NAMES: Final[Mapping[str, tuple[str, ...]]] = {
     "total": ("totalenergy", "etotal"),
     "ratio": ("totalenergyinitialenergy", "energyratio"),
     "eroded": ("erodedinternalenergy",),
+    "damping": ("systemdampingenergy", "dampingenergy"),
+    "wall": ("stonewallenergy", "rigidwallenergy"),
 }
+# Abaqus' total energy is what is left of all energies without the external work: it stays as it is at the start.
+_LESS_WORK: Final = frozenset({"etotal", "allwk"})
 # Without one of these nothing can be said of the health.
 _JUDGED: Final = frozenset(
     name for term in ("hourglass", "sliding", "external_work", "total", "ratio", "eroded") for name in _NAMES[term]
@@ -108,6 +112,9 @@ def _terms(whole: Legs, until: float) -> Balance | None:
     rotation = found.pop("rotation")
     if rotation is not None and found["kinetic"] is not None:
         found["kinetic"] = found["kinetic"] + rotation
+    total, work = found["total"], found["external_work"]
+    if total is not None and work is not None and _LESS_WORK.issubset(map(normalised, columns.used)):
+        found["total"] = total + work
     return Balance(
         time=whole.time[: columns.states],
         internal=columns.internal(),

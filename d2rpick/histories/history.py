@@ -172,12 +172,11 @@ class Track(NamedTuple):
 class Balance:
     """Energies of the whole model at ``time``, arrays of shape (n,); None for what the files do not have.
 
-    ``sliding`` is the energy of all contacts, ``friction`` what of it is friction where that is told apart,
-    ``external_work`` that of gravity and every other load, ``total`` the sum that the solver keeps and ``ratio`` that
-    sum over what it should be: the energy at the start and the external work.  ``eroded`` is the internal energy of
-    elements that were deleted.  ``velocity`` (n, 3) is that of the centre of mass, up to a factor.
-    ``hourglass_of_parts`` gives the highest hourglass and the highest internal energy of parts.  ``precision`` tells
-    how finely the energies were printed.
+    ``sliding`` is the energy of all contacts, ``friction`` its share by friction, ``damping`` what damping has taken,
+    ``wall`` the energy of rigid walls, ``external_work`` that of gravity and all other loads, ``total`` the sum that
+    the solver keeps, ``ratio`` that sum over the initial energy and the external work, ``eroded`` the internal energy
+    of deleted elements.  ``velocity`` (n, 3) is that of the centre of mass, up to a factor, ``hourglass_of_parts`` the
+    highest hourglass and internal energy of parts, ``precision`` how finely energies were printed.
     """
 
     time: Samples
@@ -190,6 +189,8 @@ class Balance:
     total: Samples | None = None
     ratio: Samples | None = None
     eroded: Samples | None = None
+    damping: Samples | None = None
+    wall: Samples | None = None
     velocity: Samples | None = None
     hourglass_of_parts: tuple[tuple[Part, float, float], ...] = ()
     precision: Precision = EXACT

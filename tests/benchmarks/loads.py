@@ -19,7 +19,8 @@ from d2rpick.base.errors import D2RPickError
 from d2rpick.choice.answers import suggest_of
 from d2rpick.choice.flights import flights_of
 from d2rpick.choice.question import Settings, read
-from tests.written_runs import WRITERS, Written
+from tests.benchmarks.chains import Chains, Run, directions, half_sine, integrated, on_first
+from tests.written_runs import WRITERS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -53,19 +54,6 @@ class Load(NamedTuple):
     falling: bool = True
 
 
-def _directions(random: np.random.Generator, count: int) -> Samples:
-    """Random directions (count, 2), every other one along x: there those of one chain have one line in common."""
-    angle = random.uniform(0, 2 * np.pi, count)
-    angle[::2] = 0
-    return np.stack([np.cos(angle), np.sin(angle)], axis=1)
-
-
-def _bell(time: float, start: Samples, length: Samples) -> Samples:
-    """Half-sine from ``start`` on, (n,)."""
-    phase = np.clip((time - start) / length, 0, 1)
-    return np.asarray(np.sin(np.pi * phase))
-
-
 def friction(random: np.random.Generator, count: int) -> Load:
     """Friction of the ground, as constant a deceleration as a dry one is, of all masses or of the first."""
     size = 10 ** random.uniform(-1, 1.3, (count, 1, 1))
@@ -96,11 +84,11 @@ def drag(random: np.random.Generator, count: int) -> Load:
 def late_contact(random: np.random.Generator, count: int) -> Load:
     """A light contact late in the record, at the first mass."""
     start, length = random.uniform(0.4, 0.85, count), 10 ** random.uniform(-2, -0.7, count)
-    size, along = 10 ** random.uniform(-1.5, 1, count), _directions(random, count)
+    size, along = 10 ** random.uniform(-1.5, 1, count), directions(random, count)
 
     def force(time: float, masses: Samples, _: Samples, __: Samples) -> Samples:
-        pushed = (size * masses.sum(axis=1) * _bell(time, start, length))[:, np.newaxis] * along
-        return _on_first(pushed)
+        pushed = (size * masses.sum(axis=1) * half_sine(time, start, length))[:, np.newaxis] * along
+        return on_first(pushed)
 
     return Load(force)
 
@@ -108,12 +96,12 @@ def late_contact(random: np.random.Generator, count: int) -> Load:
 def airbag(random: np.random.Generator, count: int) -> Load:
     """A pressure that rises at once and leaks away."""
     start, lasts = random.uniform(0.3, 0.8, count), random.uniform(0.03, 0.3, count)
-    size, along = 10 ** random.uniform(-0.5, 1.5, count), _directions(random, count)
+    size, along = 10 ** random.uniform(-0.5, 1.5, count), directions(random, count)
 
     def force(time: float, masses: Samples, _: Samples, __: Samples) -> Samples:
         since = np.maximum(time - start, 0) / lasts
         pressure = np.where(time > start, since * np.exp(1 - 4 * since), 0.0)
-        return _on_first((size * masses.sum(axis=1) * pressure)[:, np.newaxis] * along)
+        return on_first((size * masses.sum(axis=1) * pressure)[:, np.newaxis] * along)
 
     return Load(force)
 
@@ -125,7 +113,7 @@ def rope(random: np.random.Generator, count: int) -> Load:
     def force(_: float, __: Samples, places: Samples, ___: Samples) -> Samples:
         distance = np.linalg.norm(places[:, 0], axis=1, keepdims=True)
         stretched = np.maximum(distance - length, 0)
-        return _on_first(-pull * stretched * places[:, 0] / np.maximum(distance, 1e-9))
+        return on_first(-pull * stretched * places[:, 0] / np.maximum(distance, 1e-9))
 
     return Load(force)
 
@@ -133,10 +121,10 @@ def rope(random: np.random.Generator, count: int) -> Load:
 def couple(random: np.random.Generator, count: int) -> Load:
     """Two opposite forces on two masses: they change no momentum."""
     start, length = random.uniform(0.2, 0.6, count), random.uniform(0.05, 0.4, count)
-    size, along = 10 ** random.uniform(-1, 1, count), _directions(random, count)
+    size, along = 10 ** random.uniform(-1, 1, count), directions(random, count)
 
     def force(time: float, masses: Samples, _: Samples, __: Samples) -> Samples:
-        pushed = (size * masses.sum(axis=1) * _bell(time, start, length))[:, np.newaxis] * along
+        pushed = (size * masses.sum(axis=1) * half_sine(time, start, length))[:, np.newaxis] * along
         return np.stack([pushed, -pushed, np.zeros_like(pushed)], axis=1)
 
     return Load(force)
@@ -152,51 +140,33 @@ def other_gravity(random: np.random.Generator, count: int) -> Load:
     return Load(force, falling=False)
 
 
-def _on_first(forces: Samples) -> Samples:
-    """Forces (n, 2) at the first of three masses."""
-    return np.stack([forces, np.zeros_like(forces), np.zeros_like(forces)], axis=1)
-
-
 CLASSES: Final = {one.__name__: one for one in (friction, drag, late_contact, airbag, rope, couple, other_gravity)}
 
 
-def computed(random: np.random.Generator, count: int, load: Load) -> Iterator[tuple[Written, Samples]]:
-    """Integrate ``count`` chains at once; each comes with the impulse of its load and its push, (states, 2).
+def computed(random: np.random.Generator, count: int, load: Load) -> Iterator[Run]:
+    """Integrate ``count`` chains that are pushed, and then fly but for their load.
 
     Every other one has a single spring and moves along x: one oscillator describes its energy.
     """
     masses = random.uniform(5, 50, (count, 3))
-    stiffness = masses.mean(axis=1)[:, np.newaxis, np.newaxis] * random.uniform(30, 150, (count, 2, 1)) ** 2
+    stiffness = masses.mean(axis=1)[:, np.newaxis] * random.uniform(30, 150, (count, 2)) ** 2
     masses[::2, 2], stiffness[::2, 1] = _NO_MASS, 0.0
-    damping = stiffness * random.choice([0.0, 2e-5, 2e-4], (count, 1, 1))
+    damping = stiffness * random.choice([0.0, 2e-5, 2e-4], (count, 1))
     falls = (random.integers(0, 2, count) * load.falling)[:, np.newaxis, np.newaxis]
-    weight = masses[..., np.newaxis] * np.array([0.0, -GRAVITY]) * falls
-    mass, dt = masses[..., np.newaxis], 1 / (STATES * STEPS)
-    speed = _directions(random, count) * random.uniform(1, 12, (count, 1))
-    moved, velocity = np.zeros((count, 3, 2)), np.repeat(speed[:, np.newaxis], 3, axis=1)
-    moved += random.normal(size=moved.shape) * random.uniform(1e-3, 2e-2, (count, 1, 1))
-    moved[::2, :, 1] = 0
-    pushed, lasts = _directions(random, count) * random.uniform(50, 500, (count, 1)), random.uniform(0.02, 0.1, count)
-    rows, impulse, work = [], np.zeros((count, 2)), np.zeros(count)
-    for step in range(STATES * STEPS + 1):
-        time = step * dt
-        push = _on_first(masses.sum(axis=1)[:, np.newaxis] / 10 * pushed * _bell(time, 0 * lasts, lasts)[:, np.newaxis])
-        outer = load.force(time, masses, moved, velocity) + push
-        stretch = np.diff(moved, axis=1)
-        if step % STEPS == 0:
-            energies = (mass * velocity**2).sum(axis=2) / 2, (stiffness * stretch**2).sum(axis=2) / 2
-            rows.append((mass * velocity, *energies, impulse.copy(), work.copy()))
-        pull = np.pad(stiffness * stretch + damping * np.diff(velocity, axis=1), ((0, 0), (1, 1), (0, 0)))
-        before = velocity
-        velocity = velocity + dt * (np.diff(pull, axis=1) + weight + outer) / mass
-        middle = (before + velocity) / 2
-        work += dt * ((outer + weight) * middle).sum(axis=(1, 2))
-        moved = moved + dt * velocity
-        impulse += dt * outer.sum(axis=1)
-    columns = [np.stack(column, axis=1) for column in zip(*rows, strict=True)]
-    for momentum, kinetic, internal, changed, worked, own in zip(*columns, masses, strict=True):
-        halves = np.column_stack([internal[:, 0] / 2, internal.sum(axis=1) / 2, internal[:, 1] / 2])
-        yield Written(np.linspace(0, 1, STATES + 1), momentum, kinetic, halves, worked, own), changed
+    heavy = masses[..., np.newaxis] * np.array([0.0, -GRAVITY]) * falls
+    speed = directions(random, count) * random.uniform(1, 12, (count, 1))
+    places = random.normal(size=(count, 3, 2)) * random.uniform(1e-3, 2e-2, (count, 1, 1))
+    places[::2, :, 1] = 0
+    velocities, never = np.repeat(speed[:, np.newaxis], 3, axis=1), np.zeros(count)
+    chains = Chains(masses, stiffness, damping, 0 * stiffness, never, places, velocities)
+    whole, lasts = masses.sum(axis=1), random.uniform(0.02, 0.1, count)
+    pushed = directions(random, count) * (whole * random.uniform(5, 50, count))[:, np.newaxis]
+
+    def force(time: float, moved: Samples, velocity: Samples) -> Samples:
+        push = on_first(pushed * half_sine(time, 0 * lasts, lasts)[:, np.newaxis])
+        return load.force(time, masses, moved, velocity) + push
+
+    yield from integrated(chains, force, lambda *_: heavy, 1.0, STATES, STEPS)
 
 
 def changes(impulse: Samples, time: Samples, start: float, end: float) -> float:
@@ -205,10 +175,11 @@ def changes(impulse: Samples, time: Samples, start: float, end: float) -> float:
     return float(np.linalg.norm(inside - inside[:1], axis=1).max(initial=0.0))
 
 
-def counted(reference: Reference, run: Written, impulse: Samples) -> Counter[str]:
+def counted(reference: Reference, run: Run) -> Counter[str]:
     """Count the pairs that are not called poor, those that are wrong, true flights, and those that no source shows."""
     counts: Counter[str] = Counter()
-    largest = float(np.linalg.norm(run.momentum.sum(axis=1), axis=1).max())
+    time, impulse = run.written.time, run.impulse
+    largest = float(np.linalg.norm(run.written.momentum.sum(axis=1), axis=1).max())
     for td in (None, *ASKED):
         try:
             answer = suggest_of(reference, td, Settings(), with_better=False)
@@ -218,10 +189,10 @@ def counted(reference: Reference, run: Written, impulse: Samples) -> Counter[str
         if pair is None or answer.quality is None or answer.quality.grade == "poor":
             continue
         counts["pairs"] += 1
-        counts["wrong"] += changes(impulse, run.time, pair.tr, pair.td) > WRONG * largest
-    true = list(_true_flights(impulse, run.time, STEADY * largest))
+        counts["wrong"] += changes(impulse, time, pair.tr, pair.td) > WRONG * largest
+    true = list(_true_flights(impulse, time, STEADY * largest))
     try:
-        shown = [one.within(run.time) for one in flights_of(reference.history, Settings(replay=False))]
+        shown = [one.within(time) for one in flights_of(reference.history, Settings(replay=False))]
     except D2RPickError:
         shown = []
     counts["flights"] += len(true)
@@ -256,8 +227,8 @@ def main(count: int = 60, seed: int = 48) -> None:
             runs = list(computed(random, count, load(random, count)))
             for form, write in WRITERS.items():
                 total: Counter[str] = Counter()
-                for run, impulse in runs:
-                    total += counted(read([write(run, Path(folder))]), run, impulse)
+                for run in runs:
+                    total += counted(read([write(run.written, Path(folder))]), run)
                 print(f"{name:15s}{form:10s}" + "".join(f"{total[one]:9d}" for one in names), flush=True)
 
 

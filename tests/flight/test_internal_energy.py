@@ -1,6 +1,7 @@
 """No flight is claimed where forces act: walls that do no work, loads that fade, friction, supports, other bodies."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,12 +17,14 @@ from d2rpick.flight.momentum import bodies_apart, flight_around
 from d2rpick.histories.history import EXACT, Balance, History, Momenta, Precision, Samples
 from d2rpick.histories.names import Part
 from d2rpick.histories.samples import integral
-from tests.benchmarks import flights as campaign
+from tests.benchmarks import falls, flights as campaign
 from tests.energies import sure
 from tests.records import printed, table
+from tests.written_runs import FALL_WRITERS
 
 PLAIN = Settings(replay=False)
 TIME = np.linspace(0.0, 1.0, 1001)
+ZERO = np.zeros(TIME.size)
 PARTS = (Part(1, "body"), Part(2, "other"))
 
 
@@ -209,17 +212,19 @@ def test_a_spring_to_ground_does_not_fly(kept: float) -> None:
 
 def test_a_level_is_kept_by_a_vibration_and_by_one_that_damping_takes_but_not_by_a_drift() -> None:
     ringing = np.sin(200 * TIME) ** 2
-    assert settled_from(TIME, 5 + ringing, 50 + 0 * TIME, 0.0, 1.0) == 0.0
+    assert settled_from(TIME, 5 + ringing, 50 + 0 * TIME[np.newaxis], 0.0, 1.0) == 0.0
     lost = np.exp(-4 * TIME)
-    assert settled_from(TIME, 2 * lost * ringing, 50 + 2 * lost, 0.0, 1.0) == 0.0
-    assert settled_from(TIME, 5 + 3 * TIME, 50 + 0 * TIME, 0.0, 1.0) is None
-    assert settled_from(TIME, 5 - 3 * TIME, 50 + 0 * TIME, 0.0, 1.0) is None
-    late = settled_from(TIME, np.where(TIME < 0.4, 2.5 * TIME, 1.0) + 0.01 * ringing, 50 + 0 * TIME, 0.0, 1.0)
+    assert settled_from(TIME, 2 * lost * ringing, 50 + 2 * lost[np.newaxis], 0.0, 1.0) == 0.0
+    assert settled_from(TIME, 5 + 3 * TIME, 50 + 0 * TIME[np.newaxis], 0.0, 1.0) is None
+    assert settled_from(TIME, 5 - 3 * TIME, 50 + 0 * TIME[np.newaxis], 0.0, 1.0) is None
+    late = settled_from(
+        TIME, np.where(TIME < 0.4, 2.5 * TIME, 1.0) + 0.01 * ringing, 50 + 0 * TIME[np.newaxis], 0.0, 1.0
+    )
     assert late == pytest.approx(0.4, abs=0.02)
 
 
 def test_a_vibration_that_swings_only_a_few_times_keeps_its_level_and_a_crash_does_not() -> None:
-    whole = 50 + 0 * TIME
+    whole = 50 + 0 * TIME[np.newaxis]
     assert settled_from(TIME, 5 + np.sin(9 * TIME) ** 2, whole, 0.0, 1.0) == 0.0
     assert settled_from(TIME, 5 + 0 * TIME + np.sin(np.pi * TIME) ** 2, whole, 0.0, 1.0) is None
 
@@ -313,3 +318,46 @@ def test_an_end_of_the_load_behind_the_flight_gives_no_flight_that_ends_before_i
     flight = examine(history, 0.3, Settings(after=0.7, replay=False)).flight
     assert flight.start is None
     assert flight.refusal
+
+
+def falling_and_damped(*left_out: str, internal: Samples = ZERO) -> History:
+    """A vibration that damping takes, above plastic work of 5, of a body of 20 that falls from 0.1 on; seven digits.
+
+    The terms ``left_out`` are not written; ``internal`` is added to the internal energy.
+    """
+    since = np.maximum(TIME - 0.1, 0.0)
+    left, swing = 40 * np.exp(-9 * since), np.cos(250 * since) ** 2
+    internal, pushed = internal + 5 + left * swing, 20 * 60 * np.minimum(TIME, 0.1) ** 2 / 0.02
+    values = np.zeros((TIME.size, 1, 3))
+    values[:, 0, 0], values[:, 0, 2] = np.sqrt(2 * 20 * pushed), -20 * 9.81 * since
+    kinetic = (values[:, 0] ** 2).sum(axis=1) / 40 + left * (1 - swing)
+    momentum = Momenta(TIME, printed(values.ravel(), 7).reshape(values.shape), None, Precision(7), (0,))
+    written = {"internal": internal, "kinetic": kinetic, "damping": 40 - left}
+    columns = {name: printed(one, 7) for name, one in written.items() if name not in left_out}
+    mass = np.array([np.nan if "kinetic" in left_out else 20.0])
+    energies = replace(Balance(TIME, precision=Precision(7)), **columns)  # type: ignore[arg-type]
+    return table(TIME, columns["internal"], replace(momentum, masses=mass), balance=energies)
+
+
+@pytest.mark.parametrize("left_out", [(), ("damping",), ("kinetic",), ("kinetic", "damping")])
+def test_no_energy_that_is_written_hides_a_fall_whose_vibration_is_damped(left_out: tuple[str, ...]) -> None:
+    flight = examine(falling_and_damped(*left_out), 0.5, PLAIN).flight
+    assert flight.source == "momentum"
+    assert flight.start == pytest.approx(0.1, abs=2 * TIME[1])
+    assert flight.end is None
+
+
+@pytest.mark.slow
+def test_falls_in_all_formats_begin_within_two_states_with_and_without_kinetic_energy(tmp_path: Path) -> None:
+    for number, fall in enumerate(falls.fallen(np.random.default_rng(3), 6, 300)):
+        td, room = (fall.start + fall.end) / 2, (falls.WITHIN + 0.01) * fall.run.time[1]
+        for form, write in FALL_WRITERS.items():
+            for kinetic in (True, False):
+                start = falls.found_start(write(fall.run, tmp_path, kinetic=kinetic), td)
+                assert start == pytest.approx(fall.start, abs=room), (number, form, kinetic)
+
+
+def test_an_internal_energy_that_grows_while_its_body_falls_keeps_no_level() -> None:
+    """Two bodies in it hit each other: their momentum together is that of free fall."""
+    history = falling_and_damped(internal=200 * TIME)
+    assert not examine(history, 0.5, PLAIN).in_flight
