@@ -14,7 +14,8 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import RangeError
-from d2rpick.flight.flight import Described, Flight, Seen, find_flight, landed, seen_flight
+from d2rpick.flight.chosen import Described, begun_at, find_flight, landed_at
+from d2rpick.flight.flight import Flight, Seen, seen_flight
 from d2rpick.flight.internal_energy import largest, round_off
 from d2rpick.flight.margin import margin_before_contact
 from d2rpick.histories.digits import sum_as_read
@@ -239,8 +240,7 @@ def examine(
     at = (seen.flight.start + seen.flight.end) / 2 if seen.refusal and seen.flight else td
     fits = Fits() if fits is None else fits
     fit, span = _oscillator(history, at, settings, seen, fits, quick=quick)
-    flight = find_flight(history, td, settings.after, seen, _settled(history, fit, span))
-    flight = landed(_between_supports(history, flight, td), settings.landing)
+    flight = _flight_at(history, td, settings, seen, _settled(history, fit, span))
     given = settings.oscillator is not None
     evidence = Evidence(fit, span, given, prescribed=given or settings.fit_window is not None)
     situation = Situation(history, td, settings, flight, evidence, fits)
@@ -273,6 +273,18 @@ def _beginning(situation: Situation, since: float) -> Situation:
     if flight.start is None or flight.start >= since:
         return situation
     return replace(situation, flight=flight._replace(start=since))
+
+
+def _flight_at(history: History, td: float, settings: Settings, seen: Seen, described: Described | None) -> Flight:
+    """Give the flight around td by the evidence, or as the user gives it; what is held does not fly in either case."""
+    flight = find_flight(history, td, seen, described)
+    if seen.held:
+        return flight
+    if settings.after is not None:
+        flight = begun_at(history, flight, td, settings.after, described)
+    if settings.landing is not None:
+        flight = landed_at(history, flight, td, settings.landing)
+    return _between_supports(history, flight, td)
 
 
 def _between_supports(history: History, flight: Flight, td: float) -> Flight:

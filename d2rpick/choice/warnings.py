@@ -80,7 +80,9 @@ def _of_flight(situation: Situation) -> Iterator[Caution]:
             found += f": {flight.start - flight.settled:.3g} from {flight.settled:.6g} on are left unused for safety"
         yield Caution("flight-from-energy", f"{found}; give it as `after` where it is known")
     if earliest is None:
-        yield Caution("no-flight", "nothing in the record shows when the load is over; give that time as `after`")
+        found = "nothing in the record shows when the load is over"
+        given = situation.settings.after is not None or flight.refusal
+        yield Caution("no-flight", found if given else f"{found}; give that time as `after`")
     elif td <= earliest:
         yield Caution(
             "td-in-load", f"td = {td:.6g} lies {'at' if td == earliest else 'before'} {end_of_load(situation)}"

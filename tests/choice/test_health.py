@@ -131,7 +131,7 @@ def test_the_ratio_counts_what_damping_and_walls_have_taken_and_the_total_that_i
     assert "energy-ratio" in warned(damped)
     whole = assess(HEALTHY, WINDOW)
     for term in ("damping", "wall"):
-        health = assess(replace(damped, **{term: taken}), WINDOW)
+        health = assess(replace(damped, **{term: taken}), WINDOW)  # type: ignore[arg-type]
         assert health.energy_ratio_min == pytest.approx(whole.energy_ratio_min)
     total = 50 + sure(HEALTHY.external_work)
     written = assess(replace(damped, total=total), WINDOW)
