@@ -352,4 +352,4 @@ def _settled(history: History, fit: Identification | None, span: Span | None) ->
     if span is None or fit is None or fit.mode is None:
         return None
     quarter = np.pi / 2 / fit.mode.omega if span.start > history.time[0] else 0.0
-    return Described(min(span.start + quarter, span.end), span.end, fit.mode)
+    return Described(min(span.start + quarter, span.end), span.end, fit.mode.vibration_energy, fit.mode.alpha)

@@ -12,20 +12,26 @@ from d2rpick.flight.flight import BY_ENERGIES, MOST_WORK, Flight, same_within, s
 from d2rpick.flight.internal_energy import landing_after, moves_as_a_whole, quiet_time
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from d2rpick.flight.flight import Seen
-    from d2rpick.histories.history import History
-    from d2rpick.vibration.modes import Mode, Modes
+    from d2rpick.histories.history import History, Samples
 
 # So often an energy that keeps its level turns at least, or it does not change.
 _LEAST_TURNS: Final = 4
 
 
 class Described(NamedTuple):
-    """Window that a vibration describes, from its first sample to its last [time]."""
+    """Window that a vibration describes, from its first sample to its last [time].
+
+    ``energy`` gives kinetic and elastic energy of the vibration at times (n,); ``alpha`` is its damping, None of
+    several modes with dampings of their own [1/time].
+    """
 
     start: float
     end: float
-    vibration: Mode | Modes
+    energy: Callable[[Samples], Samples]
+    alpha: float | None = None
 
 
 def find_flight(history: History, td: float, seen: Seen, described: Described | None) -> Flight:
@@ -38,7 +44,7 @@ def find_flight(history: History, td: float, seen: Seen, described: Described | 
     if seen.flight:
         first, last, parts, end_seen, damping, gravity = seen.flight
         if described and seen.source in BY_ENERGIES and isnan(gravity):
-            gravity = _load_beside(history, first, last, described.vibration)
+            gravity = _load_beside(history, described._replace(start=first, end=last))
         end, by_oscillator = last if end_seen else None, described is not None
         return Flight(
             first, end, seen.source, parts, damping, seen.refusal, seen.doubts, gravity=gravity, described=by_oscillator
@@ -49,7 +55,7 @@ def find_flight(history: History, td: float, seen: Seen, described: Described | 
         refusal = _fed(history, described.start, described.end)
         if refusal:
             return Flight(refusal=refusal)
-        load = _load_beside(history, *described)
+        load = _load_beside(history, described)
         return Flight(described.start, _end_of(history, described), "oscillator", gravity=load, described=True)
     quiet = quiet_time(history, td)
     if quiet is None:
@@ -72,7 +78,7 @@ def begun_at(history: History, flight: Flight, td: float, after: float, describe
             end = history.known.once(("landing", after), lambda: landing_after(history, after))
         else:
             end = _end_of(history, described)
-        return Flight(after, end, "given", doubts=_with_refusal(flight))
+        return Flight(after, end, "given", doubts=_with_refusal(flight), described=described is not None)
     if flight.end is not None and after >= flight.end:
         ended = f"the {spoken(flight.source)} shows that the flight had ended at {flight.end:.6g}, before `after`"
         return Flight(refusal=flight.refusal or ended, doubts=flight.doubts)
@@ -119,11 +125,11 @@ def _end_of(history: History, described: Described) -> float | None:
     return described.end if described.end < history.time[-1] else None
 
 
-def _load_beside(history: History, start: float, end: float, vibration: Mode | Modes) -> float:
-    """Give NaN if energies change in a window by more than the damping of a vibration takes, else 0."""
+def _load_beside(history: History, described: Described) -> float:
+    """Give NaN if energies change in a window by more than the damping of its vibration takes, else 0."""
     from d2rpick.flight.work import taken_by_damping
 
-    taken = None if history.balance is None else taken_by_damping(history.balance, start, end, vibration)
+    taken = None if history.balance is None else taken_by_damping(history.balance, *described)
     return nan if taken is False else 0.0
 
 

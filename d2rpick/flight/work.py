@@ -15,10 +15,9 @@ from d2rpick.flight.window import FEWEST, Constant, FreeFlight, Law, lasting_win
 from d2rpick.histories.samples import integral, window
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from d2rpick.histories.history import Balance, Momenta, Samples
-    from d2rpick.vibration.modes import Mode, Modes
 
 
 # States from which a load can be told from gravity and damping: twice the unknowns.
@@ -194,22 +193,25 @@ def _work_of_gravity(balance: Balance, flight: FreeFlight, momenta: Momenta) -> 
     return np.interp(balance.time, time, flight.gravity * integral(time, along))
 
 
-def taken_by_damping(balance: Balance, start: float, end: float, vibration: Mode | Modes) -> bool | None:
+def taken_by_damping(
+    balance: Balance, start: float, end: float, vibration: Callable[[Samples], Samples], alpha: float | None
+) -> bool | None:
     r"""Whether kinetic and internal energy together change between two times [time] as a vibration is damped.
 
-    Damping within the body takes energy of the vibration alone: :math:`K + E - V` is constant.  Damping proportional
-    to mass takes the motion of the body as well, at the rate :math:`\alpha` of its vibration:
-    :math:`K + E + 2 \alpha \int K dt` is constant.  Nothing is fitted, so that no load is taken for either
-    (docs/choosing.md, "Energies that look like flight").  None where one of the energies is not written.
+    Damping within the body takes energy of the vibration alone, whose energy V(t) ``vibration`` gives:
+    :math:`K + E - V` is constant.  Damping proportional to mass takes the motion of the body as well, at the rate
+    ``alpha`` of its vibration [1/time]: :math:`K + E + 2 \alpha \int K dt` is constant.  Nothing is fitted, so that
+    no load is taken for either (docs/choosing.md, "Energies that look like flight").  None where an energy is missing.
     """
     inside = window(balance.time, start, end)
     whole, kinetic, time = balance.kinetic_and_internal, balance.kinetic, balance.time[inside]
     if whole is None or kinetic is None or not time.size:
         return None
-    of_body = float((kinetic[inside] - vibration.kinetic_energy(time)).max())
-    within_body = whole[inside] - vibration.vibration_energy(time)
-    by_mass = whole[inside] + 2 * vibration.alpha * integral(time, kinetic[inside])
-    return min(float(np.ptp(within_body)), float(np.ptp(by_mass))) <= _LITTLE * of_body
+    of_vibration = vibration(time)
+    changes = [float(np.ptp(whole[inside] - of_vibration))]
+    if alpha is not None:
+        changes.append(float(np.ptp(whole[inside] + 2 * alpha * integral(time, kinetic[inside]))))
+    return min(changes) <= _LITTLE * float((kinetic[inside] - of_vibration).max())
 
 
 def _unexplained(balance: Balance, first: int, last: int) -> float:
