@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from d2rpick.base.errors import RangeError
+from d2rpick.choice.margins import margin_of
 from d2rpick.flight.flight import Flight, all_seen, witnesses
-from d2rpick.flight.margin import margin_before_contact
 from d2rpick.flight.window import moments
 from d2rpick.histories.digits import not_after, sum_as_read
 
@@ -40,7 +40,7 @@ def longest_flight(
         raise RangeError(f"{', '.join(history.source)}: {found}; {cure}")
     windows = [(flight.within(history.time), flight) for flight in flights]
     (start, end), longest = max(windows, key=lambda one: one[0][1] - one[0][0])
-    latest = last_td(end, margin_before_contact(history, longest, settings.margin).time)
+    latest = last_td(end, margin_of(history, longest, settings, fits).time)
     return start, latest if longest.source == "energy" and latest > start else end
 
 

@@ -14,10 +14,10 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import RangeError
+from d2rpick.choice.margins import bodies_of, margin_of
 from d2rpick.flight.chosen import Described, begun_at, find_flight, landed_at
 from d2rpick.flight.flight import Flight, Seen, seen_flight
 from d2rpick.flight.internal_energy import largest, round_off
-from d2rpick.flight.margin import margin_before_contact
 from d2rpick.histories.digits import sum_as_read
 from d2rpick.vibration import find_models
 from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD, Identification, identify, identify_several, judge_given
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from d2rpick.choice.question import Settings
+    from d2rpick.flight.margin import Margin
     from d2rpick.flight.position_error import Bodies
     from d2rpick.histories.history import History, Samples
 
@@ -165,8 +166,13 @@ class Situation:
     def margin(self) -> float:
         """Time kept clear before the next contact [time]: none where td was given, unless it or the landing was."""
         if self.settings.margin is None and self.settings.landing is not None:
-            return margin_before_contact(self.history, self.flight).time
+            return self.expected_margin.time
         return self.settings.margin or 0.0
+
+    @cached_property
+    def expected_margin(self) -> Margin:
+        """Margin that a chosen td keeps: the one given, or by how much the next contact may come earlier."""
+        return margin_of(self.history, self.flight, self.settings, self.fits)
 
     @cached_property
     def at_rest(self) -> bool:
@@ -180,14 +186,7 @@ class Situation:
     @cached_property
     def bodies(self) -> Bodies | None:
         """How the bodies that the parts to be switched become drift in the flight; None where no parts show it."""
-        if self.flight.parts is None:
-            return None
-        from d2rpick.flight.position_error import bodies_in_flight  # not above: a table has no parts
-
-        told, placement = self.settings.bodies, self.settings.placement
-        return self.fits.once(
-            ("drift", self.flight, told), lambda: bodies_in_flight(self.history, self.flight, told, placement)
-        )
+        return bodies_of(self.history, self.flight, self.settings, self.fits)
 
     def position_errors(self, times: Samples) -> Samples:
         """How far a body is out of place at td when it is frozen at each of ``times`` [length]; NaN where unknown."""
