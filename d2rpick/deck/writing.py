@@ -138,10 +138,11 @@ def _radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     printed = [leg for text in card.files.values() for leg in read_legs(SourceFile("the card", text.encode()))]
     if not printed:
         raise DeckError(f"{main}: a Radioss run, but the cards are for another solver")
-    if run.starter is None or len(run.legs) != 1:
-        found = "no starter deck" if run.starter is None else f"{len(run.legs)} engine files"
-        raise DeckError(f"{main}: the run has {found}; its starter deck and one engine file were expected")
-    (leg,) = run.legs
+    if run.starter is None or not run.legs:
+        found = "starter deck" if run.starter is None else "engine file"
+        raise DeckError(f"{main}: the run has no {found}; its starter deck and an engine file were expected")
+    leg = run.legs[0]
+    _refuse_unlike(run.legs)
     _refuse_other_run(leg, printed)
     starter = run.starter.sources[0].name
     _refuse_sensors(run.starter, card)
@@ -200,6 +201,17 @@ def _refuse_sensors(starter: Starter, card: PrintedCard) -> None:
     mains = {body.node.value for body in (*starter.bodies, *added.bodies)}
     if unknown := sorted(card.sensors.keys() - mains):
         raise DeckError(f"{name_units(unknown, 'main node')}: no /RBODY of the deck has it; name main nodes of bodies")
+
+
+def _refuse_unlike(legs: Sequence[Leg]) -> None:
+    """Raise DeckError if a further leg has keywords that the first one has not, so that no leg can stand for both."""
+    first = {text_of(block) for block in blocks(legs[0].run.block.source)}
+    for leg in legs[1:]:
+        for block in blocks(leg.run.block.source):
+            words = keyword(block)
+            if words[:1] != ("RUN",) and words[:1] != ("END",) and text_of(block) not in first:
+                found = f"{leg.run.block.source.name}: /{'/'.join(words)} is not in the first engine file"
+                raise DeckError(f"{found}; legs between switches repeat that one: write its keywords alike, or one leg")
 
 
 def _refuse_other_run(leg: Leg, printed: Sequence[Leg]) -> None:
