@@ -172,11 +172,10 @@ class Track(NamedTuple):
 class Balance:
     """Energies of the whole model at ``time``, arrays of shape (n,); None for what the files do not have.
 
-    ``sliding`` is the energy of all contacts, ``friction`` its share by friction, ``damping`` what damping has taken,
-    ``wall`` the energy of rigid walls, ``external_work`` that of gravity and all other loads, ``total`` the sum that
-    the solver keeps, ``ratio`` that sum over the initial energy and the external work, ``eroded`` the internal energy
-    of deleted elements.  ``velocity`` (n, 3) is that of the centre of mass, up to a factor, ``hourglass_of_parts`` the
-    highest hourglass and internal energy of parts, ``precision`` how finely energies were printed.
+    ``sliding`` is the energy of contacts, ``friction`` its share by friction, ``damping`` and ``wall`` what damping and
+    rigid walls have taken, ``external_work`` that of all loads, ``total`` the sum that the solver keeps, ``ratio`` that
+    sum over initial energy and external work, ``eroded`` that of deleted elements, ``velocity`` (n, 3) that of the
+    centre of mass, up to a factor, ``hourglass_of_parts`` their highest hourglass and internal energy.
     """
 
     time: Samples
