@@ -101,6 +101,7 @@ class Cards:
     name: str | None = option("Radioss: name of the run.  [default: Root]", metavar="NAME")
     starter: str = ""  # cards that the starter deck lacks
     sensor: int = 901  # first id of sensors that is free
+    replaced: tuple[int, ...] = ()  # main nodes of bodies that leave the starter deck
 
     @classmethod
     def of(cls, given: CardOptions) -> Cards:
@@ -124,7 +125,7 @@ class Cards:
         given = {name: getattr(self, name) for name in self.given}
         if self.node:
             given["node"] = tuple(numbers("--node", self.node))
-        return Printing(part=tuple(parts), starter=self.starter, sensor=self.sensor, **given)
+        return Printing(part=tuple(parts), starter=self.starter, sensor=self.sensor, replaced=self.replaced, **given)
 
     def check_solver(self, solver: str) -> None:
         """Refuse an option that says what the input of ``solver`` has no place for."""
@@ -163,7 +164,7 @@ class Cards:
 
         found = bodies_for(deck, [part.id for part in parts])
         nodes = tuple(map(str, found.nodes))
-        return replace(self, node=nodes, starter=found.cards, sensor=found.sensor), found.notes
+        return replace(self, node=nodes, starter=found.cards, sensor=found.sensor, replaced=found.replaced), found.notes
 
     def request(self, asked: Asked) -> CardRequest:
         """Say how the card of a run is printed."""

@@ -60,6 +60,8 @@ class Printing(NamedTuple):
         Cards that the starter deck of the run lacks.
     sensor : int
         First id of sensors, where these switch.
+    replaced : tuple of int
+        Main nodes of bodies that the new ones take the place of.
     """
 
     part: tuple[int, ...] = ()
@@ -73,6 +75,7 @@ class Printing(NamedTuple):
     name: str = "Root"
     starter: str = ""
     sensor: int = 901
+    replaced: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,19 @@ from d2rpick.base.files import write_whole
 from d2rpick.deck import radioss_deck
 from d2rpick.deck.ls_dyna_parts import read_parts
 from d2rpick.deck.printing import EngineFile, engine_lines, listed, off
-from d2rpick.deck.radioss_deck import Leg, Starter, below_title, blocks, card_of, kept_off, keyword, numbers, read_legs
+from d2rpick.deck.radioss_bodies import replaced
+from d2rpick.deck.radioss_deck import (
+    Leg,
+    Starter,
+    below_title,
+    blocks,
+    card_of,
+    kept_off,
+    keyword,
+    number_of,
+    numbers,
+    read_legs,
+)
 from d2rpick.deck.radioss_files import run_files
 from d2rpick.deck.radioss_run import Run, parts_off, read_run
 from d2rpick.deck.reader import Deck, cure, cuts, read_deck
@@ -146,17 +158,33 @@ def _radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     _refuse_other_run(leg, printed)
     starter = run.starter.sources[0].name
     _refuse_sensors(run.starter, card)
+    left_out = {body.id: body.node.value for body in replaced(run, card.starter)}
     main_text = with_cards(run.starter.sources[0], card.starter, blocks(run.starter.sources[0]))
-    yield Path(starter).name, _with_sensors(SourceFile(starter, main_text), card.sensors)
+    yield Path(starter).name, _edited(starter, main_text, card.sensors, left_out)
     further = list(blocks(leg.run.block.source))
     for (name, text), mine in zip(card.files.items(), printed, strict=True):
         kept = (text_of(block) for block in further if repeated(keyword(block), mine))
         named = {node.value for _, _, ids in mine.switched for node in ids} | card.sensors.keys()
+        named.update(left_out.values())
         others = [node for node in kept_off(run.legs) if node not in named]  # else they would be rigid from time 0
         lines = listed(others) if mine.cap is None else off(others)  # its text ends with the bodies that it puts off
         yield name, (text + "".join(f"{line}\n" for line in lines)).encode() + b"".join(kept)
     for name, content in copies(run.starter.sources[1:], starter, {Path(starter).name, *card.files}):
-        yield name, _with_sensors(SourceFile(name, content), card.sensors)
+        yield name, _edited(name, content, card.sensors, left_out)
+
+
+def _edited(name: str, content: bytes, sensors: Mapping[int, int], left_out: Collection[int]) -> bytes:
+    """Give a file of the starter deck with sensors, and without rigid bodies that are ``left_out``, by their ids."""
+    return _with_sensors(SourceFile(name, _without(SourceFile(name, content), left_out)), sensors)
+
+
+def _without(source: SourceFile, bodies: Collection[int]) -> bytes:
+    """Give a file of the starter deck without some rigid bodies, by their ids."""
+    content = source.read(0)
+    for block in reversed([*blocks(source)]):
+        if bodies and keyword(block)[:1] == ("RBODY",) and number_of(card_of(block)) in bodies:
+            content = content[: block.start] + content[block.end :]
+    return content
 
 
 def _with_sensors(source: SourceFile, sensors: Mapping[int, int]) -> bytes:
