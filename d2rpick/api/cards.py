@@ -109,6 +109,7 @@ class Cards:
     sensor: int = 901  # first id of sensors that is free
     delete_nodal_bodies: bool = False  # as those of Printing
     delete_node_sets: bool = False
+    replaced: tuple[int, ...] = ()  # main nodes of bodies that leave the starter deck
 
     @classmethod
     def of(cls, given: CardOptions) -> Cards:
@@ -136,6 +137,7 @@ class Cards:
             part=tuple(parts),
             starter=self.starter,
             sensor=self.sensor,
+            replaced=self.replaced,
             delete_nodal_bodies=self.delete_nodal_bodies,
             delete_node_sets=self.delete_node_sets,
             **given,
@@ -189,8 +191,8 @@ class Cards:
         from d2rpick.deck.radioss_bodies import bodies_for
 
         bodies = bodies_for(deck, parts)
-        nodes = tuple(map(str, bodies.nodes))
-        return replace(cards, node=nodes, starter=bodies.cards, sensor=bodies.sensor), bodies.notes
+        cards = replace(cards, node=tuple(map(str, bodies.nodes)), replaced=bodies.replaced)
+        return replace(cards, starter=bodies.cards, sensor=bodies.sensor), bodies.notes
 
     def request(self, asked: Asked) -> CardRequest:
         """Say how the card of a run is printed."""

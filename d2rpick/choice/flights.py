@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import RangeError
-from d2rpick.flight.flight import Flight, all_seen, landed, witnesses
-from d2rpick.flight.margin import margin_before_contact
+from d2rpick.choice.margins import margin_of
+from d2rpick.flight.flight import Flight, all_seen, witnesses
 from d2rpick.flight.window import moments
 from d2rpick.histories.digits import not_after, sum_as_read
 
@@ -38,12 +38,12 @@ def longest_flight(
     if not flights:
         held = history.surroundings.held(history.parts, float(history.time[-1]))
         found = held or "nothing in the record shows a flight, in which td could be chosen"
-        cure = "give `td`, and the end of the load as `after` where it is known"
+        cure = "give `td`" if settings.after is not None else "give the end of the load as `after` where it is known"
         cure = "only what nothing holds can be switched" if held else cure
         raise RangeError(f"{', '.join(history.source)}: {found}; {cure}")
     windows = [(flight.within(history.time), flight) for flight in flights]
     (start, end), longest = max(windows, key=lambda one: one[0][1] - one[0][0])
-    latest = last_td(end, margin_before_contact(history, longest, settings.margin).time)
+    latest = last_td(end, margin_of(history, longest, settings, fits).time)
     return start, latest if longest.source == "energy" and latest > start else end
 
 
@@ -76,16 +76,43 @@ def flights_of(history: History, settings: Settings, fits: Fits | None = None) -
     """
     landing = settings.landing
     if landing is None:
-        return _flights_of(history, settings, fits)
+        return _with_given_start(history, settings, _flights_of(history, settings, fits), fits)
     history.check(landing, argument="landing")
     found = _flights_of(history, replace(settings, landing=None), fits)
     last = _last_before(landing, found)
     if last and landing <= last.within(history.time)[1]:
-        return tuple(landed(one, landing) if one is last else one for one in found)
+        found = tuple(one._replace(end=landing) if one is last else one for one in found)
+        return _with_given_start(history, settings, found, fits)
     from d2rpick.choice.situation import examine
 
     before = examine(history, landing, settings, fits).flight
-    return tuple(sorted((*found, before))) if before.end == landing and not before.refusal else found
+    return _in_order(history, found, before) if before.end == landing and not before.refusal else found
+
+
+def _with_given_start(
+    history: History, settings: Settings, found: tuple[Flight, ...], fits: Fits | None
+) -> tuple[Flight, ...]:
+    """Add the flight that begins where the user says that the load ends, if none of those found holds that time."""
+    after, last = settings.after, float(history.time[-1])
+    windows = [one.within(history.time) for one in found]
+    if after is None or any(start <= after < end for start, end in windows):
+        return found
+    from d2rpick.choice.situation import examine
+
+    end = min((start for start, _ in windows if start > after), default=last)
+    end = end if settings.landing is None else min(end, settings.landing)
+    given = examine(history, (after + end) / 2, settings, fits).flight
+    if given.source != "given" or given.refusal or given.start != after:
+        return found
+    return _in_order(history, found, given if given.end is not None or end == last else given._replace(end=end))
+
+
+def _in_order(history: History, found: tuple[Flight, ...], given: Flight) -> tuple[Flight, ...]:
+    """Give flights ascending in time, with the one that is given in place of those that it overlaps."""
+    first, last = given.within(history.time)
+    windows = ((one, *one.within(history.time)) for one in found)
+    others = [one for one, start, end in windows if end <= first or start >= last]
+    return tuple(sorted((*others, given), key=lambda one: one.within(history.time)))
 
 
 def _last_before(landing: float, flights: Iterable[Flight]) -> Flight | None:

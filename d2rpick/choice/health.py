@@ -218,20 +218,27 @@ def _worst_part(balance: Balance) -> dict[str, Any]:
 
 def _ratio(balance: Balance) -> dict[str, Any]:
     """Range of the energy ratio, the solver's own or that of its terms, where its reference counts."""
-    ratio, total, reference = balance.ratio, balance.total, None
-    if ratio is not None and total is not None:
-        reference = np.divide(total, ratio, out=np.zeros_like(total), where=ratio != 0)
-    elif ratio is None and balance.external_work is not None:
-        terms = (balance.internal, balance.kinetic, balance.hourglass, balance.sliding)
-        if balance.internal is not None and balance.kinetic is not None:
-            total = np.sum([term for term in terms if term is not None], axis=0)
-            reference = total[0] + balance.external_work - balance.external_work[0]
-            ratio = np.divide(total, reference, out=np.ones_like(total), where=reference != 0)
+    ratio, total, reference = balance.ratio, _total(balance), None
+    if ratio is not None and balance.total is not None:
+        reference = np.divide(balance.total, ratio, out=np.zeros_like(ratio), where=ratio != 0)
+    elif ratio is None and total is not None and balance.external_work is not None:
+        reference = total[0] + balance.external_work - balance.external_work[0]
+        ratio = np.divide(total, reference, out=np.ones_like(total), where=reference != 0)
     if ratio is None:
         return {}
     if reference is not None:
         ratio = ratio[np.abs(reference) >= _COUNTING_REFERENCE * float(np.abs(reference).max())]
     return {"energy_ratio_min": float(ratio.min()), "energy_ratio_max": float(ratio.max())}
+
+
+def _total(balance: Balance) -> Samples | None:
+    """Total energy as the solver keeps it, or else the sum of all terms; None where one of the main ones is unknown."""
+    if balance.total is not None:
+        return balance.total
+    if balance.internal is None or balance.kinetic is None:
+        return None
+    others = (balance.hourglass, balance.sliding, balance.damping, balance.wall)
+    return np.asarray(balance.internal + balance.kinetic + sum(term for term in others if term is not None))
 
 
 def _in_window(balance: Balance, start: float, end: float, locked: float | None) -> dict[str, Any]:

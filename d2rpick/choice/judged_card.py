@@ -45,7 +45,7 @@ class CardRequest(NamedTuple):
     def by(self, settings: Settings) -> CardRequest:
         """Let the parts of each rigid body that a deck tells be merged, and what its run keeps off stay off."""
         bodies = tuple(body.parts for body in settings.bodies or ())
-        off = tuple(node for node in settings.kept_off if node not in self.printing.node)
+        off = tuple(node for node in settings.kept_off if node not in (*self.printing.node, *self.printing.replaced))
         return self._replace(printing=self.printing._replace(bodies=bodies, off=off))
 
 

@@ -21,9 +21,9 @@ from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.answers import suggest_of
 from d2rpick.choice.flights import flights_of, last_td
 from d2rpick.choice.health import WRONG_ENERGY, cautions_of_engine, refuse_unsound
+from d2rpick.choice.margins import margin_of
 from d2rpick.choice.switched_run import Done, Times, done_windows, switched_history
 from d2rpick.flight.internal_energy import round_off
-from d2rpick.flight.margin import Margin, margin_before_contact
 from d2rpick.vibration.span import Fits
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from d2rpick.choice.quality import Quality
     from d2rpick.choice.question import Reference, Settings
     from d2rpick.flight.flight import Flight
+    from d2rpick.flight.margin import Margin
     from d2rpick.histories.history import History
 
 # A rigid window shorter than this share of the record saves less than a restart costs.
@@ -223,7 +224,7 @@ def _rows(
     for number, seen in enumerate(flights, start=1):
         flight = _given(reference.history, seen, settings.after)
         start, end = flight.within(reference.history.time)
-        margin = margin_before_contact(reference.history, flight, settings.margin)
+        margin = margin_of(reference.history, flight, settings, fits)
         row = Planned(number, flight, start, end, margin, record, "left-out")
         within = [one for one in known if one.flight == seen]
         if within:

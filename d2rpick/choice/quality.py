@@ -112,7 +112,7 @@ _BAND: Final = 0.25
 # pair worse than good, or than fair (docs/validation.md).
 _HARDLY_GOOD, _HARDLY_FAIR = 0.01, 0.05
 _NOT_CERTAIN: Final = "the flight is not certain"
-_UNKNOWN_LOAD: Final = "kinetic and internal energy change together, by gravity or by another load"
+_UNKNOWN_LOAD: Final = "momentum or energy changes in the flight, by gravity or by another load"
 
 
 class Grade(NamedTuple):

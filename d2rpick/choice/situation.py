@@ -14,9 +14,11 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import RangeError
-from d2rpick.flight.flight import Flight, Seen, find_flight, landed, seen_flight
+from d2rpick.choice.margins import bodies_of, margin_of
+from d2rpick.choice.together import Together
+from d2rpick.flight.chosen import Described, begun_at, find_flight, landed_at
+from d2rpick.flight.flight import Flight, Seen, seen_flight
 from d2rpick.flight.internal_energy import largest, quiet_time, round_off
-from d2rpick.flight.margin import margin_before_contact
 from d2rpick.histories.digits import sum_as_read
 from d2rpick.vibration import find_models
 from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD, Identification, identify, identify_several, judge_given
@@ -27,8 +29,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from d2rpick.choice.question import Settings
+    from d2rpick.flight.margin import Margin
     from d2rpick.flight.position_error import Bodies
-    from d2rpick.flight.vibrating import Beside
     from d2rpick.histories.history import History, Samples
 
     Look = Callable[[float], "Situation"]
@@ -76,32 +78,6 @@ def _faint(history: History, start: float) -> float:
     highest = history.known.once("highest", lambda: largest(history.energy))
     quantum = history.energy_precision.quantum(float(np.abs(after).max(initial=0.0)))
     return max(_SOLVER_ERROR * highest, _QUANTA * quantum, _FAINT * fall)
-
-
-class Together:
-    """What vibrates together in a flight: whether its energy is all of what was chosen, and its kinetic energy."""
-
-    def __init__(self, history: History, flight: Flight) -> None:
-        self._history, self._flight = history, flight
-
-    @cached_property
-    def beside(self) -> Beside:
-        """Parts that vibrate with the chosen ones and were not chosen."""
-        from d2rpick.flight.vibrating import vibrating_beside  # not above: an oscillator does without it
-
-        return vibrating_beside(self._history, self._flight)
-
-    @property
-    def complete(self) -> bool:
-        """Whether all that vibrates together was chosen."""
-        return not self.beside.parts
-
-    @property
-    def kinetic(self) -> tuple[Samples, Samples] | None:
-        """Kinetic energy of what vibrates together, at times in the flight; None if it is not written."""
-        from d2rpick.flight.vibrating import kinetic_energy_of  # not above: an oscillator does without it
-
-        return kinetic_energy_of(self._history, self._flight)
 
 
 class OfTd:
@@ -191,13 +167,18 @@ class Situation:
     def margin(self) -> float:
         """Time kept clear before the next contact [time]: none where td was given, unless it or the landing was."""
         if self.settings.margin is None and self.settings.landing is not None:
-            return margin_before_contact(self.history, self.flight).time
+            return self.expected_margin.time
         return self.settings.margin or 0.0
 
     @cached_property
     def together(self) -> Together:
         """What vibrates together in the flight."""
         return Together(self.history, self.flight)
+
+    @cached_property
+    def expected_margin(self) -> Margin:
+        """Margin that a chosen td keeps: the one given, or by how much the next contact may come earlier."""
+        return margin_of(self.history, self.flight, self.settings, self.fits)
 
     @cached_property
     def at_rest(self) -> bool:
@@ -211,14 +192,7 @@ class Situation:
     @cached_property
     def bodies(self) -> Bodies | None:
         """How the bodies that the parts to be switched become drift in the flight; None where no parts show it."""
-        if self.flight.parts is None:
-            return None
-        from d2rpick.flight.position_error import bodies_in_flight  # not above: a table has no parts
-
-        told, placement = self.settings.bodies, self.settings.placement
-        return self.fits.once(
-            ("drift", self.flight, told), lambda: bodies_in_flight(self.history, self.flight, told, placement)
-        )
+        return bodies_of(self.history, self.flight, self.settings, self.fits)
 
     def position_errors(self, times: Samples) -> Samples:
         """How far a body is out of place at td when it is frozen at each of ``times`` [length]; NaN where unknown."""
@@ -278,8 +252,7 @@ def examine(
     fits = Fits() if fits is None else fits
     fit, span = _oscillator(history, at, settings, seen, fits, quick=quick)
     described = _settled(history, fit, span) or _described_by_modes(history, td, settings, seen, fits)
-    flight = find_flight(history, td, settings.after, seen, described)
-    flight = landed(_between_supports(history, flight, td), settings.landing)
+    flight = _flight_at(history, td, settings, seen, described)
     given = settings.oscillator is not None
     evidence = Evidence(fit, span, given, prescribed=given or settings.fit_window is not None)
     situation = Situation(history, td, settings, flight, evidence, fits)
@@ -319,6 +292,18 @@ def _beginning(situation: Situation, since: float) -> Situation:
     if flight.start is None or flight.start >= since:
         return situation
     return replace(situation, flight=flight._replace(start=since))
+
+
+def _flight_at(history: History, td: float, settings: Settings, seen: Seen, described: Described | None) -> Flight:
+    """Give the flight around td by the evidence, or as the user gives it; what is held does not fly in either case."""
+    flight = find_flight(history, td, seen, described)
+    if seen.held:
+        return flight
+    if settings.after is not None:
+        flight = begun_at(history, flight, td, settings.after, described)
+    if settings.landing is not None:
+        flight = landed_at(history, flight, td, settings.landing)
+    return _between_supports(history, flight, td)
 
 
 def _between_supports(history: History, flight: Flight, td: float) -> Flight:
@@ -369,7 +354,7 @@ def _oscillator(
     return fit, span
 
 
-def _described_by_modes(history: History, td: float, settings: Settings, seen: Seen, fits: Fits) -> Span | None:
+def _described_by_modes(history: History, td: float, settings: Settings, seen: Seen, fits: Fits) -> Described | None:
     """Find a window whose modes go on by themselves, if nothing but the energy can tell a flight."""
     if seen.flight or seen.refusal or settings.after is not None or not settings.replay:
         return None
@@ -378,7 +363,7 @@ def _described_by_modes(history: History, td: float, settings: Settings, seen: S
     quiet, last = quiet_time(history, td), float(history.time[-1])
     guess = None if quiet is None else Span(quiet.start, last if quiet.end is None else quiet.end)
     found = find_described(history, td, guess, fits)
-    return found.span if found else None
+    return Described(*found.span, found.vibration.vibration_energy) if found else None
 
 
 def _resolved(history: History, fit: Identification, fits: Fits) -> Identification:
@@ -389,12 +374,13 @@ def _resolved(history: History, fit: Identification, fits: Fits) -> Identificati
     return fits.once(("resolved", fit.start, fit.end, fit.rms), lambda: resolved(*window, fit))
 
 
-def _settled(history: History, fit: Identification | None, span: Span | None) -> Span | None:
+def _settled(history: History, fit: Identification | None, span: Span | None) -> Described | None:
     """Give the window of an oscillator without its first quarter of a period, unless the record begins with it.
 
     While the deformation passes through zero its energy hardly shows that a load still moves it, by a tenth of its
     amplitude and more; where it is largest a hundredth shows.  Each quarter of a period has one of both.
     """
-    if span is None or fit is None or fit.mode is None or span.start <= history.time[0]:
-        return span
-    return Span(min(span.start + np.pi / 2 / fit.mode.omega, span.end), span.end)
+    if span is None or fit is None or fit.mode is None:
+        return None
+    quarter = np.pi / 2 / fit.mode.omega if span.start > history.time[0] else 0.0
+    return Described(min(span.start + quarter, span.end), span.end, fit.mode.vibration_energy, fit.mode.alpha)

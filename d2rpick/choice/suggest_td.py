@@ -15,7 +15,6 @@ from d2rpick.choice.situation import Situation, looking
 from d2rpick.choice.warnings import mean_in_flight, shortfall
 from d2rpick.flight.flight import SOURCES
 from d2rpick.flight.internal_energy import round_off
-from d2rpick.flight.margin import margin_before_contact
 from d2rpick.histories.digits import not_after, sum_as_read
 from d2rpick.histories.samples import union
 from d2rpick.vibration.measures import kinetic_share, vertices
@@ -234,7 +233,7 @@ def within_flight(look: Look, history: History, window: tuple[float, float]) -> 
 def _latest(situation: Situation, window: tuple[float, float]) -> float:
     """Last td in the window that keeps the margin, also as it is read; where none does, the last one in the flight."""
     low, high = window
-    margin = margin_before_contact(situation.history, situation.flight, situation.settings.margin).time
+    margin = situation.expected_margin.time
     end = float("inf") if situation.flight.end is None else situation.flight.end
     latest = sum_as_read(end, -margin)
     latest = latest if latest > low else situation.latest_td
@@ -245,7 +244,7 @@ def _last_at_rest(situation: Situation, window: tuple[float, float]) -> float:
     """Last td in a window where nothing vibrates: before the last state, and as far from the contact as it may move."""
     history, flight = situation.history, situation.flight
     last = min(window[1], not_after(float(history.time[-2])))  # a run that ends at td is no use
-    spread = margin_before_contact(history, flight, situation.settings.margin).spread
+    spread = situation.expected_margin.spread
     return last if flight.end is None or not spread else min(last, not_after(flight.end - _HIDDEN * spread))
 
 

@@ -14,6 +14,7 @@ from d2rpick.base.errors import Caution, listing, name_units
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.few_states import cautions_of_few_states
 from d2rpick.flight.internal_energy import round_off
+from d2rpick.flight.margin import margin_before_contact
 from d2rpick.histories.digits import above, first_as_read, not_after, window_as_read
 from d2rpick.vibration import measures
 from d2rpick.vibration.model import NOTHING_KEPT
@@ -84,13 +85,31 @@ def _of_flight(situation: Situation) -> Iterator[Caution]:
             found += f": {flight.start - flight.settled:.3g} from {flight.settled:.6g} on are left unused for safety"
         yield Caution("flight-from-energy", f"{found}; give it as `after` where it is known")
     if earliest is None:
-        yield Caution("no-flight", "nothing in the record shows when the load is over; give that time as `after`")
+        found = "nothing in the record shows when the load is over"
+        given = situation.settings.after is not None or flight.refusal
+        yield Caution("no-flight", found if given else f"{found}; give that time as `after`")
     elif td <= earliest:
         yield Caution(
             "td-in-load", f"td = {td:.6g} lies {'at' if td == earliest else 'before'} {end_of_load(situation)}"
         )
+    yield from _of_grazing(situation)
     if td > situation.latest_td:
         yield Caution("td-after-contact", f"td = {td:.6g} lies after {end_of_flight(situation)}")
+
+
+def _of_grazing(situation: Situation) -> Iterator[Caution]:
+    """Say so where the body only grazes what it touches at the end of the flight, and how early it may do so."""
+    flight = situation.flight
+    margin = situation.expected_margin
+    if flight.end is None or flight.start is None or flight.refusal or margin.source != "grazing":
+        return
+    grazed = f"the force of the contact at {flight.end:.6g} stays below 1 % of the largest one at first"
+    early = min(margin.time, flight.end - flight.start)
+    moved = f"the body grazes it, and if it is out of place at td, that contact comes up to {early:.2g} earlier"
+    kept = (
+        f"keep td before {not_after(flight.end - early):.6g}" if early < flight.end - flight.start else "no td is safe"
+    )
+    yield Caution("grazing-contact", f"{grazed}: {moved}; {kept}")
 
 
 def _of_evidence(situation: Situation) -> Iterator[Caution]:
@@ -131,7 +150,9 @@ def out_of_place(situation: Situation, tr: float) -> Iterator[Caution]:
     off = f"there the body{which} is off by {least}{worst.error:.3g}, {share:.1%} of its path in the flight"
     taken = "; this holds if the parts become one rigid body" if worst.assumed else ""
     taken += ", which `deck` tells" if worst.assumed and situation.settings.bodies is None else ""
-    yield Caution("out-of-place", f"{found}: {off}; the next contact may move by {share * last:.2g}{taken}")
+    contact = margin_before_contact(situation.history, situation.flight, place=worst.error).spread
+    moved = f"; the next contact may move by {share * last if contact is None else contact:.2g}"
+    yield Caution("out-of-place", f"{found}: {off}{moved if situation.flight.end is not None else ''}{taken}")
 
 
 def _moves_apart(parts: Sequence[Part]) -> str:

@@ -66,6 +66,8 @@ class Printing(NamedTuple):
         When something pushes the parts, by a history [time]; ``speed`` is how fast they come to it [length/time].
     delete_nodal_bodies, delete_node_sets : bool
         LS-DYNA: delete nodal rigid bodies (NRBF), or joints and extra nodes (NCSF), while the parts are rigid.
+    replaced : tuple of int
+        Main nodes of bodies that the new ones take the place of.
     """
 
     part: tuple[int, ...] = ()
@@ -85,6 +87,7 @@ class Printing(NamedTuple):
     wall: int | None = None
     pushed: tuple[Times, ...] = ()
     speed: float | None = None
+    replaced: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)

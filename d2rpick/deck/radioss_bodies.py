@@ -16,10 +16,12 @@ from d2rpick.deck.geometry import Placement, masses_and_steps
 from d2rpick.deck.mesh import nodes_of
 from d2rpick.deck.model import DISCRETE, Inventory
 from d2rpick.deck.pieces import pieces_of
-from d2rpick.deck.radioss_deck import Starter, below_title, keyword, whole
+from d2rpick.deck.radioss_deck import Starter, below_title, blocks, kept_off, keyword, whole
 from d2rpick.deck.radioss_flaws import NodeGroups
+from d2rpick.deck.radioss_rigid import Body
 from d2rpick.deck.radioss_run import Run, read_run, rigid_parts
 from d2rpick.deck.reader import cuts
+from d2rpick.deck.source import SourceFile
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
@@ -40,12 +42,14 @@ class Bodies(NamedTuple):
 
     ``nodes`` are the main nodes of all of them; ``cards`` is what the starter deck lacks, to stand before its /END,
     empty where it has all; ``notes`` say what these cards add.  ``sensor`` and all ids above it are free for sensors.
+    ``replaced`` are main nodes of bodies that have to leave the starter deck.
     """
 
     nodes: tuple[int, ...]
     cards: str = ""
     notes: tuple[str, ...] = ()
     sensor: int = 1
+    replaced: tuple[int, ...] = ()
 
 
 def bodies_for(path: str, parts: Collection[int]) -> Bodies:
@@ -75,8 +79,9 @@ def bodies_for(path: str, parts: Collection[int]) -> Bodies:
     if unknown := sorted(part for part in parts if not _nodes([part], groups)):
         raise DeckError(f"{path}: {name_units(unknown)} {are(unknown)} without nodes that are followed; name others")
     nodes, lacking = list[int](), list[tuple[int, ...]]()
+    unused = frozenset(kept_off(run.legs))
     for group in inventory.bodies(parts):
-        there = _ready(starter, inventory, group, groups)
+        there = _ready(starter, inventory, group, groups, unused)
         nodes += there
         if not there:
             lacking.append(group)
@@ -87,7 +92,32 @@ def bodies_for(path: str, parts: Collection[int]) -> Bodies:
         f"/RBODY with main node {main} is new, for {name_units(group)}{_apart(inventory, group)}"
         for main, group in zip(mains, lacking, strict=True)
     )
-    return Bodies((*nodes, *mains), "".join(text for _, text in texts), notes, made.next("SENSOR"))
+    cards = "".join(text for _, text in texts)
+    gone = replaced(run, cards)
+    notes += tuple(
+        f"/RBODY {body.id}, which every leg of the run keeps off, has to go ({body.card.at}): a new one takes its nodes"
+        for body in gone
+    )
+    return Bodies((*nodes, *mains), cards, notes, made.next("SENSOR"), tuple(body.node.value for body in gone))
+
+
+def replaced(run: Run, cards: str) -> tuple[Body, ...]:
+    """Give the bodies of a run that its legs keep off all the time, and whose nodes new bodies in ``cards`` take.
+
+    A node lies in one body, so that these have to leave the starter deck.
+    """
+    if run.starter is None or not cards:
+        return ()
+    added = Starter(blocks=[*blocks(SourceFile("the card", cards.encode()))])
+    members = [known for body in added.bodies if (known := added.group_members(body.group))]
+    groups, unused = NodeGroups(run.starter), frozenset(kept_off(run.legs))
+    taken = _nodes({part for _, parts in members for part in parts}, groups)
+    return tuple(body for body in run.starter.bodies if _is_unused(body, unused) and _touches(body, groups, taken))
+
+
+def _is_unused(body: Body, unused: Collection[int]) -> bool:
+    """Whether a body is never rigid; ``unused`` are the main nodes of those that no leg puts on."""
+    return body.node.value in unused and not body.sensor
 
 
 def _apart(inventory: Inventory, parts: Sequence[int]) -> str:
@@ -119,8 +149,13 @@ def _whole(run: Run) -> Starter:
     return starter
 
 
-def _ready(starter: Starter, inventory: Inventory, group: Sequence[int], groups: NodeGroups) -> tuple[int, ...]:
-    """Main nodes of the bodies of the deck that hold a group of parts; none where it has nothing of it in any."""
+def _ready(
+    starter: Starter, inventory: Inventory, group: Sequence[int], groups: NodeGroups, unused: Collection[int]
+) -> tuple[int, ...]:
+    """Main nodes of the bodies of the deck that hold a group of parts.
+
+    None where it has nothing of it in any, or in bodies alone that are never rigid, which a new one replaces.
+    """
     stiff = set(_stiff(inventory, group))
     own = _nodes(stiff, groups)
     touching = [body for body in starter.bodies if _touches(body, groups, own)]
@@ -131,6 +166,8 @@ def _ready(starter: Starter, inventory: Inventory, group: Sequence[int], groups:
     found = frozenset[int]().union(*whole.values())
     if found == stiff and all(whole.values()) and not any(body.sensor for body in touching):
         return tuple(body.node.value for body in touching)
+    if all(_is_unused(one, unused) for one in touching):
+        return ()
     body = next((one for one in touching if one.sensor or not whole[one.node.value] <= stiff), touching[0])
     place, who = f"{body.card.at}: /RBODY {body.id}", name_units(sorted(stiff))
     if body.sensor:

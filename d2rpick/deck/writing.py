@@ -13,7 +13,19 @@ from d2rpick.base.errors import DeckError, name_units
 from d2rpick.base.files import write_whole
 from d2rpick.deck.engine_files import EngineFile, engine_lines, listed, off
 from d2rpick.deck.ls_dyna_parts import read_parts
-from d2rpick.deck.radioss_deck import Leg, Starter, below_title, blocks, card_of, kept_off, keyword, numbers, read_legs
+from d2rpick.deck.radioss_bodies import replaced
+from d2rpick.deck.radioss_deck import (
+    Leg,
+    Starter,
+    below_title,
+    blocks,
+    card_of,
+    kept_off,
+    keyword,
+    number_of,
+    numbers,
+    read_legs,
+)
 from d2rpick.deck.radioss_files import root_of, run_files
 from d2rpick.deck.radioss_run import Run, parts_off, read_run
 from d2rpick.deck.radioss_sensors import STOPS_SINCE
@@ -138,27 +150,44 @@ def _radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     printed = [leg for text in card.files.values() for leg in read_legs(SourceFile("the card", text.encode()))]
     if not printed:
         raise DeckError(f"{main}: a Radioss run, but the cards are for another solver")
-    if run.starter is None or len(run.legs) != 1:
-        found = "no starter deck" if run.starter is None else f"{len(run.legs)} engine files"
-        raise DeckError(f"{main}: the run has {found}; its starter deck and one engine file were expected")
-    (leg,) = run.legs
+    if run.starter is None or not run.legs:
+        found = "starter deck" if run.starter is None else "engine file"
+        raise DeckError(f"{main}: the run has no {found}; its starter deck and an engine file were expected")
+    leg = run.legs[0]
+    _refuse_unlike(run.legs)
     starter = run.starter.sources[0].name
     root = root_of(starter) or leg.name  # the engine looks for a restart that begins like its own file
     _refuse_other_run(leg, root, printed)
     _refuse_sensors(run.starter, card)
+    left_out = {body.id: body.node.value for body in replaced(run, card.starter)}
     main_text = with_cards(run.starter.sources[0], card.starter, blocks(run.starter.sources[0]))
     main_name = f"{root}_0000.rad"
-    yield main_name, _with_sensors(SourceFile(starter, main_text), card.sensors)
+    yield main_name, _edited(starter, main_text, card.sensors, left_out)
     further = list(blocks(leg.run.block.source))
     names = [f"{root}_{mine.number:04d}.rad" for mine in printed]
     for name, text, mine in zip(names, card.files.values(), printed, strict=True):
         kept = (text_of(block) for block in further if repeated(keyword(block), mine))
         named = {node.value for _, _, ids in mine.switched for node in ids} | card.sensors.keys()
+        named.update(left_out.values())
         others = [node for node in kept_off(run.legs) if node not in named]  # else they would be rigid from time 0
         lines = listed(others) if mine.cap is None else off(others)  # its text ends with the bodies that it puts off
         yield name, (text + "".join(f"{line}\n" for line in lines)).encode() + b"".join(kept)
     for name, content in copies(run.starter.sources[1:], starter, {main_name, *names}):
-        yield name, _with_sensors(SourceFile(name, content), card.sensors)
+        yield name, _edited(name, content, card.sensors, left_out)
+
+
+def _edited(name: str, content: bytes, sensors: Mapping[int, int], left_out: Collection[int]) -> bytes:
+    """Give a file of the starter deck with sensors, and without rigid bodies that are ``left_out``, by their ids."""
+    return _with_sensors(SourceFile(name, _without(SourceFile(name, content), left_out)), sensors)
+
+
+def _without(source: SourceFile, bodies: Collection[int]) -> bytes:
+    """Give a file of the starter deck without some rigid bodies, by their ids."""
+    content = source.read(0)
+    for block in reversed([*blocks(source)]):
+        if bodies and keyword(block)[:1] == ("RBODY",) and number_of(card_of(block)) in bodies:
+            content = content[: block.start] + content[block.end :]
+    return content
 
 
 def _with_sensors(source: SourceFile, sensors: Mapping[int, int]) -> bytes:
@@ -203,6 +232,17 @@ def _refuse_sensors(starter: Starter, card: PrintedCard) -> None:
     mains = {body.node.value for body in (*starter.bodies, *added.bodies)}
     if unknown := sorted(card.sensors.keys() - mains):
         raise DeckError(f"{name_units(unknown, 'main node')}: no /RBODY of the deck has it; name main nodes of bodies")
+
+
+def _refuse_unlike(legs: Sequence[Leg]) -> None:
+    """Raise DeckError if a further leg has keywords that the first one has not, so that no leg can stand for both."""
+    first = {text_of(block) for block in blocks(legs[0].run.block.source)}
+    for leg in legs[1:]:
+        for block in blocks(leg.run.block.source):
+            words = keyword(block)
+            if words[:1] != ("RUN",) and words[:1] != ("END",) and text_of(block) not in first:
+                found = f"{leg.run.block.source.name}: /{'/'.join(words)} is not in the first engine file"
+                raise DeckError(f"{found}; legs between switches repeat that one: write its keywords alike, or one leg")
 
 
 def _refuse_other_run(leg: Leg, root: str, printed: Sequence[Leg]) -> None:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from functools import cache, partial
-from math import isinf, isnan, nan
+from math import isfinite, isinf
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.flight.contact_forces import Touches, is_deformed
-from d2rpick.flight.internal_energy import landing_after, moves_as_a_whole, quiet_time, settled_from
+from d2rpick.flight.internal_energy import moves_as_a_whole, settled_from
 from d2rpick.flight.window import SHORTEST, all_windows, marks, unheld
 
 if TYPE_CHECKING:
@@ -32,16 +32,14 @@ SOURCES: Final = (
     None,
 )
 _SURE: Final = ("given", "momentum", "oscillator")
-_BY_ENERGIES: Final = ("contact-energy", "energy-balance")
+BY_ENERGIES: Final = ("contact-energy", "energy-balance")
 # In free flight no load works.  An energy that is off by 4 % is a deformation that is off by 0.02, within which two
 # candidates count as equally good.
 MOST_WORK: Final = 0.04
-# So often an energy that keeps its level turns at least, or it does not change.
-_LEAST_TURNS: Final = 4
 # What must show every flight that a better source shows: a contact of any part is a contact.
 _AGREEING: Final = ("contact-force", "contact-energy")
 # Forces that are not written, and loads, do not show in the forces of contacts, nor do walls in energies.
-_PARTIAL: Final = (*_BY_ENERGIES, "contact-force")
+_PARTIAL: Final = (*BY_ENERGIES, "contact-force")
 # Ends of a flight by two sources are the same within this share of it, or so many output intervals.
 _SAME, _SAME_STATES = 0.01, 3
 
@@ -80,9 +78,8 @@ class Flight(NamedTuple):
 
     @property
     def unknown_load(self) -> bool:
-        """Whether energies alone show it, while a load acts that may be gravity, or a pull, or friction."""
-        lost = isnan(self.gravity) and not self.described
-        return (lost or isinf(self.gravity)) and self.source in (*_BY_ENERGIES, "energy")
+        """Whether a load acts in it that may be gravity, or a pull, or friction, and nothing tells which."""
+        return self.source != "given" and not isfinite(self.gravity)
 
     @property
     def certain(self) -> bool:
@@ -91,9 +88,9 @@ class Flight(NamedTuple):
         A fixed rigid wall does no work and has no contact energy: without the momentum, only an oscillator that swings
         on tells a flight from a crash into it.
         """
-        if self.source in _PARTIAL:
-            return self.described and not self.unknown_load
-        return self.source in _SURE and not isnan(self.gravity)
+        if self.unknown_load or (self.source == "given" and self.doubts):
+            return False
+        return self.source in _SURE or (self.source in _PARTIAL and self.described)
 
 
 class Witness(NamedTuple):
@@ -148,85 +145,6 @@ class Seen(NamedTuple):
     held: bool = False
 
 
-def landed(flight: Flight, landing: float | None) -> Flight:
-    """Let a flight end at the ``landing`` that is given [time], unless more than the energy shows an earlier one."""
-    if landing is None or flight.start is None or landing <= flight.start:
-        return flight
-    known = flight.end is not None and flight.end < landing and flight.source not in ("energy", "given")
-    return flight if known else flight._replace(end=landing)
-
-
-def find_flight(
-    history: History, td: float, after: float | None, seen: Seen, span: tuple[float, float] | None
-) -> Flight:
-    """Choose the best answer to when the load is over: given, seen, by the oscillator, by the energy.
-
-    ``after`` is given as the end of the load [time]; ``seen`` what the evidence shows; ``span`` the window that an
-    oscillator describes, from its first sample to its last.
-    """
-    if seen.held:
-        return Flight(refusal=seen.refusal)
-    if seen.flight:
-        first, last, parts, end_seen, damping, gravity = seen.flight
-        given = after is not None and not (seen.refusal and first > td)
-        start, source = (after, "given") if given else (first, seen.source)
-        if given and start is not None and start >= last:
-            landed = f"the {_spoken(seen.source)} shows that the flight had ended at {last:.6g}, before `after`"
-            return Flight(refusal=seen.refusal or landed, doubts=seen.doubts)
-        end = last if end_seen else None
-        return Flight(
-            start, end, source, parts, damping, seen.refusal, seen.doubts, gravity=gravity, described=span is not None
-        )
-    if after is not None:
-        if span is None:  # many td have the same one
-            end = history.known.once(("landing", after), lambda: landing_after(history, after))
-        else:
-            end = span[1] if span[1] < history.time[-1] else None
-        return Flight(
-            after,
-            None if seen.refusal else end,
-            "given",
-            refusal=seen.refusal,
-            doubts=seen.doubts,
-            described=span is not None,
-        )
-    if seen.refusal:
-        return Flight(refusal=seen.refusal, doubts=seen.doubts)
-    if span:
-        refusal = _fed(history, *span)
-        end = span[1] if span[1] < history.time[-1] else None
-        return Flight(refusal=refusal) if refusal else Flight(span[0], end, "oscillator", described=True)
-    quiet = quiet_time(history, td)
-    if quiet is None:
-        return Flight()
-    if refusal := _fed(history, quiet.start, td):
-        return Flight(refusal=refusal)
-    end = quiet.end if quiet.end is not None and quiet.end < history.time[-1] else None
-    known = history.balance is not None and history.balance.kinetic_and_internal is not None
-    return Flight(quiet.start, end, "energy", settled=quiet.settled, gravity=nan if known else 0.0)
-
-
-def _fed(history: History, start: float, end: float) -> str | None:
-    """Say so when kinetic and internal energy together change, or nothing moves but the vibration, as in no flight."""
-    balance, energy = history.balance, history.mean_energy(start, end)
-    if balance is None or energy is None or balance.kinetic_and_internal is None:
-        return None
-    turns = int(np.count_nonzero((history.turns > start) & (history.turns < end)))
-    if turns < _LEAST_TURNS and float(np.ptp(history.between(start, end)[1])) > MOST_WORK * energy:
-        return f"from {start:.6g} to {end:.6g} the internal energy turns {turns} times: too few to tell a flight by it"
-    from d2rpick.flight.work import change_of_balance
-
-    change = change_of_balance(balance, start, end)
-    if change is not None and change > MOST_WORK * max(energy, 0.0):
-        found = f"kinetic and internal energy together change by {change:.3g} from {start:.6g} to {end:.6g}"
-        return f"{found}, at a mean internal energy of {energy:.3g}: a load works there"
-    if not moves_as_a_whole(balance, start, end):
-        return (
-            f"from {start:.6g} to {end:.6g} there is no more kinetic energy than that of the vibration: it does not fly"
-        )
-    return None
-
-
 def seen_flight(history: History, td: float) -> Seen:
     """Find the free flight around ``td`` [time] in everything but the energy of the parts.
 
@@ -248,12 +166,23 @@ def _seen(history: History, td: float) -> Seen:
         if flight:
             found.append((witness.source, flight))
         elif (not found or _may_deny(witness, found[0][1])) and witness.counts():
-            refusal = f"the {_spoken(witness.source)} shows no free flight at td = {td:.6g}"
+            refusal = _refusal(history, witness, td)
             doubts = tuple(f"the {source} shows a flight there, but {refusal}" for source, _ in found)
             return _nearest(witness, td, refusal, doubts)
     if not found:
         return Seen()
     return history.known.once(("confirmed", *found), lambda: _confirmed(history, found))  # many td lie in the same
+
+
+def _refusal(history: History, witness: Witness, td: float) -> str:
+    """Say what shows that nothing flies at td [time]: a momentum may be that of free flight, and the energy not."""
+    if witness.source == "momentum":
+        from d2rpick.flight.momentum import flight_around, to_be_asked
+
+        if any(flight_around(one, td, history.balance) for one in to_be_asked(history.momenta)):
+            found = f"the momentum is that of free flight at td = {td:.6g}, but the internal energy keeps no level"
+            return f"{found}: parts of the model may touch each other, or energies are wrong"
+    return f"the {spoken(witness.source)} shows no free flight at td = {td:.6g}"
 
 
 def all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
@@ -323,7 +252,7 @@ def _first(history: History, momenta: Sequence[Momenta], td: float) -> FreeFligh
     for one in momenta:
         found = flight_around(one, td, history.balance)
         if found:
-            return found if one.parts is not None or one.flying else _keeping_level(history, found, td)
+            return found if one.parts is not None or one.flying else _keeping_level(history, found, td, one)
     return None
 
 
@@ -356,20 +285,28 @@ def _by_forces(history: History, touches: Touches, td: float) -> FreeFlight | No
     return unheld(history.surroundings, found, history.parts, td)
 
 
-def _keeping_level(history: History, flight: FreeFlight | None, td: float) -> FreeFlight | None:
-    """Give what of a flight of the whole model the internal energy keeps its level in, or None where td is before."""
+def _keeping_level(
+    history: History, flight: FreeFlight | None, td: float, momenta: Momenta | None = None
+) -> FreeFlight | None:
+    """Give what of a flight of the whole model the internal energy keeps its level in, or None where td is before.
+
+    ``momenta`` are those that show the flight.
+    """
     if flight is None:
         return None
-    balance, whole, time, energy = history.balance, None, history.time, history.energy
+    balance, damped, time, energy, unseen = history.balance, None, history.time, history.energy, 0.0
     if balance and balance.kinetic_and_internal is not None and balance.internal is not None:
-        whole = np.interp(time, balance.time, balance.kinetic_and_internal)
+        from d2rpick.flight.work import lowered_by_damping
+
+        sums, unseen = lowered_by_damping(balance, flight, momenta)
+        damped = np.stack([np.interp(time, balance.time, one) for one in sums]) if sums else None
         if history.parts is not None:
             energy = np.interp(time, balance.time, balance.internal)
-    start = settled_from(time, energy, whole, flight.start, flight.end)
+    start = settled_from(time, energy, damped, flight.start, flight.end, unseen)
     if start is None or start > td or flight.end - start < SHORTEST * (time[-1] - time[0]):
         return None
-    if whole is not None and not flight.gravity:
-        first, last = np.interp((flight.start, start), time, whole)
+    if damped is not None and not flight.gravity:
+        first, last = np.interp((flight.start, start), time, damped[0])
         if last - first > MOST_WORK * float(np.abs(energy).max()):
             return None  # forces that cancel worked on it, as where it is held and moved, and they may still act
     return flight._replace(start=start)
@@ -383,7 +320,8 @@ def _nearest(witness: Witness, td: float, refusal: str, doubts: tuple[str, ...])
     return Seen(nearest, witness.source if nearest else None, refusal, doubts)
 
 
-def _spoken(source: str | None) -> str:
+def spoken(source: str | None) -> str:
+    """Words for a source."""
     return str(source).replace("-", " ")
 
 
@@ -395,17 +333,22 @@ def _confirmed(history: History, found: Sequence[tuple[str, FreeFlight]]) -> See
         return Seen(refusal=refusal)
     start, end, end_seen = best.start, best.end, best.end_seen
     doubts = []
-    room = max(_SAME * (end - start), _SAME_STATES * history.step)
+    room = same_within(history, start, end)
     for other, flight in found[1:]:
         if other not in _AGREEING or best.parts is not None:
             continue
         if abs(flight.start - best.start) > room or abs(flight.end - best.end) > room:
-            one, two = (f"{f.start:.6g} to {f.end:.6g} by the {_spoken(n)}" for n, f in (found[0], (other, flight)))
+            one, two = (f"{f.start:.6g} to {f.end:.6g} by the {spoken(n)}" for n, f in (found[0], (other, flight)))
             doubts.append(f"the flight lasts from {one}, from {two}; the later start and the earlier end count")
         if flight.end < end:
             end, end_seen = flight.end, flight.end_seen
         start = max(start, flight.start)
     return Seen(best._replace(start=start, end=end, end_seen=end_seen), source, doubts=tuple(doubts))
+
+
+def same_within(history: History, start: float, end: float) -> float:
+    """By how much two sources may differ that show the same flight [time]."""
+    return max(_SAME * (end - start), _SAME_STATES * history.step)
 
 
 def _driven(history: History, source: str, flight: FreeFlight) -> str | None:
@@ -420,7 +363,7 @@ def _driven(history: History, source: str, flight: FreeFlight) -> str | None:
     if work is None or energy is None or work <= MOST_WORK * max(energy, 0.0):
         return None
     return (
-        f"the {_spoken(source)} shows a flight from {flight.start:.6g} to {flight.end:.6g}, but there the "
+        f"the {spoken(source)} shows a flight from {flight.start:.6g} to {flight.end:.6g}, but there the "
         f"external work beyond gravity and damping is {work:.3g} at a mean energy of {energy:.3g}: it is driven"
     )
 

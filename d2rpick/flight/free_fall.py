@@ -55,6 +55,8 @@ _STRAIGHT = 0.01
 _UNSEEN = 2.0
 # What the work of gravity leaves open of the energies: samples are far apart, and a solver adds up by steps.
 _OF_WORK = 2e-3
+# A mass that is this much above all that momenta and kinetic energies show is written.
+_CLEARLY_HEAVIER = 1e-6
 # States that tell a work from none: twice the unknowns.
 _LEAST_STATES = 6
 
@@ -204,12 +206,35 @@ class Laws:
             return None if self._carried else 0.0
         if self._is_gravity(force / mass, _ALIKE + _REACH_OF_DIGITS * self.noise / (force * (end - start))):
             return None if self._slowed(window, vector) else force / mass
+        if self.velocity:  # what changes it is an acceleration already
+            return None
         found = None
         if self.balance is not None:
             found = acceleration_by_work(self.balance, self.fit.time, self.fit.momentum @ (vector / force), start, end)
         if found is None:
-            return float("nan") if self._may_fall and (self.velocity or np.isnan(mass)) else None
-        return found if self._is_gravity(found) or (self._may_fall and self.velocity and found > 0) else None
+            return float("nan") if self._may_fall and np.isnan(mass) else None
+        if self._is_gravity(found):
+            return found
+        return float("nan") if self._may_be_heavier(force, start, end) else None
+
+    def _may_be_heavier(self, force: float, start: float, end: float) -> bool:
+        """Whether a force may be that of gravity on more than the mass, of which the kinetic energy shows the least.
+
+        At the state that shows most mass, as much of the kinetic energy may belong to the vibration as the internal
+        energy swings by.
+        """
+        balance, squares = self.balance, np.sum(self.fit.momentum**2, axis=1)
+        if balance is None or balance.kinetic is None or balance.internal is None or self.velocity:
+            return False
+        kinetic = np.interp(self.fit.time, balance.time, balance.kinetic)
+        ratios = np.divide(squares, 2 * kinetic, out=np.zeros_like(squares), where=kinetic > 0)
+        best = int(np.argmax(ratios))
+        if self.mass > (1 + _CLEARLY_HEAVIER) * ratios[best]:
+            return False  # it is written
+        swing = float(np.ptp(balance.internal[window(balance.time, start, end)]))
+        largest = force / self.mass
+        least = largest * (1 - swing / float(kinetic[best]))
+        return any(least <= one <= largest for one in _gravities_near(largest, self.gravities))
 
     def _slowed(self, window: tuple[int, int], force: Samples) -> bool:
         """Whether a constant force (3,) is rather friction than gravity: all it does is to slow down.

@@ -190,23 +190,28 @@ _ALIKE: Final = 0.75
 _TO_ZERO, _HARDLY = 0.05, 1e-3
 
 
-def settled_from(time: Samples, energy: Samples, whole: Samples | None, start: float, end: float) -> float | None:
+def settled_from(
+    time: Samples, energy: Samples, damped: Samples | None, start: float, end: float, unseen: float = 0.0
+) -> float | None:
     """Give the time in a window from which an internal energy keeps its level; None where it drifts to the end.
 
     Parameters
     ----------
     time, energy : array of shape (n,)
-    whole : array of shape (n,), or None
-        Kinetic and internal energy together: what damping takes of them, the level may lose.  None where unknown: then
-        it may fall by any amount.
+    damped : array of shape (k, n), or None
+        Energies that damping lowers, each a measure of what it has taken: the level may fall by as much as one of them
+        does.  None where there is none: then it may fall by any amount.
     start, end : float
         [time]
+    unseen : float
+        What the digits of these energies leave open: the level may fall by it as well [energy].
     """
     inside = window(time, start, end)
     least = _ROUND_OFF * float(np.abs(energy).max(initial=0.0))
     first, last = inside.start, inside.stop
     while last - first >= FEWEST:
-        states = energy[first:last], None if whole is None else whole[first:last], least
+        lost = np.full(last - first, np.inf) if damped is None else _still_lost(damped[:, first:last]) + unseen
+        states = energy[first:last], lost, least
         kept = 0 if _swings(*states) else _kept_from(*states)
         if kept is not None:
             return start if first + kept == inside.start else float(time[first + kept])
@@ -214,31 +219,40 @@ def settled_from(time: Samples, energy: Samples, whole: Samples | None, start: f
     return None
 
 
-def _kept_from(energy: Samples, whole: Samples | None, least: float) -> int | None:
-    """First state from which an energy keeps the level of its last quarter; None where that drifts."""
+def _still_lost(damped: Samples) -> Samples:
+    """What damping takes from each state up to the mean of the last quarter, by the energy that falls most, (n,)."""
+    last = 3 * damped.shape[1] // 4
+    fallen = damped - damped[:, last:].mean(axis=1, keepdims=True)
+    return np.asarray(fallen.max(axis=0, initial=0.0))
+
+
+def _kept_from(energy: Samples, lost: Samples, least: float) -> int | None:
+    """First state from which an energy keeps the level of its last quarter; None where that drifts.
+
+    What is still ``lost`` after each state (n,), infinite where it is unknown, may lie above that level.
+    """
     half, last = energy.size // 2, 3 * energy.size // 4
     low, high = float(energy[last:].min()), float(energy[last:].max())
     width = max(high - low, least)
-    lost = np.full(energy.size, np.inf) if whole is None else np.maximum(whole - whole[last:].mean(), 0.0)
     drift = float(energy[last:].mean() - energy[half:last].mean())
     if abs(drift) > _DRIFT * width + (float(lost[half:last].mean()) if drift < 0 else 0.0):
         return None
-    below = low - _RESERVE * width - (0.0 if whole is None else lost[:last])
+    below = low - _RESERVE * width - np.where(np.isinf(lost), 0.0, lost)[:last]
     outside = np.flatnonzero((energy[:last] < below) | (energy[:last] > high + _RESERVE * width + lost[:last]))
     return int(outside[-1]) + 1 if outside.size else 0
 
 
-def _swings(energy: Samples, whole: Samples | None, least: float) -> bool:
+def _swings(energy: Samples, lost: Samples, least: float) -> bool:
     """Whether an energy swings slowly about one level: to and fro by half of its range, alike in both halves."""
     width = float(np.ptp(energy))
     if width <= least:
         return True
     one, two = np.array_split(energy, 2)
-    lost = 0.0 if whole is None else max(0.0, float(whole[0] - whole[-1]))
+    taken = 0.0 if np.isinf(lost[0]) else float(lost[0] - lost[-1])
     drift = float(two.mean() - one.mean())
-    if abs(drift) > _DRIFT * _ALIKE * width + (lost if drift < 0 else 0.0):
+    if abs(drift) > _DRIFT * _ALIKE * width + (taken if drift < 0 else 0.0):
         return False
-    if min(np.ptp(one), np.ptp(two)) < _ALIKE * width - lost:
+    if min(np.ptp(one), np.ptp(two)) < _ALIKE * width - taken:
         return False
     return _large_swings(energy, width / 2) >= _SWINGS
 

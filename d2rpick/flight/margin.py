@@ -10,19 +10,29 @@ from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.samples import window
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from d2rpick.flight.flight import Flight
-    from d2rpick.histories.history import History, Samples
+    from d2rpick.histories.history import History, Momenta, Samples
 
 # Share of the flight that is always kept clear [-].  Landings of 36 computed runs (a car-like structure, a box with a
 # block inside, OpenRadioss) moved by up to 1.1 % and 2.5 % of the flight before them.
 SHARE: Final = 0.03
+# Fewest states that a force is looked for in.
+_FEWEST: Final = 3
+
+
+# A contact whose force stays below this share of the largest on the body is a grazing one: the surfaces move along each
+# other, so that the body reaches it much earlier if it is a little out of place.
+_GRAZING: Final = 0.01
 
 
 class Margin(NamedTuple):
     """Time kept clear before a contact [time], and what it comes from.
 
-    ``source``: "given", "flight" (3 % of it), "landing" (how far a switch may move it) or "no-contact".  ``spread`` is
-    how far a switch may move the landing [time], None where the files do not tell.
+    ``source``: "given", "flight" (3 % of it), "landing" (how far a switch may move it), "grazing" (the same if the body
+    only grazes it) or "no-contact".  ``spread`` is how far a switch may move the landing [time], None where the files
+    do not tell.
     """
 
     time: float
@@ -30,19 +40,83 @@ class Margin(NamedTuple):
     spread: float | None = None
 
 
-def margin_before_contact(history: History, flight: Flight, given: float | None = None) -> Margin:
-    """Give the margin before the contact that ends a flight: the one given, else 3 % of the flight or `landing_spread`.
+def margin_before_contact(
+    history: History, flight: Flight, given: float | None = None, place: float | None = None
+) -> Margin:
+    """Give the margin before the contact that ends a flight: the one given, else the time by which it may come earlier.
 
-    The larger of the two counts; where no contact is seen nothing has to be kept clear.
+    At least 3 % of the flight is kept; where no contact is seen nothing has to be kept clear.
+
+    Parameters
+    ----------
+    history : History
+    flight : Flight
+    given : float, optional
+        [time]
+    place : float, optional
+        How far the body may be out of place at the contact [length], see `landing_moves`.
     """
     if given is not None:
         return Margin(given, "given")
     if flight.end is None or flight.start is None:
         return Margin(0.0, "no-contact")
-    share, spread = SHARE * (flight.end - flight.start), landing_spread(history, flight)
-    if spread is not None and spread > share:
-        return Margin(spread, "landing", spread)
-    return Margin(share, "flight", spread)
+    share, spread = SHARE * (flight.end - flight.start), landing_moves(history, flight, place)
+    kept = Margin(share, "flight", spread) if spread is None or spread <= share else Margin(spread, "landing", spread)
+    if not grazes(history, flight, kept.time):
+        return kept
+    earlier = grazing_moves(history, flight, place)
+    return kept if earlier is None or earlier <= kept.time else Margin(earlier, "grazing", earlier)
+
+
+def landing_moves(history: History, flight: Flight, place: float | None) -> float | None:
+    """Tell how far a switch may move the next landing: by its velocity error and by the place error of the body.
+
+    A body that is out of place by ``place`` [length] reaches the contact earlier by that over the speed at which it
+    moves towards the ground then.  None where neither is known [time].
+    """
+    spread, speed = landing_spread(history, flight), _closing_speed(history, flight)
+    if place is None or speed is None:
+        return spread
+    out_of_place = place / speed if speed > 0 else float("inf")
+    return out_of_place if spread is None else spread + out_of_place
+
+
+def grazing_moves(history: History, flight: Flight, place: float | None) -> float | None:
+    r"""Tell how much earlier a grazing contact may come [time]; infinite without gravity, None if no error is known.
+
+    Where surfaces move along each other their closing speed is next to nothing, and gravity g alone opens a gap of
+    ``place`` and of the amplitude of the vibration: in :math:`\sqrt{2 e / g}`.
+    """
+    spread, speed = landing_spread(history, flight), _closing_speed(history, flight)
+    amplitude = None if spread is None or speed is None or np.isinf(spread) else spread * speed
+    if place is None and amplitude is None:
+        return None
+    error = (place or 0.0) + (amplitude or 0.0)
+    gravity = flight.gravity if np.isfinite(flight.gravity) else 0.0
+    if gravity <= 0:
+        return float("inf") if error > 0 else 0.0
+    return float(np.sqrt(2 * error / gravity))
+
+
+def grazes(history: History, flight: Flight, within: float) -> bool:
+    """Whether the contact that ends a flight stays below a hundredth of the largest force for a time ``within`` it.
+
+    False where the record ends before that, or momenta do not show the force [time].
+    """
+    seen = _of_flight(history, flight)
+    if seen is None or flight.end is None:
+        return False
+    from d2rpick.flight.free_fall import FreeFall
+
+    momenta, members = seen
+    time, momentum = momenta.time, momenta.of(members)
+    inside = window(time, *flight.within(time))
+    after = window(time, flight.end, flight.end + within)
+    if time[inside].size < _FEWEST or time[after].size < _FEWEST or time[-1] <= flight.end + within:
+        return False
+    gravity = FreeFall(time[inside], momentum[inside]).gravity()
+    force = np.linalg.norm(np.gradient(momentum, time, axis=0) - gravity, axis=1)
+    return bool(force[after].max() < _GRAZING * force.max())
 
 
 def landing_spread(history: History, flight: Flight) -> float | None:
@@ -111,19 +185,41 @@ def energy_of_approach(history: History, flight: Flight) -> float | None:
 
 def _momentum(history: History, flight: Flight) -> Samples | None:
     """Momentum of what flies during the flight, shape (k, 3 or 1); None where others move too, or none is written."""
+    seen = _of_flight(history, flight)
+    if seen is None:
+        return None
+    momenta, members = seen
+    moving = np.ptp(momenta.values, axis=0).any(axis=1)
+    if set(np.flatnonzero(moving).tolist()) - set(members):
+        return None
+    values = momenta.of(members)[window(momenta.time, *flight.within(momenta.time))]
+    return values if len(values) > 1 else None
+
+
+def _of_flight(history: History, flight: Flight) -> tuple[Momenta, Sequence[int]] | None:
+    """Momenta that show what flies, and the places of it in them; None where none is written."""
     for momenta in history.momenta:
         if (momenta.parts is None) != (flight.parts is None):
             continue
-        moving = np.ptp(momenta.values, axis=0).any(axis=1)
-        members = range(moving.size)
-        if momenta.parts is not None and flight.parts is not None:
-            flying = {part.id for part in flight.parts}
-            members = [i for i, part in enumerate(momenta.parts) if part.id in flying]  # type: ignore[assignment]
-        if set(np.flatnonzero(moving).tolist()) - set(members):
-            return None
-        values = momenta.of(members)[window(momenta.time, *flight.within(momenta.time))]
-        return values if len(values) > 1 else None
+        if momenta.parts is None or flight.parts is None:
+            return momenta, range(momenta.values.shape[1])
+        flying = {part.id for part in flight.parts}
+        return momenta, [i for i, part in enumerate(momenta.parts) if part.id in flying]
     return None
+
+
+def _closing_speed(history: History, flight: Flight) -> float | None:
+    """Speed along gravity, without it of the whole motion, at the end of a flight [length/time]; None if unknown."""
+    seen = _of_flight(history, flight)
+    if seen is None:
+        return None
+    momenta, members = seen
+    momentum = momenta.of(members)[window(momenta.time, *flight.within(momenta.time))]
+    mass = 1.0 if momenta.velocity else momenta.mass(members)
+    if len(momentum) < 2 or not mass > 0:
+        return None
+    size = float(np.linalg.norm(momentum[-1])) / mass
+    return size * float(np.sqrt(_towards_ground(momentum)))
 
 
 def _towards_ground(momentum: Samples) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError
 from d2rpick.flight.free_fall import Laws
-from d2rpick.flight.window import FEWEST, TOLERANCE, FreeFlight, all_windows, unheld
+from d2rpick.flight.window import FEWEST, TOLERANCE, FreeFlight, all_windows, lasting_window, moments, unheld
 from d2rpick.histories.samples import bent, stretches, window
 
 if TYPE_CHECKING:
@@ -312,7 +312,35 @@ def flying_together(run: Run) -> tuple[Part, ...]:
             if not any(part in (flight.parts or ()) for flight in found):
                 found += all_flights(momenta.choosing((place,)))
         found += all_flights(momenta)
+        for core in _cores(momenta):
+            found += all_flights(momenta.choosing(core, core))
     return _heaviest(run, deformable, momenta, found)
+
+
+def _cores(momenta: Momenta) -> Iterator[tuple[int, ...]]:
+    """Give sets that hang on the heaviest part at some time, without what slides then.
+
+    What moves straight, as a loose wheel does that slides, bends no sum, so that it may pass for a part of the body.
+    """
+    masses = momenta.masses
+    places = [i for i in momenta.chosen if masses is not None and masses[i] > 0]
+    if masses is None or not places:
+        return
+    heaviest = max(places, key=lambda i: float(masses[i]))
+    found: set[tuple[int, ...]] = set()
+    for td in moments(momenta.time):
+        attached = _attached(momenta, (heaviest,), td)
+        core = tuple(sorted((heaviest, *(i for i in attached if not _slides(momenta, i, td)))))
+        if len(core) <= len(attached) and core not in found:  # with all of them it was tried before
+            found.add(core)
+            yield core
+
+
+def _slides(momenta: Momenta, part: int, td: float) -> bool:
+    """Whether a part is seen to move under a constant force around ``td`` [time] that is not gravity."""
+    laws = laws_of(momenta, (part,))
+    straight = lasting_window(laws.fit, td, laws.extent, laws.noise, fades=True)
+    return straight is not None and flight_of(momenta, (part,), td) is None
 
 
 def _with_momenta(run: Run) -> tuple[tuple[Part, ...], Momenta | None]:

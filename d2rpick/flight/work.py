@@ -15,9 +15,9 @@ from d2rpick.flight.window import FEWEST, Constant, FreeFlight, Law, lasting_win
 from d2rpick.histories.samples import integral, window
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
-    from d2rpick.histories.history import Balance, Samples
+    from d2rpick.histories.history import Balance, Momenta, Samples
 
 
 # States from which a load can be told from gravity and damping: twice the unknowns.
@@ -33,6 +33,9 @@ _SLOW: Final = 1e-2
 _MASS_ERROR: Final = 2.0
 # What deviates by less than the tolerance of this share of the range of the internal energy shows no work.
 _OF_INTERNAL: Final = 0.1
+# Of a sum of energies less the work of gravity so many times the relative error of a printed number is open: energies,
+# momenta and the mass that was found from both are rounded, the mass at the state at which that shows most.
+_OF_DIGITS: Final = 4
 # Momentum changes by half the share of the kinetic energy that is gained or lost along the motion.  A loss of this much
 # of it is told from that by friction.
 _LITTLE, _MUCH = 5e-3, 0.5
@@ -151,6 +154,66 @@ def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
     return FreeFlight.of(time, found, gravity=_unexplained(balance, *found) or (np.nan if rings else 0.0))
 
 
+def lowered_by_damping(balance: Balance, flight: FreeFlight, momenta: Momenta | None) -> tuple[list[Samples], float]:
+    """Give energies (n,) of a balance that damping lowers in a flight, and what their digits leave open [energy].
+
+    The first is the sum of kinetic and internal energy; none is given where a load of unknown size works on it, too.
+
+    Under gravity that sum grows as the body falls, so that it hides what damping takes: what is left of it without the
+    work of gravity, and the damping energy where it is written, show that.  ``momenta`` are those that show the flight,
+    and their gravity.
+    """
+    whole = balance.kinetic_and_internal
+    assert whole is not None
+    work = balance.worked
+    if momenta is not None and work is None and np.isnan(flight.gravity):
+        return [], 0.0
+    if momenta is not None and work is None and flight.gravity:
+        work = _work_of_gravity(balance, flight, momenta)
+    sums = [whole]
+    sums += [] if balance.damping is None else [-balance.damping]
+    sums += [] if work is None or not flight.gravity else [whole - work]
+    largest = float(np.abs(whole[window(balance.time, flight.start, flight.end)]).max(initial=0.0))
+    return sums, _OF_DIGITS * balance.precision.noise(np.ones(1)) * largest
+
+
+def _work_of_gravity(balance: Balance, flight: FreeFlight, momenta: Momenta) -> Samples:
+    """Work of gravity since the first state (n,), by the momentum of the model that it changes [energy].
+
+    Of a velocity the mass is the largest that moves so at the kinetic energy that is written.
+    """
+    from d2rpick.flight.free_fall import FreeFall
+
+    time, momentum = momenta.time, momenta.of((0,))
+    inside = window(time, flight.start, flight.end)
+    force = FreeFall(time[inside], momentum[inside]).gravity()
+    along = momentum @ force / np.linalg.norm(force)
+    if momenta.velocity and balance.kinetic is not None:
+        along *= _most_gravity(momentum, np.interp(time, balance.time, balance.kinetic)) / _MASS_ERROR
+    return np.interp(balance.time, time, flight.gravity * integral(time, along))
+
+
+def taken_by_damping(
+    balance: Balance, start: float, end: float, vibration: Callable[[Samples], Samples], alpha: float | None
+) -> bool | None:
+    r"""Whether kinetic and internal energy together change between two times [time] as a vibration is damped.
+
+    Damping within the body takes energy of the vibration alone, whose energy V(t) ``vibration`` gives:
+    :math:`K + E - V` is constant.  Damping proportional to mass takes the motion of the body as well, at the rate
+    ``alpha`` of its vibration [1/time]: :math:`K + E + 2 \alpha \int K dt` is constant.  Nothing is fitted, so that
+    no load is taken for either (docs/choosing.md, "Energies that look like flight").  None where an energy is missing.
+    """
+    inside = window(balance.time, start, end)
+    whole, kinetic, time = balance.kinetic_and_internal, balance.kinetic, balance.time[inside]
+    if whole is None or kinetic is None or not time.size:
+        return None
+    of_vibration = vibration(time)
+    changes = [float(np.ptp(whole[inside] - of_vibration))]
+    if alpha is not None:
+        changes.append(float(np.ptp(whole[inside] + 2 * alpha * integral(time, kinetic[inside]))))
+    return min(changes) <= _LITTLE * float((kinetic[inside] - of_vibration).max())
+
+
 def _unexplained(balance: Balance, first: int, last: int) -> float:
     """What stands for gravity in a window: 0 where energies change by nothing or damping alone, else of unknown size.
 
@@ -240,4 +303,4 @@ def plateau_around(balance: Balance, td: float) -> FreeFlight | None:
     states = lasting_window(law, td, float(np.ptp(energy)), balance.precision.noise(energy))
     if states is None or (states[0] == 0 and balance.external_work is None):
         return None
-    return FreeFlight.of(time, states)
+    return FreeFlight.of(time, states, gravity=_unexplained(balance, *states))

@@ -30,10 +30,14 @@ _QUANTITIES: Final[Mapping[str, str]] = {
     "total": "total_energy",
     "ratio": "energy_ratio",
     "eroded": "eroded_internal_energy",
+    "damping": "damping_energy",
 }
+# Abaqus' total energy is what is left of all energies without the external work: it stays as it is at the start.
+_LESS_WORK: Final = frozenset({"etotal", "allwk"})
 # Without one of these nothing can be said of the health.
-_JUDGED: Final = frozenset(_QUANTITIES.values()) - {"kinetic_energy", "frictional_contact_energy"}
+_JUDGED: Final = frozenset(_QUANTITIES.values()) - {"kinetic_energy", "frictional_contact_energy", "damping_energy"}
 # Normalised names.
+_WALLS: Final = ("stonewallenergy", "rigidwallenergy")
 _GLOBAL_VELOCITIES: Final = ("globalxvelocity", "globalyvelocity", "globalzvelocity")
 _MOMENTA: Final = ("x_momentum", "y_momentum", "z_momentum")
 _VELOCITIES: Final = ("x_velocity", "y_velocity", "z_velocity")
@@ -102,6 +106,11 @@ def _terms(whole: Legs, until: float) -> Balance | None:
     rotation = columns.called(ROTATION_ENERGY)
     if rotation is not None and found["kinetic"] is not None:
         found["kinetic"] = found["kinetic"] + rotation
+    walls = (columns.called(name) for name in _WALLS)
+    found["wall"] = next((energy for energy in walls if energy is not None), None)
+    total, work = found["total"], found["external_work"]
+    if total is not None and work is not None and _LESS_WORK.issubset(map(normalised, columns.used)):
+        found["total"] = total + work
     return Balance(
         time=whole.time[: columns.states],
         internal=columns.internal(),

@@ -173,13 +173,11 @@ class Track(NamedTuple):
 class Balance:
     """Energies of the whole model at ``time``, arrays of shape (n,); None for what the files do not have.
 
-    ``sliding`` is the energy of all contacts, ``friction`` what of it is friction where that is told apart,
-    ``external_work`` that of gravity and every other load, ``total`` the sum that the solver keeps and ``ratio`` that
-    sum over what it should be: the energy at the start and the external work.  ``eroded`` is the internal energy of
-    elements that were deleted.  ``artificial`` is what Abaqus spends against hourglassing, a part of ``internal``;
-    ``hourglass`` is beside it.  ``velocity`` (n, 3) is that of the centre of mass, up to a factor.
-    ``hourglass_of_parts`` gives the highest hourglass and the highest internal energy of parts.  ``precision`` tells
-    how finely the energies were printed.
+    ``sliding`` is the energy of contacts, ``friction`` its share by friction, ``damping`` and ``wall`` what damping and
+    rigid walls have taken, ``external_work`` that of all loads, ``total`` the sum that the solver keeps, ``ratio`` that
+    sum over initial energy and external work, ``eroded`` that of deleted elements.  ``artificial`` is what Abaqus
+    spends against hourglassing, a part of ``internal``; ``hourglass`` is beside it.  ``velocity`` (n, 3) is that of the
+    centre of mass, up to a factor, ``hourglass_of_parts`` their highest hourglass and internal energy.
     """
 
     time: Samples
@@ -193,6 +191,8 @@ class Balance:
     total: Samples | None = None
     ratio: Samples | None = None
     eroded: Samples | None = None
+    damping: Samples | None = None
+    wall: Samples | None = None
     velocity: Samples | None = None
     hourglass_of_parts: tuple[tuple[Part, float, float], ...] = ()
     precision: Precision = EXACT

@@ -125,6 +125,27 @@ def test_a_ratio_is_not_judged_where_the_run_has_hardly_any_energy_yet() -> None
     assert "energy-ratio" not in warned(replace(HEALTHY, total=total, ratio=ratio))
 
 
+def test_the_ratio_counts_what_damping_and_walls_have_taken_and_the_total_that_is_written() -> None:
+    taken = 10 * TIME
+    damped = replace(HEALTHY, kinetic=sure(HEALTHY.kinetic) - taken, total=None, ratio=None)
+    assert "energy-ratio" in warned(damped)
+    whole = assess(HEALTHY, WINDOW)
+    for term in ("damping", "wall"):
+        health = assess(replace(damped, **{term: taken}), WINDOW)  # type: ignore[arg-type]
+        assert health.energy_ratio_min == pytest.approx(whole.energy_ratio_min)
+    total = 50 + sure(HEALTHY.external_work)
+    written = assess(replace(damped, total=total), WINDOW)
+    assert (written.energy_ratio_min, written.energy_ratio_max) == pytest.approx((1.0, 1.0))
+
+
+def test_the_total_energy_of_abaqus_is_without_the_external_work(tmp_path: Path) -> None:
+    rows = [f"{time},{5 + time},{3 + 2 * time},{3 * time},8" for time in range(5)]
+    path = put(tmp_path / "abaqus.csv", "\n".join(["time,ALLIE,ALLKE,ALLWK,ETOTAL", *rows]).encode())
+    run_of = open_run([str(path)])
+    health = assess(sure(balance_of(run_of.databases, None)))
+    assert (health.energy_ratio_min, health.energy_ratio_max) == (1.0, 1.0)
+
+
 def test_damping_that_counts_as_external_work_is_no_load() -> None:
     fall = 4 * np.exp(-3 * TIME) - 2  # of v' = g - 3 v with g = -6
     velocity = np.stack([np.exp(-3 * TIME), 0 * TIME, fall], axis=1)

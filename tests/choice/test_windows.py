@@ -2,6 +2,7 @@
 
 import csv
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from d2rpick.choice.windows import (
     error_profile,
 )
 from d2rpick.flight.flight import Flight
-from d2rpick.flight.margin import SHARE, landing_spread, margin_before_contact
+from d2rpick.flight.margin import SHARE, grazes, landing_moves, landing_spread, margin_before_contact
 from d2rpick.histories.history import EXACT, Balance, Given, History, Momenta, Samples
 from d2rpick.histories.opening import Selection
 from d2rpick.vibration.modes import Mode, Modes
@@ -46,7 +47,8 @@ def flying_oscillator(
     kinetic = mass * velocity**2 / 2 + mass * (omega * amplitude) ** 2 / 2 - internal
     momentum = np.stack([0 * time, 0 * time, -mass * velocity], axis=1)[:, np.newaxis]
     balance = Balance(time, internal=internal, kinetic=kinetic)
-    evidence = Given((Momenta(time, momentum, None, EXACT, (0,)),), balance)
+    whole = Momenta(time, momentum, None, EXACT, (0,), masses=np.array([mass]))
+    evidence = Given((whole,), balance)
     history = History(time, internal, source=("test",), format="csv", channel="E", evidence=evidence)
     return history, Flight(0.0, float(time[-1]), "momentum")
 
@@ -75,6 +77,63 @@ def test_without_a_contact_or_energies_nothing_is_made_up() -> None:
     assert margin_before_contact(history, flight._replace(end=None)) == (0.0, "no-contact", None)
     bare = of(history.energy, history.time)
     assert margin_before_contact(bare, flight) == (SHARE * history.time[-1], "flight", None)
+
+
+@given(st.floats(0.001, 0.05), positive)
+def test_a_body_out_of_place_reaches_the_contact_earlier_by_that_over_the_closing_speed(
+    place: float, speed: float
+) -> None:
+    history, flight = flying_oscillator(10.0, 1e-4 * speed, speed, 2.0)
+    spread = sure(landing_spread(history, flight))
+    assert landing_moves(history, flight, place) == pytest.approx(spread + place / speed, rel=1e-6)
+    assert landing_moves(history, flight, None) == spread
+    kept = margin_before_contact(history, flight, place=place)
+    assert kept.time == max(SHARE * sure(flight.end), sure(kept.spread))
+
+
+def touching(force: float) -> tuple[History, Flight]:
+    """A body of 2 that vibrates, is pushed by 2000, flies from 0.1 to 0.6 and is then touched with so much force."""
+    time = np.linspace(0.0, 1.0, 2001)
+    push = np.where(time < 0.1, 2000.0, np.where(time > 0.6, force, 0.0))
+    momentum = np.zeros((time.size, 1, 3))
+    momentum[:, 0, 0] = np.concatenate([[0.0], np.cumsum((push[1:] + push[:-1]) / 2) * time[1]])
+    momentum[:, 0, 2] = -2 * 9.81 * time
+    internal = 0.01 * np.sin(60 * time) ** 2
+    kinetic = (momentum[:, 0] ** 2).sum(axis=1) / 4 + 0.01 - internal
+    whole = Momenta(time, momentum, None, EXACT, (0,), masses=np.array([2.0]))
+    history = of(internal, time)
+    evidence = Given((whole,), Balance(time, internal=internal, kinetic=kinetic))
+    return replace(history, evidence=evidence), Flight(0.1, 0.6, "momentum", gravity=9.81)
+
+
+@pytest.mark.parametrize(("force", "grazed"), [(0.5, True), (19.0, True), (30.0, False), (3000.0, False)])
+def test_a_contact_below_a_hundredth_of_the_largest_force_is_a_grazing_one(force: float, grazed: bool) -> None:
+    history, flight = touching(force)
+    margin = margin_before_contact(history, flight, place=0.02)
+    assert grazes(history, flight, 0.02) is grazed
+    assert (margin.source == "grazing") is grazed
+    if grazed:  # gravity alone opens a gap of 20 mm, and of the vibration, in that time
+        assert margin.time >= np.sqrt(2 * 0.02 / 9.81)
+        assert margin.time == pytest.approx(np.sqrt(2 * 0.02 / 9.81), rel=0.1)
+
+
+def test_a_grazing_contact_without_gravity_leaves_no_td() -> None:
+    history, flight = touching(0.5)
+    assert margin_before_contact(history, flight._replace(gravity=0.0), place=0.02).time == np.inf
+
+
+def test_where_no_force_is_known_no_contact_grazes() -> None:
+    history, flight = touching(0.5)
+    assert not grazes(of(history.energy, history.time), flight, 0.02)
+    assert not grazes(history, flight._replace(end=0.99), 0.02)  # the record ends too early
+
+
+def test_a_grazing_contact_is_said_and_td_keeps_clear_of_it() -> None:
+    history, _ = touching(0.5)
+    answer = suggest(history, 0.59, Settings())
+    told = {one.code: one.message for one in answer.cautions}
+    assert "stays below 1 % of the largest one" in told["grazing-contact"]
+    assert "grazing-contact" not in {one.code for one in suggest(touching(3000.0)[0], 0.59, Settings()).cautions}
 
 
 def landings(name: str, column: str) -> Iterator[tuple[str, float]]:

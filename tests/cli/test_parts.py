@@ -98,7 +98,7 @@ def test_an_oscillator_does_not_overrule_a_momentum_that_shows_no_flight() -> No
     assert "no-free-flight" not in {c.code for c in cautions_of(examine(plain, 0.0687, Settings()))}
     given = examine(history, 0.0687, Settings(after=0.001))
     assert given.in_flight
-    assert "no-free-flight" in {c.code for c in cautions_of(given)}
+    assert "flight-sources-disagree" in {c.code for c in cautions_of(given)}
 
 
 def test_where_nothing_can_be_chosen_the_table_says_so(tmp_path: Path) -> None:

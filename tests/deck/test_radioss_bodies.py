@@ -124,6 +124,32 @@ def test_a_body_that_the_deck_has_is_taken(tmp_path: Path) -> None:
     assert "part 3" in found.notes[0]
 
 
+@pytest.mark.parametrize("held", [(1,), (1, 2, 3, 4)])
+def test_a_body_that_is_never_rigid_gives_its_nodes_to_the_new_one(tmp_path: Path, held: tuple[int, ...]) -> None:
+    """A set of parts can be written whatever bodies the deck has for other sets, if its run never puts these on."""
+    main = deck(tmp_path / "deck", group(70, *held, kind="PART") + BODY, ENGINE + "/RBODY/OFF\n99\n")
+    found = bodies_for(main, (1, 2, 4))
+    assert (found.nodes, found.replaced) == ((100,), (99,))
+    assert "/RBODY 7, which every leg of the run keeps off, has to go" in found.notes[-1]
+    printing = Printing(node=found.nodes, end=0.4, name="box", starter=found.cards, replaced=found.replaced)
+    name = write_deck(main, cards([(0.1, 0.2)], printing, "radioss"), str(tmp_path / "next"))[0]
+    starter_of_copy = read_run(name).starter
+    assert starter_of_copy
+    assert [body.id for body in starter_of_copy.bodies] == [8]
+    checked = check_deck(name)
+    assert not checked.findings
+    assert {window.part for window in checked.windows} == {1, 2, 4}
+    assert "99" not in (tmp_path / "next" / "box_0001.rad").read_text().split()
+
+
+def test_a_body_that_is_rigid_at_some_time_stays(tmp_path: Path) -> None:
+    engine = ENGINE + "/RBODY/OFF\n99\n"
+    main = deck(tmp_path, group(70, 1, kind="PART") + BODY, engine)
+    (tmp_path / "box_0002.rad").write_text(ENGINE.replace("box/1", "box/2") + "/RBODY/ON\n99\n")
+    with pytest.raises(DeckError, match="not these parts alone and whole"):
+        bodies_for(main, (1, 2, 4))
+
+
 @pytest.mark.parametrize(
     ("more", "message"),
     [

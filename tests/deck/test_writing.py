@@ -154,6 +154,20 @@ def test_legs_are_named_after_the_files_of_the_run_by_which_the_engine_finds_its
     refused(main, card, "the cards are for run 'other', the run is 'box'")
 
 
+def test_a_run_of_several_legs_alike_is_cut_anew_at_the_switches(tmp_path: Path) -> None:
+    """A later leg may leave out keywords of the first, as velocities at the start, but has none of its own."""
+    card = cards(WINDOWS, Printing(node=(1808,), end=0.8, name="box"), "radioss")
+    ref = radioss_run(tmp_path / "ref")
+    (tmp_path / "ref" / "box_0002.rad").write_text("/RUN/box/2\n 0.8\n/VERS/2022\n/TFILE/4\n1e-5\n")
+    starter, *legs = write_deck(ref, card, str(tmp_path / "next"))
+    assert [leg.stop.value for leg in read_run(starter).legs] == [*(time for window in WINDOWS for time in window), 0.8]
+    assert all("/TFILE/4\n1e-5\n" in Path(leg).read_text() for leg in legs)
+    for added in ("/RBODY/ON\n1808\n", "/DT\n0.5 0.0\n", "/TFILE/4\n1e-4\n"):
+        (tmp_path / "ref" / "box_0002.rad").write_text("/RUN/box/2\n 0.8\n/VERS/2022\n" + added)
+        with pytest.raises(DeckError, match=r"box_0002\.rad: /.* is not in the first engine file"):
+            write_deck(ref, card, str(tmp_path / "other"))
+
+
 def test_bodies_that_the_run_keeps_off_stay_off_in_every_leg(tmp_path: Path) -> None:
     """Else they would be rigid from time 0: the loose wheels of a car whose body alone is switched."""
     engine = ENGINE.replace("1808\n", "1808 1809\n1810\n") + "/END\nleft over\n"

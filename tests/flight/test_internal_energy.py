@@ -1,6 +1,7 @@
 """No flight is claimed where forces act: walls that do no work, loads that fade, friction, supports, other bodies."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,12 +17,14 @@ from d2rpick.flight.momentum import bodies_apart, flight_around
 from d2rpick.histories.history import EXACT, Balance, History, Momenta, Precision, Samples
 from d2rpick.histories.names import Part
 from d2rpick.histories.samples import integral
-from tests.benchmarks import flights as campaign
+from tests.benchmarks import falls, flights as campaign
 from tests.energies import sure
 from tests.records import printed, table
+from tests.written_runs import FALL_WRITERS
 
 PLAIN = Settings(replay=False)
 TIME = np.linspace(0.0, 1.0, 1001)
+ZERO = np.zeros(TIME.size)
 PARTS = (Part(1, "body"), Part(2, "other"))
 
 
@@ -125,6 +128,35 @@ def test_a_constant_force_is_gravity_only_if_it_is_as_large(acceleration: float,
     assert flight_around(momenta(push - mass * 9.81 * TIME, masses=(mass,)), 0.6)
 
 
+@pytest.mark.parametrize("acceleration", [0.1, 0.4, 1.0, 1.62, 3.71, 5.0, 8.87, 15.0, 20.0])
+@pytest.mark.parametrize("falling", [False, True])
+def test_a_velocity_of_the_model_shows_no_gravity_but_that_of_earth(acceleration: float, falling: bool) -> None:
+    """Friction and other planets: kinetic energy follows any constant force, so the acceleration itself decides."""
+    assert not flights_of(accelerated(acceleration if falling else -acceleration), PLAIN)
+    assert flights_of(accelerated(9.81), PLAIN)
+
+
+def accelerated(acceleration: float) -> History:
+    """Velocity and energies of a model of 10 that is accelerated, in a glstat with six digits."""
+    velocity = np.zeros((TIME.size, 1, 3))
+    velocity[:, 0, 0] = 30 + acceleration * TIME
+    velocity = printed(velocity.ravel()).reshape(velocity.shape)
+    ringing = 10 * np.sin(90 * TIME) ** 2
+    kinetic = printed(5 * (30 + acceleration * TIME) ** 2 + 10 - ringing)
+    energies = Balance(TIME, ringing, kinetic, velocity=velocity[:, 0], precision=Precision(6))
+    whole = Momenta(TIME, velocity, None, Precision(6), (0,), masses=np.array([np.nan]), velocity=True)
+    return table(TIME, ringing, whole, balance=energies)
+
+
+def test_a_constant_force_on_an_unknown_mass_makes_a_pair_poor() -> None:
+    """Without the mass and without energies nothing shows whether the force is gravity."""
+    falling = momenta(200 - 50 * TIME - 100 * np.exp(-TIME / 0.02), masses=(np.nan,))
+    whole = Momenta(TIME, falling.values, None, EXACT, (0,), masses=np.array([np.nan]))
+    answer = suggest(table(TIME, 5 + 5 * np.sin(60 * TIME) ** 2, whole), 0.8, Settings())
+    assert sure(answer.quality).grade == "poor"
+    assert "gravity-assumed" in {caution.code for caution in answer.cautions}
+
+
 def test_what_is_carried_does_not_fly_and_does_not_hide_what_falls() -> None:
     falling = np.where(TIME < 0.1, -2e3 * TIME, -200 - 40 * 9.81 * (TIME - 0.1))
     carried = 30 + 20 * np.sin(np.minimum(TIME, 0.3) * 40)
@@ -180,17 +212,19 @@ def test_a_spring_to_ground_does_not_fly(kept: float) -> None:
 
 def test_a_level_is_kept_by_a_vibration_and_by_one_that_damping_takes_but_not_by_a_drift() -> None:
     ringing = np.sin(200 * TIME) ** 2
-    assert settled_from(TIME, 5 + ringing, 50 + 0 * TIME, 0.0, 1.0) == 0.0
+    assert settled_from(TIME, 5 + ringing, 50 + 0 * TIME[np.newaxis], 0.0, 1.0) == 0.0
     lost = np.exp(-4 * TIME)
-    assert settled_from(TIME, 2 * lost * ringing, 50 + 2 * lost, 0.0, 1.0) == 0.0
-    assert settled_from(TIME, 5 + 3 * TIME, 50 + 0 * TIME, 0.0, 1.0) is None
-    assert settled_from(TIME, 5 - 3 * TIME, 50 + 0 * TIME, 0.0, 1.0) is None
-    late = settled_from(TIME, np.where(TIME < 0.4, 2.5 * TIME, 1.0) + 0.01 * ringing, 50 + 0 * TIME, 0.0, 1.0)
+    assert settled_from(TIME, 2 * lost * ringing, 50 + 2 * lost[np.newaxis], 0.0, 1.0) == 0.0
+    assert settled_from(TIME, 5 + 3 * TIME, 50 + 0 * TIME[np.newaxis], 0.0, 1.0) is None
+    assert settled_from(TIME, 5 - 3 * TIME, 50 + 0 * TIME[np.newaxis], 0.0, 1.0) is None
+    late = settled_from(
+        TIME, np.where(TIME < 0.4, 2.5 * TIME, 1.0) + 0.01 * ringing, 50 + 0 * TIME[np.newaxis], 0.0, 1.0
+    )
     assert late == pytest.approx(0.4, abs=0.02)
 
 
 def test_a_vibration_that_swings_only_a_few_times_keeps_its_level_and_a_crash_does_not() -> None:
-    whole = 50 + 0 * TIME
+    whole = 50 + 0 * TIME[np.newaxis]
     assert settled_from(TIME, 5 + np.sin(9 * TIME) ** 2, whole, 0.0, 1.0) == 0.0
     assert settled_from(TIME, 5 + 0 * TIME + np.sin(np.pi * TIME) ** 2, whole, 0.0, 1.0) is None
 
@@ -240,9 +274,23 @@ def test_what_damping_takes_of_a_body_and_its_vibration_is_no_load() -> None:
     alpha = 0.3
     kinetic = 60 * np.exp(-2 * alpha * TIME) + 20 * np.exp(-alpha * TIME) * np.cos(60 * TIME) ** 2
     whole = 80 - 2 * alpha * integral(TIME, kinetic)
-    flight = suggest(totals(whole - kinetic, kinetic), 0.8, PLAIN).situation.flight
-    assert np.isnan(flight.gravity)  # it is lost as damping takes it: no load, where an oscillator describes the rest
-    assert not flight._replace(described=True).unknown_load
+    record = totals(whole - kinetic, kinetic)
+    assert suggest(record, 0.8, PLAIN).situation.flight.unknown_load
+    flight = suggest(record, 0.8, Settings()).situation.flight  # the oscillator is damped at the same rate
+    assert flight.certain
+    assert flight.described
+
+
+@pytest.mark.parametrize("lost", [0.0, 0.02, 0.3])
+def test_an_oscillator_makes_no_flight_certain_in_which_the_body_loses_energy(lost: float) -> None:
+    """Drag slows the body down while the spring in it swings on as one oscillator."""
+    decay = np.exp(-0.2 * TIME)  # damping within the body, which the energies show as well
+    ringing, moving = 20 * decay * np.cos(60 * TIME) ** 2, 60 * (1 - lost * TIME)
+    internal = 20 * decay - ringing
+    flight = suggest(totals(internal, moving + ringing), 0.8, Settings()).situation.flight
+    assert flight.described
+    assert flight.certain is (lost == 0)
+    assert flight.unknown_load is (lost > 0)
 
 
 def test_no_flight_is_certain_in_which_energies_show_a_load() -> None:
@@ -270,3 +318,46 @@ def test_an_end_of_the_load_behind_the_flight_gives_no_flight_that_ends_before_i
     flight = examine(history, 0.3, Settings(after=0.7, replay=False)).flight
     assert flight.start is None
     assert flight.refusal
+
+
+def falling_and_damped(*left_out: str, internal: Samples = ZERO) -> History:
+    """A vibration that damping takes, above plastic work of 5, of a body of 20 that falls from 0.1 on; seven digits.
+
+    The terms ``left_out`` are not written; ``internal`` is added to the internal energy.
+    """
+    since = np.maximum(TIME - 0.1, 0.0)
+    left, swing = 40 * np.exp(-9 * since), np.cos(250 * since) ** 2
+    internal, pushed = internal + 5 + left * swing, 20 * 60 * np.minimum(TIME, 0.1) ** 2 / 0.02
+    values = np.zeros((TIME.size, 1, 3))
+    values[:, 0, 0], values[:, 0, 2] = np.sqrt(2 * 20 * pushed), -20 * 9.81 * since
+    kinetic = (values[:, 0] ** 2).sum(axis=1) / 40 + left * (1 - swing)
+    momentum = Momenta(TIME, printed(values.ravel(), 7).reshape(values.shape), None, Precision(7), (0,))
+    written = {"internal": internal, "kinetic": kinetic, "damping": 40 - left}
+    columns = {name: printed(one, 7) for name, one in written.items() if name not in left_out}
+    mass = np.array([np.nan if "kinetic" in left_out else 20.0])
+    energies = replace(Balance(TIME, precision=Precision(7)), **columns)  # type: ignore[arg-type]
+    return table(TIME, columns["internal"], replace(momentum, masses=mass), balance=energies)
+
+
+@pytest.mark.parametrize("left_out", [(), ("damping",), ("kinetic",), ("kinetic", "damping")])
+def test_no_energy_that_is_written_hides_a_fall_whose_vibration_is_damped(left_out: tuple[str, ...]) -> None:
+    flight = examine(falling_and_damped(*left_out), 0.5, PLAIN).flight
+    assert flight.source == "momentum"
+    assert flight.start == pytest.approx(0.1, abs=2 * TIME[1])
+    assert flight.end is None
+
+
+@pytest.mark.slow
+def test_falls_in_all_formats_begin_within_two_states_with_and_without_kinetic_energy(tmp_path: Path) -> None:
+    for number, fall in enumerate(falls.fallen(np.random.default_rng(3), 6, 300)):
+        td, room = (fall.start + fall.end) / 2, (falls.WITHIN + 0.01) * fall.run.time[1]
+        for form, write in FALL_WRITERS.items():
+            for kinetic in (True, False):
+                start = falls.found_start(write(fall.run, tmp_path, kinetic=kinetic), td)
+                assert start == pytest.approx(fall.start, abs=room), (number, form, kinetic)
+
+
+def test_an_internal_energy_that_grows_while_its_body_falls_keeps_no_level() -> None:
+    """Two bodies in it hit each other: their momentum together is that of free fall."""
+    history = falling_and_damped(internal=200 * TIME)
+    assert not examine(history, 0.5, PLAIN).in_flight

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from d2rpick.flight.flight import Flight, find_flight, seen_flight
+from d2rpick.flight.chosen import find_flight
+from d2rpick.flight.flight import Flight, seen_flight
 from d2rpick.flight.position_error import (
     MOST_OF_PATH,
     Bodies,
@@ -209,13 +210,13 @@ def test_a_set_that_leaves_the_first_landing_part_out_is_off_as_far() -> None:
 
 def test_the_parts_to_be_switched_count_and_only_in_a_flight_that_momenta_show() -> None:
     history = solved("carT01.gz", "1-17").history
-    flight = find_flight(history, 0.14, None, seen_flight(history, 0.14), None)
+    flight = find_flight(history, 0.14, seen_flight(history, 0.14), None)
     found = sure(drift_in_flight(history, flight))
     assert found.part.title == "engine"
     assert found.errors(np.array([0.0496]), 0.1464)[0] == pytest.approx(2.2e-3, abs=1e-3)
     assert drift_in_flight(history, flight, [found.part]) is None
     assert drift_in_flight(history, flight._replace(parts=None)) is None
-    assert drift_in_flight(history, find_flight(history, 0.2, None, seen_flight(history, 0.2), None)) is None
+    assert drift_in_flight(history, find_flight(history, 0.2, seen_flight(history, 0.2), None)) is None
 
 
 SPAN = np.linspace(0.0, 1.0, 11)
@@ -273,7 +274,7 @@ def test_the_limit_is_that_of_the_bodies_whose_parts_move() -> None:
 @cache
 def car(parts: str) -> tuple[History, Flight]:
     history = solved("carT01.gz", parts).history
-    return history, find_flight(history, 0.14, None, seen_flight(history, 0.14), None)
+    return history, find_flight(history, 0.14, seen_flight(history, 0.14), None)
 
 
 def test_heavy_parts_each_for_itself_stay_where_they_should_as_computed() -> None:

@@ -13,7 +13,8 @@ from hypothesis import given, settings, strategies as st
 
 from d2rpick.deck import read_inventory
 from d2rpick.deck.geometry import Placed, Placement
-from d2rpick.flight.flight import find_flight, seen_flight
+from d2rpick.flight.chosen import find_flight
+from d2rpick.flight.flight import seen_flight
 from d2rpick.flight.position_error import Drift, drift_in_flight, drift_of
 from d2rpick.flight.turning import Flying
 from d2rpick.histories.history import EXACT, Momenta, Samples
@@ -183,5 +184,5 @@ def test_every_switched_run_of_the_car_is_as_far_off_and_turned_as_computed(tmp_
 @cache
 def of_the_car(parts: tuple[str, ...], where: Placement) -> Drift:
     history = solved("carT01.gz", *parts).history
-    flight = find_flight(history, 0.14, None, seen_flight(history, 0.14), None)
+    flight = find_flight(history, 0.14, seen_flight(history, 0.14), None)
     return sure(drift_in_flight(history, flight, None, where))

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from d2rpick.choice.answers import suggest
 from d2rpick.choice.question import Settings
-from d2rpick.choice.situation import Together
+from d2rpick.choice.together import Together
 from d2rpick.flight.flight import Flight
 from d2rpick.histories.history import Memory, Samples
 from d2rpick.report.situation import heading

@@ -1,0 +1,46 @@
+"""The margin before the contact that ends a flight, by what the parts to be switched become."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from d2rpick.flight.margin import Margin, margin_before_contact
+
+if TYPE_CHECKING:
+    from d2rpick.choice.question import Settings
+    from d2rpick.flight.flight import Flight
+    from d2rpick.flight.position_error import Bodies
+    from d2rpick.histories.history import History
+    from d2rpick.vibration.span import Fits
+
+# Times in a flight at which a body may be frozen: what moves in it does so slowly.
+_TIMES: Final = 100
+
+
+def bodies_of(history: History, flight: Flight, settings: Settings, fits: Fits | None = None) -> Bodies | None:
+    """Give how the bodies that the parts become drift in a flight, found once; None where no parts show it."""
+    if flight.parts is None:
+        return None
+    from d2rpick.flight.position_error import bodies_in_flight  # not above: a table has no parts
+
+    known = history.known if fits is None else fits
+    told, placement = settings.bodies, settings.placement
+    return known.once(("drift", flight, told), lambda: bodies_in_flight(history, flight, told, placement))
+
+
+def margin_of(history: History, flight: Flight, settings: Settings, fits: Fits | None = None) -> Margin:
+    """Give the margin that is asked for, or by how much a switch in the flight may let the contact come earlier."""
+    if settings.margin is not None or flight.end is None or flight.start is None:
+        return margin_before_contact(history, flight, settings.margin)
+    bodies = bodies_of(history, flight, settings, fits)
+    place = None if bodies is None else _largest_error(bodies, flight.start, flight.end)
+    return margin_before_contact(history, flight, place=place)
+
+
+def _largest_error(bodies: Bodies, start: float, end: float) -> float | None:
+    """Largest distance of a body from its place at the end of a flight; None where it is unknown [length]."""
+    errors = bodies.errors(np.linspace(start, end, _TIMES)[:-1], end)
+    known = errors[np.isfinite(errors)]
+    return float(known.max()) if known.size else None

@@ -1,0 +1,112 @@
+"""Flights found of bodies that fall while their vibration is damped, in all formats, with and without kinetic energy.
+
+``python -m tests.benchmarks.falls [RUNS [SEED]]``: chains are pushed while they are carried, fall freely under gravity
+while dampers and yielding springs take their vibration, and land.  Each is read as a table, a glstat, a binout and a
+T01, with and without kinetic energy.  A flight is right that begins within two states of the true one.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from d2rpick.base.errors import D2RPickError
+from d2rpick.choice.question import Settings, read
+from d2rpick.choice.situation import examine
+from tests.benchmarks.chains import Chains, integrated, on_first
+from tests.written_runs import FALL_WRITERS, Written
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from d2rpick.histories.history import Samples
+
+STEPS, GRAVITY = 24, 9.81
+# A flight is right that begins no more than so many states from the true one.
+WITHIN: Final = 2
+
+
+class Fall(NamedTuple):
+    """A run that is carried up to ``start`` and lands at ``end`` [time]."""
+
+    run: Written
+    start: float
+    end: float
+
+
+def fallen(random: np.random.Generator, count: int, states: int) -> Iterator[Fall]:
+    """Integrate ``count`` falls over so many states, in one record length."""
+    length = 10 ** random.uniform(-0.8, 0.2)
+    masses = random.uniform(5, 50, (count, 3))
+    periods = 10 ** random.uniform(-1.6, -0.9, (count, 2)) * length
+    stiffness = masses.mean(axis=1)[:, np.newaxis] * (2 * np.pi / periods) ** 2
+    damping = stiffness * periods / np.pi * 10 ** random.uniform(-3, -1, (count, 1))
+    whole = masses.sum(axis=1)
+    pushed = whole * random.uniform(0.5, 4, count) / length
+    strength = pushed[:, np.newaxis] * random.choice([0.4, 0.7, 100], (count, 1)) * np.ones(2)
+    starts, ends = random.uniform(0.1, 0.3, count) * length, random.uniform(0.7, 0.95, count) * length
+    starts = np.round(starts * states / length) / states * length  # a load ends at a state: none is half in it
+    still = np.zeros((count, 3, 2))
+    heavy = masses[..., np.newaxis] * np.array([0.0, -GRAVITY])
+    ground = whole * (2 * np.pi / (0.2 * length)) ** 2
+
+    def force(time: float, places: Samples, _: Samples) -> Samples:
+        push = np.stack([np.where(time < starts, pushed, 0.0), np.zeros(count)], axis=1)
+        fallen_since = GRAVITY / 2 * ((time - starts) ** 2 - (ends - starts) ** 2)
+        pressed = np.where(time > ends, ground * np.maximum(fallen_since, 0) / 10, 0.0)
+        landing = np.stack([np.zeros(count), pressed], axis=1)
+        carried = np.where((time < starts)[:, np.newaxis, np.newaxis], -heavy, 0.0)
+        return on_first(push + landing) + carried + 0 * places
+
+    chains = Chains(masses, stiffness, damping, strength, starts, still, still)
+    runs = integrated(chains, force, lambda *_: heavy, length, states, STEPS)
+    for one, start, end in zip(runs, starts.tolist(), ends.tolist(), strict=True):
+        yield Fall(one.written, start, end)
+
+
+def found_start(path: str, td: float) -> float | None:
+    """Start of the flight around td that a file shows; None without one."""
+    try:
+        flight = examine(read([path]).history, td, Settings(replay=False)).flight
+    except D2RPickError:
+        return None
+    return None if flight.refusal else flight.start
+
+
+def main(count: int = 100, seed: int = 48) -> None:
+    """Print the counts of each format."""
+    right: Counter[str] = Counter()
+    shorter: Counter[str] = Counter()
+    total: Counter[str] = Counter()
+    random = np.random.default_rng(seed)
+    with TemporaryDirectory() as folder:
+        batch = 20
+        for number in range(count // batch):
+            states = int(random.choice([120, 300, 600]))
+            for at, fall in enumerate(fallen(random, batch, states)):
+                td, state = (fall.start + fall.end) / 2, float(fall.run.time[1])
+                for form, write in FALL_WRITERS.items():
+                    starts = [found_start(write(fall.run, Path(folder), kinetic=has), td) for has in (True, False)]
+                    for has, start in zip(("with", "without"), starts, strict=True):
+                        good = start is not None and abs(start - fall.start) <= (WITHIN + 0.01) * state
+                        total[f"{form} {has}"] += 1
+                        right[f"{form} {has}"] += good
+                        if not good:
+                            print(f"{form} {has} kinetic: {number}/{at} {start} for {fall.start}", flush=True)
+                    with_, without = starts
+                    if without is not None and (with_ is None or with_ > without + 0.01 * state):
+                        print(f"{form} is shorter with kinetic energy: {number}/{at} {with_} for {without}", flush=True)
+                        shorter[form] += 1
+    for name, size in total.items():
+        print(f"{name:20s}{size:6d} falls{right[name]:6d} right")
+    for form in FALL_WRITERS:
+        print(f"{form:20s}{shorter[form]:6d} shorter with kinetic energy")
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))

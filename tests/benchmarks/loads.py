@@ -1,0 +1,236 @@
+"""Pairs called good or fair under loads that last, against the momentum that these loads truly change.
+
+``python -m tests.benchmarks.loads [RECORDS [SEED]]``: chains of three masses and two springs move in a plane and
+vibrate, while a load of one kind acts.  Each run is written as four files: totals in a table, momenta of the model
+in a table, a glstat and a matsum, with the digits of these formats.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from d2rpick.base.errors import D2RPickError
+from d2rpick.choice.answers import suggest_of
+from d2rpick.choice.flights import flights_of
+from d2rpick.choice.question import Settings, read
+from tests.benchmarks.chains import Chains, Run, directions, half_sine, integrated, on_first
+from tests.written_runs import WRITERS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from d2rpick.choice.question import Reference
+    from d2rpick.histories.history import Samples
+
+    Motion = Callable[[float, Samples, Samples, Samples], Samples]
+
+STATES, STEPS = 500, 16
+# Of the third mass of a chain of two.
+_NO_MASS: Final = 1e-6
+# A pair is wrong in which more than this share of the largest momentum changes.
+WRONG: Final = 0.01
+# A flight in which less of the momentum changes, for this share of the record, is missed where none is shown.
+STEADY, LONG = 0.001, 0.15
+# td that are asked for beside the one that is chosen, as shares of the record.
+ASKED: Final = (0.4, 0.85)
+GRAVITY: Final = 9.81
+# Of the Moon, Mars, Venus, Jupiter, and of a centrifuge.
+OTHER_GRAVITIES: Final = (1.62, 3.71, 8.87, 24.8, 49.05)
+
+
+class Load(NamedTuple):
+    """Forces on ``count`` chains: ``force`` of time, masses (n, 3), places and velocities (n, 3, 2) is (n, 3, 2).
+
+    ``falling``: half of the chains fall on earth.
+    """
+
+    force: Motion
+    falling: bool = True
+
+
+def friction(random: np.random.Generator, count: int) -> Load:
+    """Friction of the ground, as constant a deceleration as a dry one is, of all masses or of the first."""
+    size = 10 ** random.uniform(-1, 1.3, (count, 1, 1))
+    only_first = random.random((count, 1)) < 1 / 3
+
+    def force(_: float, masses: Samples, __: Samples, velocity: Samples) -> Samples:
+        whole = masses.sum(axis=1, keepdims=True)
+        carried = np.where(only_first, whole * (np.arange(3) == 0), masses)[..., np.newaxis]
+        speed = np.linalg.norm(velocity, axis=2, keepdims=True)
+        return np.asarray(-size * carried * velocity / np.maximum(speed, 0.01))
+
+    return Load(force, falling=False)
+
+
+def drag(random: np.random.Generator, count: int) -> Load:
+    """Drag by the square of the speed, on the first mass or on two of them."""
+    size, on_first = 10 ** random.uniform(-2.5, 0, (count, 1, 1)), random.uniform(0.5, 2.0, (count, 1, 1)).clip(max=1)
+    shares = np.concatenate([on_first, 1 - on_first, 0 * on_first], axis=1)
+
+    def force(_: float, masses: Samples, __: Samples, velocity: Samples) -> Samples:
+        whole = masses.sum(axis=1)[:, np.newaxis, np.newaxis]
+        speed = np.linalg.norm(velocity, axis=2, keepdims=True)
+        return np.asarray(-size * whole * shares / 5 * speed * velocity)
+
+    return Load(force)
+
+
+def late_contact(random: np.random.Generator, count: int) -> Load:
+    """A light contact late in the record, at the first mass."""
+    start, length = random.uniform(0.4, 0.85, count), 10 ** random.uniform(-2, -0.7, count)
+    size, along = 10 ** random.uniform(-1.5, 1, count), directions(random, count)
+
+    def force(time: float, masses: Samples, _: Samples, __: Samples) -> Samples:
+        pushed = (size * masses.sum(axis=1) * half_sine(time, start, length))[:, np.newaxis] * along
+        return on_first(pushed)
+
+    return Load(force)
+
+
+def airbag(random: np.random.Generator, count: int) -> Load:
+    """A pressure that rises at once and leaks away."""
+    start, lasts = random.uniform(0.3, 0.8, count), random.uniform(0.03, 0.3, count)
+    size, along = 10 ** random.uniform(-0.5, 1.5, count), directions(random, count)
+
+    def force(time: float, masses: Samples, _: Samples, __: Samples) -> Samples:
+        since = np.maximum(time - start, 0) / lasts
+        pressure = np.where(time > start, since * np.exp(1 - 4 * since), 0.0)
+        return on_first((size * masses.sum(axis=1) * pressure)[:, np.newaxis] * along)
+
+    return Load(force)
+
+
+def rope(random: np.random.Generator, count: int) -> Load:
+    """A rope to the ground that is slack up to its length."""
+    length, pull = random.uniform(0.3, 3, (count, 1)), 10 ** random.uniform(1, 4, (count, 1))
+
+    def force(_: float, __: Samples, places: Samples, ___: Samples) -> Samples:
+        distance = np.linalg.norm(places[:, 0], axis=1, keepdims=True)
+        stretched = np.maximum(distance - length, 0)
+        return on_first(-pull * stretched * places[:, 0] / np.maximum(distance, 1e-9))
+
+    return Load(force)
+
+
+def couple(random: np.random.Generator, count: int) -> Load:
+    """Two opposite forces on two masses: they change no momentum."""
+    start, length = random.uniform(0.2, 0.6, count), random.uniform(0.05, 0.4, count)
+    size, along = 10 ** random.uniform(-1, 1, count), directions(random, count)
+
+    def force(time: float, masses: Samples, _: Samples, __: Samples) -> Samples:
+        pushed = (size * masses.sum(axis=1) * half_sine(time, start, length))[:, np.newaxis] * along
+        return np.stack([pushed, -pushed, np.zeros_like(pushed)], axis=1)
+
+    return Load(force)
+
+
+def other_gravity(random: np.random.Generator, count: int) -> Load:
+    """Gravity of another planet, which without a deck no file tells from a load."""
+    size = random.choice(OTHER_GRAVITIES, count)[:, np.newaxis, np.newaxis]
+
+    def force(_: float, masses: Samples, places: Samples, __: Samples) -> Samples:
+        return np.asarray(masses[..., np.newaxis] * size * np.array([0.0, -1.0]) * np.ones_like(places))
+
+    return Load(force, falling=False)
+
+
+CLASSES: Final = {one.__name__: one for one in (friction, drag, late_contact, airbag, rope, couple, other_gravity)}
+
+
+def computed(random: np.random.Generator, count: int, load: Load) -> Iterator[Run]:
+    """Integrate ``count`` chains that are pushed, and then fly but for their load.
+
+    Every other one has a single spring and moves along x: one oscillator describes its energy.
+    """
+    masses = random.uniform(5, 50, (count, 3))
+    stiffness = masses.mean(axis=1)[:, np.newaxis] * random.uniform(30, 150, (count, 2)) ** 2
+    masses[::2, 2], stiffness[::2, 1] = _NO_MASS, 0.0
+    damping = stiffness * random.choice([0.0, 2e-5, 2e-4], (count, 1))
+    falls = (random.integers(0, 2, count) * load.falling)[:, np.newaxis, np.newaxis]
+    heavy = masses[..., np.newaxis] * np.array([0.0, -GRAVITY]) * falls
+    speed = directions(random, count) * random.uniform(1, 12, (count, 1))
+    places = random.normal(size=(count, 3, 2)) * random.uniform(1e-3, 2e-2, (count, 1, 1))
+    places[::2, :, 1] = 0
+    velocities, never = np.repeat(speed[:, np.newaxis], 3, axis=1), np.zeros(count)
+    chains = Chains(masses, stiffness, damping, 0 * stiffness, never, places, velocities)
+    whole, lasts = masses.sum(axis=1), random.uniform(0.02, 0.1, count)
+    pushed = directions(random, count) * (whole * random.uniform(5, 50, count))[:, np.newaxis]
+
+    def force(time: float, moved: Samples, velocity: Samples) -> Samples:
+        push = on_first(pushed * half_sine(time, 0 * lasts, lasts)[:, np.newaxis])
+        return load.force(time, masses, moved, velocity) + push
+
+    yield from integrated(chains, force, lambda *_: heavy, 1.0, STATES, STEPS)
+
+
+def changes(impulse: Samples, time: Samples, start: float, end: float) -> float:
+    """Largest change of an impulse (n, 2) from ``start`` to ``end``."""
+    inside = impulse[(time >= start) & (time <= end)]
+    return float(np.linalg.norm(inside - inside[:1], axis=1).max(initial=0.0))
+
+
+def counted(reference: Reference, run: Run) -> Counter[str]:
+    """Count the pairs that are not called poor, those that are wrong, true flights, and those that no source shows."""
+    counts: Counter[str] = Counter()
+    time, impulse = run.written.time, run.impulse
+    largest = float(np.linalg.norm(run.written.momentum.sum(axis=1), axis=1).max())
+    for td in (None, *ASKED):
+        try:
+            answer = suggest_of(reference, td, Settings(), with_better=False)
+        except D2RPickError:
+            continue
+        pair = answer.recommended
+        if pair is None or answer.quality is None or answer.quality.grade == "poor":
+            continue
+        counts["pairs"] += 1
+        counts["wrong"] += changes(impulse, time, pair.tr, pair.td) > WRONG * largest
+    true = list(_true_flights(impulse, time, STEADY * largest))
+    try:
+        shown = [one.within(time) for one in flights_of(reference.history, Settings(replay=False))]
+    except D2RPickError:
+        shown = []
+    counts["flights"] += len(true)
+    counts["missed"] += sum(not any(start < b and a < end for start, end in shown) for a, b in true)
+    return counts
+
+
+def _true_flights(impulse: Samples, time: Samples, room: float) -> Iterator[tuple[float, float]]:
+    """Give the longest stretches in which an impulse changes by at most ``room``, one after the other."""
+    first = 0
+    while first < time.size - 1:
+        last = first
+        low = high = impulse[first]
+        while last < time.size - 1:
+            low, high = np.minimum(low, impulse[last + 1]), np.maximum(high, impulse[last + 1])
+            if np.linalg.norm(high - low) > room:
+                break
+            last += 1
+        if time[last] - time[first] >= LONG:
+            yield float(time[first]), float(time[last])
+            first = last
+        first += 1
+
+
+def main(count: int = 60, seed: int = 48) -> None:
+    """Print the counts of each load and form."""
+    names = ("pairs", "wrong", "flights", "missed")
+    print(f"{'load':15s}{'form':10s}" + "".join(f"{name:>9s}" for name in names))
+    with TemporaryDirectory() as folder:
+        for number, (name, load) in enumerate(CLASSES.items()):
+            random = np.random.default_rng((seed, number))
+            runs = list(computed(random, count, load(random, count)))
+            for form, write in WRITERS.items():
+                total: Counter[str] = Counter()
+                for run in runs:
+                    total += counted(read([write(run.written, Path(folder))]), run)
+                print(f"{name:15s}{form:10s}" + "".join(f"{total[one]:9d}" for one in names), flush=True)
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))
