@@ -64,7 +64,7 @@ def drive(deck: str, folder: str, resume: bool, dry_run: bool, output: Output, *
 
     Examples
     --------
-    d2rpick drive sample_data/flying_box/BOX_0000.rad --wait 0.002 -o driven --dry-run \
+    d2rpick drive sample_data/falling_plate/plate_0000.rad --part 1 --wait 0.02 -o driven --dry-run \
         --starter 'starter -i {deck} -np 4' --engine 'mpirun -np 4 engine -i {deck}'
     """
     import signal
@@ -96,6 +96,7 @@ def _plan(driving: Driving) -> list[str]:
         f"copies    {', '.join(deck.files)} to {driving.folder}",
         f"starts    {shlex.join(commands.words('starter', f'{deck.name}_0000.rad'))}",
         f"          {shlex.join(commands.words('engine', f'{deck.name}_0001.rad'))}, and further legs",
+        *([f"missing   {missing}: no such program"] if (missing := commands.missing()) else []),
         f"switches  {len(deck.parts)} parts by main node {bodies}, to the end at {deck.end:g}",
     ]
 

@@ -11,7 +11,7 @@ from d2rpick.base.errors import Caution, D2RPickError
 from d2rpick.base.files import append_whole, record_of, signed, write_whole
 from d2rpick.deck.model import DISCRETE
 from d2rpick.histories.names import Selection
-from d2rpick.running.evidence import Evidence, highest_energy
+from d2rpick.running.evidence import Evidence, highest_energy, range_of_energy
 from d2rpick.running.inner_motion import InnerMotion, Wait, swing_in
 from d2rpick.running.looks import Looks
 from d2rpick.running.sequence import LOAD, Leg, Order, Seen, began_rigid, next_order, window_of
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 JOURNAL: Final = "drive.ndjson"
 # Largest step while rigid over the mean one before: a rigid leg costs a few percent of a deformable one then, and the
 # state of a run is written often enough to show a contact.
-_STEP_RATIO: Final = 5.0
+_STEP_RATIO: Final = 10.0
 # A flight that did not last for the wait is told where it did for this share of it.
 _TOLD: Final = 0.5
 # Between two looks whether the solver is still at work, and from when on silence is told [s].
@@ -289,9 +289,12 @@ class Observer:
             why = f"as given, but {why}" if asked and asked.time > self._given else "as given"
         least = _TOLD * (wait or 0.0)
         pauses = self._evidence.pauses(order.start)
+        peak = highest_energy(history, max(order.start, free), now)
+        if wait and history.energy_at(now) >= range_of_energy(history, now, wait)[2]:
+            peak = order.until
         return Seen(
             free, wait, why, bool(flights) and flights[-1].end is None,
-            highest_energy(history, max(order.start, free), now), idle,
+            peak, idle,
             tuple(one for one in pauses if wait and least <= one[1] - one[0] and one[0] >= order.after),
             swing=self._motion.longest_swing(now),
         )  # fmt: skip
@@ -311,7 +314,8 @@ class Observer:
     def _floor(self, known: float) -> Wait | None:
         """Give the longest wait that is known from the deck, or from the record of flights before."""
         if known > (self._of_deck.time if self._of_deck else 0.0):
-            return Wait(known, "record", "as in the flight before")
+            most = self._of_deck.most if self._of_deck else 0.0
+            return Wait(known, "record", "as in the flight before", most)
         return self._of_deck
 
 

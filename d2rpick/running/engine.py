@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import re
 import shlex
+import shutil
 import signal
 import subprocess
 import time
@@ -61,7 +62,23 @@ class Commands(NamedTuple):
             raise ConfigurationError(
                 f"--{program} {template!r}: {{deck}} was expected, where the name of the file goes"
             )
-        return [word.replace("{deck}", deck).replace("{threads}", str(self.threads)) for word in split]
+        return [
+            _whole(split[0]),
+            *(word.replace("{deck}", deck).replace("{threads}", str(self.threads)) for word in split[1:]),
+        ]
+
+    def missing(self) -> str:
+        """Name the first program that is not there, or cannot be started; empty where all can.
+
+        ConfigurationError as of `words`.
+        """
+        programs = (self.words(program, "{deck}")[0] for program in _PROGRAMS)
+        return next((one for one in programs if shutil.which(one) is None), "")
+
+
+def _whole(program: str) -> str:
+    """Give the path of a program that is named by one: it is started in another folder."""
+    return str(Path(program).absolute()) if "/" in program else program
 
 
 def _installed(program: str) -> list[str]:
@@ -251,8 +268,6 @@ class Solver:
 
     def check_room(self, number: int, share: float) -> None:
         """Raise D2RPickError where the disk has no room for a leg that has this share of the run still before it."""
-        import shutil
-
         files = list(self.folder.iterdir())
         restart = max((one.stat().st_size for one in files if one.suffix == ".rst"), default=0)
         histories = sum(self.history(one).stat().st_size for one in range(number) if self.history(one).exists())

@@ -41,6 +41,9 @@ CONSTANT: Final = 1e-4
 _AGAIN: Final = 0.25
 # States of a long stretch that are held against the law: what acts changes the momentum for good.
 _HELD: Final = 128
+# A switch is good where the internal energy is this share of the way from the lowest to the highest of one wait: in a
+# trough of computed runs the energy after td was half of what it should be, from a peak 0.9 of it and more.
+_HIGH: Final = 0.75
 # States before a flight, and in it, that tell whether it is gravity that acts.
 _TOLD: Final = 1000
 
@@ -374,6 +377,13 @@ def highest_energy(history: History, start: float, end: float) -> float:
     """
     time, energy = history.between(start, end)
     return float(time[energy.size - 1 - int(np.argmax(energy[::-1]))])
+
+
+def range_of_energy(history: History, now: float, wait: float) -> tuple[float, float, float]:
+    """Give the lowest and the highest internal energy within the last wait, and from which one on tr is good."""
+    energy = history.between(now - wait, now)[1]
+    low, high = float(energy.min()), float(energy.max())
+    return low, high, low + _HIGH * (high - low)
 
 
 def _going_on(one: Quiet, reach: float, found: Sequence[Quiet]) -> Quiet:

@@ -8,20 +8,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.base.errors import ArgumentError, DeckError, name_units
+from d2rpick.base.errors import ArgumentError, DeckError
 from d2rpick.deck import read_inventory
 from d2rpick.deck.ls_dyna_parts import read_entities
-from d2rpick.deck.pieces import inner_period, supports_of
+from d2rpick.deck.pieces import inner_period
 from d2rpick.deck.printed_card import PHYSICS, PrintedCard, Printing, check_ids, comments, shortest
 from d2rpick.deck.printing import Waiting, capped, header, listed, off, to_deformable, to_rigid
 from d2rpick.deck.radioss_bodies import bodies_for
-from d2rpick.deck.radioss_deck import kept_off, number_of
+from d2rpick.deck.radioss_deck import kept_off
 from d2rpick.deck.radioss_run import parts_off, read_run
 from d2rpick.deck.reader import read_deck
+from d2rpick.running.checks import NO_CONTACT, contacts_of, refuse_held
 from d2rpick.running.inner_motion import Wait, check_wait, wait_of_deck
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Sequence
+    from collections.abc import Collection, Sequence
 
     from d2rpick.deck.model import Inventory
     from d2rpick.deck.radioss_deck import Starter
@@ -33,7 +34,6 @@ _MOST_LEGS: Final = 9
 _CAP_SHARE: Final = 300
 # LS-DYNA: how long after it becomes rigid the first contact may not release it, of the wait.
 _SHORT: Final = 100
-_NO_FORCE: Final = {"TYPE1", "TYPE2", "TYPE9", "TYPE12", "TYPE18", "SUB"}  # ties, fluids, and parts of other contacts
 _LOADS: Final = ("CLOAD", "PLOAD", "MONVOL", "LOAD", "PRELOAD", "LASER", "PFLUID")
 _OF_ALL: Final = (
     "A first run: no reference tells the level at td, so that none is matched.",
@@ -92,7 +92,7 @@ def first_card(path: str, parts: Collection[int] = (), wait: float | None = None
         chosen = chosen or parts_off(read_run(path))
     if not chosen:
         raise ArgumentError(f"no parts were given, and {path} keeps no body off; name them with `parts`")
-    _refuse_held(path, inventory, chosen)
+    refuse_held(path, inventory, chosen)
     known = _wait(path, inventory, wait)
     make = _radioss if inventory.solver == "radioss" else _ls_dyna
     return make(path, inventory, chosen, known, after)
@@ -112,15 +112,6 @@ def _wait(path: str, inventory: Inventory, given: float | None) -> Wait:
     return Wait(float(f"{known.time / 2:.3g}"), "deck", f"half of the period {known.time:.3g} of {known.reason}")
 
 
-def _refuse_held(path: str, inventory: Inventory, parts: Collection[int]) -> None:
-    """Raise DeckError where a support holds the parts: its force is none of a contact."""
-    if unknown := sorted(set(parts) - inventory.nodes_by_part.keys()):
-        raise DeckError(f"{path}: {name_units(unknown)}: no elements in the deck; name others")
-    held = supports_of(inventory)[0]
-    for part in sorted(held.keys() & set(parts)):
-        raise DeckError(f"{path}: part {part} is held by {held[part][0].name}: it does not fly; leave it out")
-
-
 # Radioss.
 
 
@@ -130,9 +121,9 @@ def _radioss(path: str, inventory: Inventory, parts: Sequence[int], wait: Wait, 
         raise DeckError(f"{path}: the run has {len(run.legs)} engine files; its starter deck and one were expected")
     _refuse_loads(run.starter)
     (leg,) = run.legs
-    forces = list(_forces(run.starter))
+    forces = list(contacts_of(run.starter))
     if not forces:
-        raise DeckError(f"{path}: no contact and no rigid wall, so nothing would end a flight")
+        raise DeckError(f"{path}: {NO_CONTACT}")
     at_rest = after is None and _falls(run, inventory, parts)
     start = wait.time if after is None else max(after, wait.time)
     sensors, contact, flight = _sensors(forces, wait.time, start, bodies.sensor)
@@ -157,15 +148,6 @@ def _radioss(path: str, inventory: Inventory, parts: Sequence[int], wait: Wait, 
 def _refuse_loads(starter: Starter) -> None:
     for card in starter.named(*_LOADS):
         raise DeckError(f"{card.at}: /{card.name} pushes without a contact, so that a flight is not seen by contacts")
-
-
-def _forces(starter: Starter) -> Iterator[tuple[str, int]]:
-    """Kind of sensor and id of each contact and rigid wall."""
-    for card in starter.named("INTER"):
-        if card.words[1:] and card.words[1] not in _NO_FORCE:
-            yield "INTER", next(number for at in (2, 3) if (number := number_of(card, at)) or at == 3)
-    for card in starter.named("RWALL"):
-        yield "RWALL", number_of(card, -1)
 
 
 def _falls(run: Run, inventory: Inventory, parts: Collection[int]) -> bool:

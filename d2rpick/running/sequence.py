@@ -32,8 +32,8 @@ _OF_FLOWN, _OF_RUN = 0.4, 0.01
 # The restart of a leg, written and read, costs as much as so many deformable cycles (some five, measured).
 _RESTART: Final = 10
 # A flight of fewer half swings is too short to be switched: what still swings touches the ground at another time than
-# the body that is frozen does.  In a soft box that bounced low the landing came 33 ms late, after 2.5 of them.
-_SWINGS: Final = 3.0
+# the body that is frozen does.  In a soft box that bounced low the landing came 33 ms late, after 2.3 of them.
+_SWINGS: Final = 2.5
 # A window moves the landing behind it by up to 2 ms, the one after that by up to 37 ms (two computed boxes): one that
 # saves less than this share of a deformable run is not worth that.
 _WORTH: Final = 0.04
@@ -87,7 +87,7 @@ class Seen(NamedTuple):
     """What the record shows up to the end of a leg.
 
     ``free``: since when no force acts [time]; ``wait``: how long that is asked for [time], None where it is not known,
-    and ``why``; ``flies``: whether it has lasted for so long; ``peak``: when the energy was highest in the leg [time];
+    and ``why``; ``flies``: whether it has lasted for so long; ``peak``: a good tr, at a high energy [time];
     ``idle``: no energy was ever stored; ``short``: begin and end of flights in the leg that did not last for the wait;
     ``contact``: the first one of the rigid body [time].
     ``swing``: the longest half of a swing so far, pushed or not [time].

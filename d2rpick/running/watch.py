@@ -15,7 +15,7 @@ from d2rpick.base.errors import FormatError, HistoryError, RangeError
 from d2rpick.flight.window import FEWEST
 from d2rpick.histories.listings import WITH_AN_ERROR, ending
 from d2rpick.histories.source import expand, later_legs
-from d2rpick.running.evidence import Evidence, highest_energy
+from d2rpick.running.evidence import Evidence, highest_energy, range_of_energy
 from d2rpick.running.inner_motion import InnerMotion, swing_in, wait_of_deck
 from d2rpick.running.looks import Looks
 
@@ -27,10 +27,6 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.histories.names import Selection
     from d2rpick.running.evidence import Quiet
-
-# A switch is advised where the internal energy is this share of the way from the lowest to the highest of one wait:
-# in a trough of computed runs the energy after td was half of what it should be, from a peak 0.9 of it and more.
-_HIGH: Final = 0.75
 
 
 class Event(NamedTuple):
@@ -112,12 +108,11 @@ def _switch(history: History, one: Quiet) -> Iterator[Event]:
     """Advise a switch where the internal energy is high, within one more wait; else where it was highest in it."""
     last = one.seen + one.wait
     for now, energy in zip(*(values.tolist() for values in history.between(one.seen, last)), strict=True):
-        before = history.between(now - one.wait, now)[1]
-        low, high = float(before.min()), float(before.max())
+        low, high, enough = range_of_energy(history, now, one.wait)
         where = f"the internal energy is {energy:.4g}, of {low:.4g} to {high:.4g} within one wait"
         if one.end is not None and now >= one.end:
             return
-        if energy >= low + _HIGH * (high - low):
+        if energy >= enough:
             yield Event("switch", now, now, f"switch now: {where}{_swings(history, one, now)}", one.wait, tr=now)
             return
         if now == one.seen:
