@@ -134,13 +134,17 @@ def _leads(ids: Sequence[int], printing: Printing) -> dict[int, int]:
 
 
 class Waiting(NamedTuple):
-    """What a switch waits for: its CODE, the contact, the delay after it [time], the set of its pair, and its place."""
+    """What a switch waits for: its CODE, the contact, the delay after it [time], the set of its pair, and its place.
+
+    ``offset`` is how far from each other the surfaces of the contact are when it switches back [length].
+    """
 
     code: int = 0
     contact: int = 0
     delay: float = 0.0
     other: int = 0
     paired: int = 0
+    offset: float = 0.0
 
 
 def header(
@@ -155,7 +159,7 @@ def header(
         f"{on.contact:10d}{on.other:10d}{on.paired:10d}"
     )
     yield _COUNT_HEAD
-    yield f"{0:10d}{0:10d}{0:10d}{step_cap:>10s}{counts[0]:10d}{counts[1]:10d}{'0.0':>10s}"
+    yield f"{0:10d}{0:10d}{0:10d}{step_cap:>10s}{counts[0]:10d}{counts[1]:10d}{shortest(on.offset):>10s}"
 
 
 def _sets(first: tuple[int, int], count: int) -> Iterator[tuple[int, int]]:
@@ -263,10 +267,13 @@ def _radioss_sensors(windows: Sequence[Times], printing: Printing, remarks: Sequ
     how = (
         f"Each /RBODY with main node {nodes} takes sensor {last}: sens_ID, columns 11 to 20 below its title.",
         f"/BEGIN needs version {STOPS_SINCE} or later, which knows when a sensor of time stops.",
-        "The largest step holds for the whole run: below the deformable step it changes that run; set --step-cap.",
     )
-    told = _told(windows, printing, (*_OF_SENSORS, *how, *remarks), files, sensors)
-    return replace(told, sensors=dict.fromkeys(ids, last))
+    slow = (
+        f"The largest step, {cap:.4g}, holds for the whole run, which takes {end / cap:.0f} cycles at least;"
+        " where it takes fewer without switching, set --step-cap to the deformable step or more."
+    )
+    told = _told(windows, printing, (*_OF_SENSORS, *how, slow, *remarks), files, sensors)
+    return replace(told, sensors=dict.fromkeys(ids, last), notes=(*told.notes, slow))
 
 
 def _sensors(windows: Sequence[Times], first: int) -> tuple[str, int]:
