@@ -11,7 +11,7 @@ from d2rpick.base.errors import Caution, D2RPickError
 from d2rpick.base.files import append_whole, record_of, signed, write_whole
 from d2rpick.deck.model import DISCRETE
 from d2rpick.histories.names import Selection
-from d2rpick.running.evidence import Evidence, highest_energy, range_of_energy
+from d2rpick.running.evidence import Evidence
 from d2rpick.running.inner_motion import InnerMotion, Wait, swing_in
 from d2rpick.running.looks import Looks
 from d2rpick.running.sequence import LOAD, Leg, Order, Seen, began_rigid, next_order, window_of
@@ -289,15 +289,18 @@ class Observer:
             why = f"as given, but {why}" if asked and asked.time > self._given else "as given"
         least = _TOLD * (wait or 0.0)
         pauses = self._evidence.pauses(order.start)
-        peak = highest_energy(history, max(order.start, free), now)
-        if wait and history.energy_at(now) >= range_of_energy(history, now, wait)[2]:
-            peak = order.until
+        energies = [history.energy_at(max(time, float(history.time[0]))) for time in (order.start, now)]
+        earlier = energies[0] > energies[1] and order.start >= max(free, order.after)
         return Seen(
-            free, wait, why, bool(flights) and flights[-1].end is None,
-            peak, idle,
-            tuple(one for one in pauses if wait and least <= one[1] - one[0] and one[0] >= order.after),
+            free=free,
+            wait=wait,
+            why=why,
+            flies=bool(flights) and flights[-1].end is None,
+            tr=order.start if earlier else order.until,
+            idle=idle,
+            short=tuple(one for one in pauses if wait and least <= one[1] - one[0] and one[0] >= order.after),
             swing=self._motion.longest_swing(now),
-        )  # fmt: skip
+        )
 
     def _needed(self, start: float, now: float) -> float | None:
         asked = self._motion.wait(start, now)
@@ -314,8 +317,7 @@ class Observer:
     def _floor(self, known: float) -> Wait | None:
         """Give the longest wait that is known from the deck, or from the record of flights before."""
         if known > (self._of_deck.time if self._of_deck else 0.0):
-            most = self._of_deck.most if self._of_deck else 0.0
-            return Wait(known, "record", "as in the flight before", most)
+            return Wait(known, "record", "as in the flight before")
         return self._of_deck
 
 

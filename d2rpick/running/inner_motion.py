@@ -53,14 +53,14 @@ _ROUND_OFF: Final = 1e-6
 class Wait(NamedTuple):
     """Time without force that counts as flight [time], where it comes from and why.
 
-    ``source``: "given", "record", "deck" or "at-rest".  ``most``: half of the period by a deck, of which the wait is
-    what it cannot be below [time].
+    ``source``: "given", "record", "deck" or "at-rest".  ``least``: what half of a period of the deck cannot be below
+    [time]; else it is the wait itself.
     """
 
     time: float
     source: str
     reason: str
-    most: float = 0.0
+    least: float | None = None
 
 
 class _HalfPeriod(NamedTuple):
@@ -256,7 +256,7 @@ class InnerMotion:
         own = self._evidence.free_since(swing.end) <= swing.begin
         motion.has_own |= own
         inner = swing.strength >= _SLOW * strongest
-        most = _BEYOND * self._of_deck.most if self._of_deck and self._of_deck.most else np.inf
+        most = _BEYOND * self._of_deck.time if self._of_deck and self._of_deck.source == "deck" else np.inf
         counts = inner and swing.half <= most and (own or not (motion.has_own or self._of_deck))
         half, who = (swing.half, motion.name) if counts and swing.half > longest.half else (longest.half, longest.name)
         over = swing.known if half > longest.half else longest.over
@@ -295,7 +295,7 @@ class InnerMotion:
     def longest_swing(self, now: float) -> float:
         """Longest half of a swing that is known ``now``, though a push may have made it longer [time]."""
         known = self._so_far(now)
-        return max(known.swing if known else 0.0, self._of_deck.most if self._of_deck else 0.0)
+        return max(known.swing if known else 0.0, self._of_deck.time if self._of_deck else 0.0)
 
     def _so_far(self, now: float) -> _Known | None:
         known = self._known[any(one.begins <= now for one in self._motions)]
@@ -323,22 +323,19 @@ class InnerMotion:
 
 
 def wait_of_deck(inventory: Inventory) -> Wait | None:
-    """Give half of what the longest period cannot be below, by a deck; None where its springs are not known.
-
-    The record shows what it is more than that; half of that was longer than any gap in the load of a car.
-    """
+    """Give half of the longest period of the springs of a deck; None where these are not known."""
     found = inner_period(inventory)
     if found is None:
         return None
-    reason = f"half of {found.least:.3g}, the least period of {found.reason}"
-    return Wait(found.least / 2, "deck", reason, found.time / 2)
+    return Wait(found.time / 2, "deck", f"half of the period {found.time:.3g} of {found.reason}", found.least / 2)
 
 
 def check_wait(given: float, known: Wait | None, name: str) -> None:
-    """RangeError where a wait that was given is below half of a known period."""
-    if known and given < _EXACT * known.time:
+    """RangeError where a wait that was given is below half of what a known period cannot be below."""
+    least = known and (known.time if known.least is None else known.least)
+    if known and least and given < _EXACT * least:
         raise RangeError(
-            f"{name}: `wait` {given:g} is below {known.time:.3g}, half of a period that is known: {known.reason}; "
+            f"{name}: `wait` {given:g} is below {least:.3g}, half of a period that is known: {known.reason}; "
             "a gap in the load would pass for flight"
         )
 

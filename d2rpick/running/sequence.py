@@ -16,13 +16,13 @@ from d2rpick.flight.window import FEWEST
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-LOAD, APPROACH, PROBE, RIGID = "load", "approach", "probe", "rigid"
+LOAD, PROBE, RIGID = "load", "probe", "rigid"
 RIGID_KINDS: Final = (PROBE, RIGID)
 # Where a leg ends, its history does so up to one state earlier; times within it are the same.
 _STATES: Final = 1.5
 # The solver numbers so many legs; flights are looked for as long as so many are left, which takes the run to its end.
 _MOST_LEGS, _KEPT_BACK = 99, 10
-# A leg while nothing acts is at least this share of the wait: tr is the highest energy in it.
+# A leg while nothing acts is at least this share of the wait: at one of its ends the energy is higher.
 _LEAST: Final = 0.25
 # A leg where nothing tells how long to wait, of the run.
 _UNKNOWN: Final = 0.02
@@ -87,17 +87,17 @@ class Seen(NamedTuple):
     """What the record shows up to the end of a leg.
 
     ``free``: since when no force acts [time]; ``wait``: how long that is asked for [time], None where it is not known,
-    and ``why``; ``flies``: whether it has lasted for so long; ``peak``: a good tr, at a high energy [time];
+    and ``why``; ``flies``: whether it has lasted for so long; ``tr``: the end of the leg with the higher energy [time];
     ``idle``: no energy was ever stored; ``short``: begin and end of flights in the leg that did not last for the wait;
-    ``contact``: the first one of the rigid body [time].
-    ``swing``: the longest half of a swing so far, pushed or not [time].
+    ``contact``: the first one of the rigid body [time]; ``swing``: the longest half of a swing so far, pushed or not
+    [time].
     """
 
     free: float = 0.0
     wait: float | None = None
     why: str = ""
     flies: bool = False
-    peak: float = 0.0
+    tr: float = 0.0
     idle: bool = False
     short: tuple[tuple[float, float], ...] = ()
     contact: float | None = None
@@ -149,8 +149,6 @@ def next_order(legs: Sequence[Leg], limits: Limits) -> Order | None:
         order: Order | None = _before_contact(legs, limits)
     elif last.until >= limits.end:
         order = None
-    elif last.kind == APPROACH:
-        order = _following(last, PROBE, _probed(legs, last.until, limits))
     elif last.kind == PROBE:
         order = _following(last, PROBE, _probed(legs, began_rigid(legs).start, limits))
     elif last.kind == RIGID:
@@ -171,11 +169,9 @@ def _after_load(legs: Sequence[Leg], limits: Limits) -> Order:
     switches = seen.flies and seen.free >= last.after and limits.end - last.until > _WORTH * limits.end
     if not switches or last.number > _MOST_LEGS - _KEPT_BACK:
         return _following(last, LOAD, _loaded(legs[-1], limits))
-    if seen.idle or seen.peak >= last.until - limits.same:
+    if seen.idle or seen.tr > last.start:
         return _following(last, PROBE, _probed(legs, last.until, limits))
-    if seen.peak <= last.start + limits.same:
-        return last._replace(kind=PROBE, until=_probed(legs, last.start, limits, now=last.start))
-    return last._replace(kind=APPROACH, until=seen.peak)
+    return last._replace(kind=PROBE, until=_probed(legs, last.start, limits, now=last.start))
 
 
 def _loaded(leg: Leg, limits: Limits) -> float:

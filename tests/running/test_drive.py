@@ -251,7 +251,7 @@ def test_how_far_a_run_is_can_be_told_at_any_time(tmp_path: Path) -> None:
         assert driver.progress(9.0) == f"leg 2, rigid: 0.05 to 0.2 of {END:g}"
 
 
-IDLE, SWINGS = Seen(0.0, 0.02, flies=True, idle=True), Seen(0.05, 0.05, flies=True, peak=0.1, swing=0.02)
+IDLE, SWINGS = Seen(0.0, 0.02, flies=True, idle=True), Seen(0.05, 0.05, flies=True, tr=0.1, swing=0.02)
 WITHIN = Limits(1.0, 1e-3, 0.002, 0.01, 0.2)
 FLOWN = Leg(Order(LOAD, 1, 0.0, 0.1), SWINGS, 1000, 1.0)
 
@@ -317,8 +317,8 @@ def test_whatever_is_seen_the_run_comes_to_its_end_with_the_numbers_that_the_sol
         assert order.number <= 99
         free = share * order.until
         contact = order.start + share * (order.until - order.start) if order.rigid and flies else None
-        peak = order.start + share * (order.until - order.start)
-        legs.append(Leg(order, Seen(free, wait, flies=flies, peak=peak, contact=contact), 100, 1.0))
+        tr = order.start if flies else order.until
+        legs.append(Leg(order, Seen(free, wait, flies=flies, tr=tr, contact=contact), 100, 1.0))
         if order.kind == RIGID:
             legs[-1] = legs[-1]._replace(seen=Seen())  # it flies the same way as the probe did
 

@@ -194,7 +194,7 @@ def test_an_energy_that_jumps_in_the_first_state_makes_no_wait(jump: bool) -> No
 
 
 def test_a_swing_in_a_push_makes_no_wait_where_the_deck_tells_its_springs() -> None:
-    of_deck = Wait(0.01, "deck", "of the deck", 0.012)
+    of_deck = Wait(0.012, "deck", "of the deck", 0.01)
     motion = seen_in(record(BOX), None, of_deck)[1]
     assert sure(motion.longest(0.28)) == of_deck  # it falls
     assert 0.016 <= sure(motion.longest(0.7)).time <= 0.021  # the swing that was pushed at 302 ms took 24 ms
