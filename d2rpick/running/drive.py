@@ -12,9 +12,10 @@ from d2rpick.base.files import append_whole, record_of, signed, write_whole
 from d2rpick.deck.model import DISCRETE
 from d2rpick.histories.names import Selection
 from d2rpick.running.evidence import Evidence
-from d2rpick.running.inner_motion import InnerMotion, Wait, swing_in
+from d2rpick.running.inner_motion import InnerMotion, Wait
 from d2rpick.running.looks import Looks
 from d2rpick.running.sequence import LOAD, Leg, Order, Seen, began_rigid, next_order, window_of
+from d2rpick.running.swing import swing_in
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 JOURNAL: Final = "drive.ndjson"
 # Largest step while rigid over the mean one before: a rigid leg costs a few percent of a deformable one then, and the
 # state of a run is written often enough to show a contact.
-_STEP_RATIO: Final = 10.0
+_STEP_RATIO: Final = 5.0
 # A flight that did not last for the wait is told where it did for this share of it.
 _TOLD: Final = 0.5
 # Between two looks whether the solver is still at work, and from when on silence is told [s].

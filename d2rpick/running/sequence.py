@@ -28,7 +28,7 @@ _LEAST: Final = 0.25
 _UNKNOWN: Final = 0.02
 # A leg of a probe lasts for the wait, this share of what it has flown, or of the run: what it computes too much costs
 # some hundredths of a deformable run of the flight, and so does a leg more.
-_OF_FLOWN, _OF_RUN = 0.4, 0.01
+_OF_FLOWN, _OF_RUN = 0.4, 0.02
 # The restart of a leg, written and read, costs as much as so many deformable cycles (some five, measured).
 _RESTART: Final = 10
 # A flight of fewer half swings is too short to be switched: what still swings touches the ground at another time than

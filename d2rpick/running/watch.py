@@ -16,8 +16,9 @@ from d2rpick.flight.window import FEWEST
 from d2rpick.histories.listings import WITH_AN_ERROR, ending
 from d2rpick.histories.source import expand, later_legs
 from d2rpick.running.evidence import Evidence, highest_energy, range_of_energy
-from d2rpick.running.inner_motion import InnerMotion, swing_in, wait_of_deck
+from d2rpick.running.inner_motion import InnerMotion, wait_of_deck
 from d2rpick.running.looks import Looks
+from d2rpick.running.swing import swing_in
 
 if TYPE_CHECKING:
     import os
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import History
     from d2rpick.histories.names import Selection
-    from d2rpick.running.evidence import Quiet
+    from d2rpick.running.witness import Quiet
 
 
 class Event(NamedTuple):

@@ -16,8 +16,9 @@ from d2rpick.choice.question import Settings
 from d2rpick.histories.history import EXACT, Given, History, Momenta, rows_of
 from d2rpick.histories.names import Part
 from d2rpick.histories.opening import Selection, open_run
-from d2rpick.running.evidence import Evidence, Quiet, highest_energy, quiet_times
+from d2rpick.running.evidence import Evidence, highest_energy, quiet_times
 from d2rpick.running.inner_motion import InnerMotion, Wait
+from d2rpick.running.witness import Quiet
 from tests.command import ROOT
 from tests.energies import sure
 from tests.records import table, until

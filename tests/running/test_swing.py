@@ -9,7 +9,7 @@ from d2rpick.flight.flight import Flight
 from d2rpick.flight.position_error import Drift, drift_in_flight
 from d2rpick.histories.history import EXACT, History, Momenta
 from d2rpick.histories.names import Part
-from d2rpick.running.inner_motion import swing_in
+from d2rpick.running.swing import swing_in
 from tests.command import ENERGY, ROOT, run
 from tests.energies import sure
 from tests.reading import read_history, solved
