@@ -58,9 +58,9 @@ CMD = ("text", "CMD")
 def drive(deck: str, folder: str, resume: bool, dry_run: bool, output: Output, **asked: Any) -> None:
     r"""Compute a Radioss run that switches itself: no reference is needed.
 
-    DECK, a starter deck with one engine file, is copied into RUNDIR.  Each flight begins when no force has acted for
-    the wait; tr is the highest energy within one more.  A rigid probe finds the next contact and is thrown away.  Then
-    the run is rigid to the margin before it, and goes on deformable.  What is interrupted goes on with --resume.
+    DECK, a starter deck with one engine file, is copied into RUNDIR.  It flies when no force has acted for the wait.
+    Then a rigid probe finds the next contact, and the run goes on deformable from the margin before it.  The same
+    command computes the same run.  What is interrupted goes on with --resume.
 
     Examples
     --------
