@@ -182,7 +182,7 @@ class Driver:
                 if silent > said:
                     said = 2 * silent
                     self.told(f"the solver has written nothing for {silent:.0f} s; Ctrl-C ends it, then --resume")
-        except (KeyboardInterrupt, D2RPickError):
+        except KeyboardInterrupt:
             self.told("stopping: the leg that is being computed is begun again with --resume")
             self.solver.end()
             raise
@@ -196,7 +196,10 @@ class Driver:
         if not self.solver.ended_well(number):
             words = self.solver.last_words(number)
             raise D2RPickError(f"{self.solver.file(number, '.out')}: the solver failed: {words}; --resume goes on")
-        if not self.solver.whole(number) or not self.solver.came_to(number, order.until - 3 * self.limits.interval):
+        cycles, cpu = self.solver.took(number)
+        step = (order.until - order.start) / (cycles or 1)
+        last_state = order.until - max(3 * self.limits.interval, 2 * step)
+        if not self.solver.whole(number) or not self.solver.came_to(number, last_state):
             if order in self._again:
                 where = self.solver.file(number, ".out")
                 raise D2RPickError(f"{where}: the leg left no whole restart; make room on the disk, then --resume")
@@ -206,11 +209,11 @@ class Driver:
             return
         legs = self.legs
         seen = self.observer.look(order, self._histories(order, legs), self._longest_wait(order, legs))
-        ended = Leg(order, seen, *self.solver.took(number))
+        ended = Leg(order, seen, cycles, cpu)
         place = self._place([*legs, ended]) if order.rigid else ""
         if place:
             self.told(f"warning: out-of-place: {place}")
-        self.journal.add("ended", order=order, seen=seen, cycles=ended.cycles, cpu=ended.cpu, place=place)
+        self.journal.add("ended", order=order, seen=seen, cycles=cycles, cpu=cpu, place=place)
         self.solver.keep({number, number - 1, number - 2, *self._begin_of_window([*legs, ended])})
 
     def _begin_of_window(self, legs: Sequence[Leg]) -> set[int]:

@@ -200,8 +200,9 @@ class Solver:
             with suppress(ProcessLookupError, PermissionError):
                 os.killpg(int(text), sign)
             begun = time.monotonic()
-            while self.alive and time.monotonic() - begun < _ENDS:
-                time.sleep(_PAUSE)
+            with suppress(KeyboardInterrupt):  # of somebody who cannot wait
+                while self.alive and time.monotonic() - begun < _ENDS:
+                    time.sleep(_PAUSE)
 
     def silent_for(self) -> float:
         """For how long the solver has written nothing [s]."""
@@ -225,15 +226,12 @@ class Solver:
         the contacts; a disk that is full leaves shorter ones, although the listing ends as it should.
         """
         first, own = self._restarts(0), self._restarts(number)
-        sizes = {path.name.rpartition("_")[2]: path.stat().st_size for path in first}
-        names = [path.name.rpartition("_")[2] for path in own]
-        return (
-            bool(own)
-            and {*names} >= {*sizes}
-            and all(
-                path.stat().st_size >= _WHOLE * sizes.get(domain, 1) and _begins_with_its_name(path)
-                for path, domain in zip(own, names, strict=True)
-            )
+        sizes = {path.name[-8:]: path.stat().st_size for path in first}
+        named = all(map(_begins_with_its_name, first))
+        return {path.name[-8:] for path in own} >= sizes.keys() != set() and all(
+            path.stat().st_size >= max(_WHOLE * sizes.get(path.name[-8:], 1), 1)
+            and (not named or _begins_with_its_name(path))
+            for path in own
         )
 
     def came_to(self, number: int, end: float) -> bool:
