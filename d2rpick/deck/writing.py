@@ -146,8 +146,7 @@ def _radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     starter = run.starter.sources[0].name
     _refuse_sensors(run.starter, card)
     main_text = with_cards(run.starter.sources[0], card.starter, blocks(run.starter.sources[0]))
-    main_name = f"{leg.name}_0000.rad"  # the engine looks for the restart of a starter deck with the name of its run
-    yield main_name, _with_sensors(SourceFile(starter, main_text), card.sensors)
+    yield Path(starter).name, _with_sensors(SourceFile(starter, main_text), card.sensors)
     further = list(blocks(leg.run.block.source))
     for (name, text), mine in zip(card.files.items(), printed, strict=True):
         kept = (text_of(block) for block in further if repeated(keyword(block), mine))
@@ -155,7 +154,7 @@ def _radioss(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
         others = [node for node in kept_off(run.legs) if node not in named]  # else they would be rigid from time 0
         lines = listed(others) if mine.cap is None else off(others)  # its text ends with the bodies that it puts off
         yield name, (text + "".join(f"{line}\n" for line in lines)).encode() + b"".join(kept)
-    for name, content in copies(run.starter.sources[1:], starter, {main_name, *card.files}):
+    for name, content in copies(run.starter.sources[1:], starter, {Path(starter).name, *card.files}):
         yield name, _with_sensors(SourceFile(name, content), card.sensors)
 
 

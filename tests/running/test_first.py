@@ -162,12 +162,3 @@ def test_what_falls_from_rest_is_rigid_from_the_start_in_ls_dyna_too(tmp_path: P
     notes = d2.first(deck, tmp_path / "next", parts="1-3", wait=0.02).notes
     assert any("give the time of the last push" in note for note in notes) is thrown
     assert any("At rest in free fall" in note for note in notes) is not thrown
-
-
-def test_a_run_is_written_under_the_name_that_its_engine_looks_for(tmp_path: Path) -> None:
-    main = Path(radioss(tmp_path / "ref"))
-    for suffix in ("0000", "0001"):
-        (tmp_path / "ref" / f"box_{suffix}.rad").rename(tmp_path / "ref" / f"other_{suffix}.rad")
-    found = d2.first(main.with_name("other_0000.rad"), tmp_path / "next", parts=(1, 2))
-    assert Path(found.files[0]).name == "box_0000.rad"
-    assert Path(found.files[1]).name == "box_0001.rad"
