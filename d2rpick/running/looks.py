@@ -38,6 +38,11 @@ class Looks:
         self._taken: dict[str, _Taken] = {}
         self._time = float("-inf")
 
+    @property
+    def grow(self) -> bool:
+        """Whether the files are of a format of which what is new can be read alone."""
+        return bool(self._taken)
+
     def new_states(self, names: Sequence[str]) -> tuple[History | None, bool]:
         """Read what is new, None where nothing is, and say whether it follows what was read before.
 

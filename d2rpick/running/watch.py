@@ -1,7 +1,7 @@
 """Watch a run while it is computed: what happens in it, event after event, and what is new since the last look.
 
 Nothing is started, stopped or changed, and each event is told by the states up to the one at which it is seen.  The
-time to the next look is a hundred times what one costs, which is one percent of a core, but five seconds at most.
+time to the next look is a hundred times what one costs: one percent of a core.
 """
 
 from __future__ import annotations
@@ -133,7 +133,8 @@ def _swings(history: History, one: Quiet, tr: float) -> str:
     return f"; {swing.told}" if swing and swing.flight > tr - one.start else ""
 
 
-# Share of a core, shortest and longest time between two looks, and how long a run that is silent writes nothing [s].
+# Share of a core, shortest time between two looks, longest one where they read what is new, and how long a run that
+# is silent writes nothing [s].
 _SHARE: Final = 0.01
 _SHORTEST, _LONGEST, _SILENT = 0.5, 5.0, 60.0
 _PACKED: Final = "normally: its history is packed"
@@ -193,6 +194,11 @@ class Watch:
         if silent > self._silent and not self.ended:
             self._silent = 2 * silent
             yield self._event("silent", f"nothing was written for {silent:.0f} s")
+
+    @property
+    def reads_what_is_new(self) -> bool:
+        """Whether the next look reads what is new alone."""
+        return self._looks.grow
 
     def state(self) -> Event:
         """Tell how it stands, with the time since which it flies, if it does."""
@@ -260,7 +266,8 @@ def follow(
     while True:
         begun = time.process_time()
         yield from watch.news()
-        pause = min(max(_SHORTEST, (time.process_time() - begun) / _SHARE), _LONGEST)
+        pause = max(_SHORTEST, (time.process_time() - begun) / _SHARE)
+        pause = min(pause, _LONGEST) if watch.reads_what_is_new else pause  # the first look costs more than others
         left = end - time.monotonic()
         if left <= 0 or (watch.ended and lasting is None):
             yield watch.state()
