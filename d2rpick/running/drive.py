@@ -14,7 +14,7 @@ from d2rpick.histories.names import Selection
 from d2rpick.running.evidence import Evidence
 from d2rpick.running.inner_motion import InnerMotion, Wait
 from d2rpick.running.looks import Looks
-from d2rpick.running.sequence import LOAD, Leg, Order, Seen, began_rigid, next_order, window_of
+from d2rpick.running.sequence import LOAD, Leg, Order, Seen, next_order, together, window_of
 from d2rpick.running.swing import swing_in
 
 if TYPE_CHECKING:
@@ -155,17 +155,12 @@ class Driver:
         number = order.number
         self.solver.check_room(number, 1 - order.start / self.limits.end)
         self.solver.clear(number)
-        legs = self.legs
-        goes_on = order.rigid and bool(legs) and legs[-1].order.rigid and order.start > self._tr(order, legs)
-        text = self.deck.leg(number, order.until, self._cap() if order.rigid else None, frozen=goes_on)
+        frozen = order.rigid and len(together(order, self.legs)) > 1
+        text = self.deck.leg(number, order.until, self._cap() if order.rigid else None, frozen=frozen)
         write_whole(self.solver.file(number, ".rad"), text)
         self.journal.add("started", order=order)
         self.solver.start(self.commands.words("engine", self.solver.file(number, ".rad").name), number)
         self.told(f"leg {number}: {order.kind} from {order.start:.6g} to {order.until:.6g}")
-
-    def _tr(self, order: Order, legs: Sequence[Leg]) -> float:
-        """When the parts became rigid that are so in a leg."""
-        return min([order.start, *(leg.order.start for leg in _chain(order, legs) if leg.order.rigid is order.rigid)])
 
     def _cap(self) -> float:
         """Largest step of a rigid leg, by the smallest mean one of the deformable legs before [time]."""
@@ -208,50 +203,24 @@ class Driver:
             self.journal.add("lost", order=order)
             return
         legs = self.legs
-        seen = self.observer.look(order, self._histories(order, legs), self._longest_wait(order, legs))
-        ended = Leg(order, seen, cycles, cpu)
-        place = self._place([*legs, ended]) if order.rigid else ""
+        record = together(order, legs)
+        before = [leg.seen for leg in legs if leg.order.until <= record[0].start and not leg.seen.idle]
+        known = max((seen.wait or 0.0 for seen in before), default=0.0)
+        seen = self.observer.look(order, [self.solver.history(one.number) for one in record], known)
+        place = self._place([*legs, Leg(order, seen, cycles, cpu)], record[0])
         if place:
             self.told(f"warning: out-of-place: {place}")
         self.journal.add("ended", order=order, seen=seen, cycles=cycles, cpu=cpu, place=place)
-        self.solver.keep({number, number - 1, number - 2, *self._begin_of_window([*legs, ended])})
+        # a window that is left out is computed from where it begins
+        self.solver.keep({number, number - 1, number - 2, *([record[0].number - 1] if order.rigid else [])})
 
-    def _begin_of_window(self, legs: Sequence[Leg]) -> set[int]:
-        """Number of the leg behind which the parts became rigid: a window that is left out is computed from there."""
-        last = legs[-1].order
-        return {min([last.number, *(leg.order.number for leg in _chain(last, legs))]) - 1} if last.rigid else set()
-
-    def _longest_wait(self, order: Order, legs: Sequence[Leg]) -> float:
-        """Longest wait that was asked for before the record that a leg goes on with [time]."""
-        begins = self._tr(order, legs)
-        return max(
-            (leg.seen.wait or 0.0 for leg in legs if leg.order.until <= begins and not leg.seen.idle), default=0.0
-        )
-
-    def _place(self, legs: Sequence[Leg]) -> str:
-        """Say so where parts swing too much to be rigid in a window whose end is known."""
-        before = _chain(began_rigid(legs)._replace(kind=LOAD), legs)
-        if legs[-1].seen.contact is None or not before:
+    def _place(self, legs: Sequence[Leg], first: Order) -> str:
+        """Say so where parts swing too much to be rigid in a window, from its ``first`` leg on, whose end is known."""
+        planned = window_of(legs, self.limits) if legs[-1].seen.contact is not None else None
+        if planned is None or planned.reason or first.number == 1:
             return ""
-        planned = window_of(legs, self.limits)
-        numbers = sorted(leg.order.number for leg in before)
-        place = self.observer.swing([self.solver.history(number) for number in numbers], planned)
-        return "" if planned.reason else place
-
-    def _histories(self, order: Order, legs: Sequence[Leg]) -> list[Path]:
-        """Histories of the legs whose record counts: of a rigid leg the rigid ones before it, else those since."""
-        numbers = sorted({order.number, *(leg.order.number for leg in _chain(order, legs))})
-        return [self.solver.history(number) for number in numbers]
-
-
-def _chain(order: Order, legs: Sequence[Leg]) -> list[Leg]:
-    """Give the legs before a leg, as far back as the parts were rigid as they are in it, or deformable."""
-    latest = {leg.order.number: leg for leg in legs}
-    found, number = list[Leg](), order.number - 1
-    while (leg := latest.get(number)) and leg.order.rigid is order.rigid:
-        found.append(leg)
-        number -= 1
-    return found
+        numbers = [one.number for one in together(first._replace(kind=LOAD), legs)[:-1]]
+        return self.observer.swing([self.solver.history(number) for number in numbers], planned)
 
 
 class Observer:

@@ -6,7 +6,6 @@ machine is.  One that is thrown away has the number of the leg that takes its pl
 
 from __future__ import annotations
 
-from itertools import takewhile
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import D2RPickError
@@ -150,7 +149,7 @@ def next_order(legs: Sequence[Leg], limits: Limits) -> Order | None:
     elif last.until >= limits.end:
         order = None
     elif last.kind == PROBE:
-        order = _following(last, PROBE, _probed(legs, began_rigid(legs).start, limits))
+        order = _following(last, PROBE, _probed(legs, _became_rigid(legs).start, limits))
     elif last.kind == RIGID:
         order = _following(last, LOAD, _loaded(legs[-1], limits))._replace(after=last.until)
     else:
@@ -188,31 +187,30 @@ def _loaded(leg: Leg, limits: Limits) -> float:
 def _probed(legs: Sequence[Leg], tr: float, limits: Limits, now: float | None = None) -> float:
     """When the next leg of a probe that began at ``tr`` ends."""
     now = legs[-1].order.until if now is None else now
-    until = now + max(flown(legs).wait or 0.0, _OF_FLOWN * (now - tr), _OF_RUN * limits.end, FEWEST * limits.interval)
+    until = now + max(_flown(legs).wait or 0.0, _OF_FLOWN * (now - tr), _OF_RUN * limits.end, FEWEST * limits.interval)
     return until if until < limits.end - limits.same else limits.end
 
 
 def _before_contact(legs: Sequence[Leg], limits: Limits) -> Order:
     """Go on from the last leg of a probe that ended before td, or deformable where the window does not pay."""
-    window, first = window_of(legs, limits), began_rigid(legs)
+    window, first = window_of(legs, limits), _became_rigid(legs)
     if window.reason:
         number, now = first.number, first.start
-        until = _loaded(Leg(Order(RIGID, number - 1, now, now), flown(legs)), limits)
+        until = _loaded(Leg(Order(RIGID, number - 1, now, now), _flown(legs)), limits)
         return Order(LOAD, number, now, until, after=now + limits.same)
-    chain = [leg.order for leg in legs if leg.order.rigid and leg.order.start >= first.start]
-    before = [one for one in chain if one.until <= window.td]
-    last = max(before, key=lambda one: one.until, default=None)
+    before = [one for one in together(legs[-1].order, legs) if one.until <= window.td]
+    last = before[-1] if before else None
     if last is None:
         return first._replace(kind=RIGID, until=window.td)
     if window.td - last.until <= limits.same:
-        until = _loaded(Leg(last, flown(legs)), limits)
+        until = _loaded(Leg(last, _flown(legs)), limits)
         return _following(last, LOAD, until)._replace(after=last.until)
     return _following(last, RIGID, window.td)
 
 
 def window_of(legs: Sequence[Leg], limits: Limits) -> Window:
     """Give the window before the contact that the last of these legs has shown, or the end of the run without one."""
-    tr, before, contact = began_rigid(legs).start, flown(legs), legs[-1].seen.contact
+    tr, before, contact = _became_rigid(legs).start, _flown(legs), legs[-1].seen.contact
     wait = before.wait or 0.0
     if contact is None:
         return Window(before.free, tr, legs[-1].order.until, None, wait)
@@ -228,7 +226,7 @@ def _why_left_out(legs: Sequence[Leg], rigid_time: float, limits: Limits) -> str
     """Say why a window is not worth its probe and restarts, by the cycles so far: processor times differ each time."""
     if rigid_time <= 0:
         return "its margin begins before tr"
-    frozen = began_rigid(legs)
+    frozen = _became_rigid(legs)
     probed = [leg for leg in legs if leg.order.rigid and leg.order.start >= frozen.start]
     took = sum((leg.cycles or 0) * limits.rigid_cycle + _RESTART for leg in probed)
     saved = (rigid_time - took / _cycles(legs)) / limits.end
@@ -241,13 +239,20 @@ def _cycles(legs: Sequence[Leg]) -> float:
     return sum(leg.cycles or 0 for leg in loaded) / sum(leg.length for leg in loaded) if loaded else float("inf")
 
 
-def began_rigid(legs: Sequence[Leg]) -> Order:
+def together(order: Order, legs: Sequence[Leg]) -> list[Order]:
+    """Give the legs before a leg, and it, as far back as the parts were rigid as they are in it, or deformable."""
+    latest, found = {leg.order.number: leg.order for leg in legs}, [order]
+    while (before := latest.get(found[0].number - 1)) and before.rigid is order.rigid:
+        found.insert(0, before)
+    return found
+
+
+def _became_rigid(legs: Sequence[Leg]) -> Order:
     """Order of the leg in which the parts became rigid, of those that the last leg goes on with."""
-    *_, first = takewhile(lambda leg: leg.order.rigid, reversed(legs))
-    return first.order
+    return together(legs[-1].order, legs)[0]
 
 
-def flown(legs: Sequence[Leg]) -> Seen:
+def _flown(legs: Sequence[Leg]) -> Seen:
     """What was seen of the flight when it was decided to switch."""
     return next(leg.seen for leg in reversed(legs) if leg.order.kind == LOAD)
 
