@@ -202,7 +202,7 @@ def _before_contact(legs: Sequence[Leg], limits: Limits) -> Order:
     last = before[-1] if before else None
     if last is None:
         return first._replace(kind=RIGID, until=window.td)
-    if window.td - last.until <= limits.same:
+    if last.until == window.td:
         until = _loaded(Leg(last, _flown(legs)), limits)
         return _following(last, LOAD, until)._replace(after=last.until)
     return _following(last, RIGID, window.td)
@@ -216,6 +216,8 @@ def window_of(legs: Sequence[Leg], limits: Limits) -> Window:
         return Window(before.free, tr, legs[-1].order.until, None, wait)
     flight = contact - before.free
     td = contact - limits.margin_of(flight, idle=before.idle)
+    ends = [one.until for one in together(legs[-1].order, legs) if 0 <= td - one.until <= limits.same]
+    td = max(ends, default=td)  # a leg that ended there need not go on by a state
     reason = _why_left_out(legs, td - tr, limits)
     if not before.idle and flight < _SWINGS * before.swing:
         reason = f"shorter than {_SWINGS:g} half swings of {before.swing:.3g}: its landing is not known"

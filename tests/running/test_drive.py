@@ -16,6 +16,7 @@ import pytest
 from hypothesis import given
 from hypothesis.strategies import booleans, floats, lists, tuples
 
+from d2rpick.api.arguments import read_windows
 from d2rpick.api.drives import Driving
 from d2rpick.base.errors import D2RPickError
 from d2rpick.histories.opening import open_run
@@ -98,6 +99,10 @@ def test_a_run_is_rigid_in_its_flight_and_comes_to_its_end(whole: tuple[Path, di
     over = run(*asked(folder, "--resume"))
     assert f"resumed: legs that are over: {len(legs)}, the last at {END}" in over.stderr
     assert json.loads(over.stdout)["windows"] == found["windows"]
+    journal = (folder / "run" / "drive.ndjson").read_text()
+    switched = [one for one in json.loads(over.stdout)["windows"] if one["reason"] is None]
+    written = read_windows(journal, "drive.ndjson")
+    assert np.array(written) == pytest.approx(np.array([(one["tr"], one["td"]) for one in switched]), abs=0.0021)
 
 
 @pytest.mark.slow
