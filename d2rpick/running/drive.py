@@ -243,7 +243,7 @@ class Observer:
         """
         states, follows = self._looks.new_states([str(path) for path in histories])
         if not follows:
-            self._evidence, self._motion = Evidence(), InnerMotion(None, self._floor(known))
+            self._evidence, self._motion = Evidence(), InnerMotion(None, self._of_deck, known)
         if states is not None and states.time.size:
             self._evidence.take(states)
             self._motion.take(states, self._evidence)
@@ -286,12 +286,6 @@ class Observer:
         history = self._whole.whole([str(path) for path in histories])
         found = swing_in(history, planned.free, planned.tr)
         return f"tr = {planned.tr:.6g}: {found.told}" if found and found.flight > planned.td - planned.free else ""
-
-    def _floor(self, known: float) -> Wait | None:
-        """Give the longest wait that is known from the deck, or from the record of flights before."""
-        if known > (self._of_deck.time if self._of_deck else 0.0):
-            return Wait(known, "record", "as in the flight before")
-        return self._of_deck
 
 
 class Journal:

@@ -38,8 +38,9 @@ _RESOLVED: Final = 4
 _SLOWEST: Final = 1e-3
 # What has swung for so many times its longest half period goes on for nobody knows how long.
 _LONGER: Final = 2.0
-# A swing that takes more than so many times half of the period that the deck tells is none of its springs.
-_BEYOND: Final = 2.5
+# A swing that no push disturbed and that takes more than so many times half of the period of the deck is that of a body
+# that turns; one that was pushed counts as so long at most.
+_TURNS, _BEYOND = 1.5, 2.5
 # A period is known no better: a wait that is given may be so much shorter.
 _EXACT: Final = 0.9
 # Parts of a smaller share of the mass move the others too little.
@@ -176,11 +177,14 @@ class _Known(NamedTuple):
 class InnerMotion:
     """The wait that a record asks for at each of its states, by what it has shown of its inner motion up to there.
 
-    ``given`` is asked for by the user [time]; ``of_deck`` is what the deck tells, or the record of flights before.
+    ``given`` is asked for by the user, ``before`` by the record of flights before [time], ``of_deck`` by the deck.
     """
 
-    def __init__(self, given: float | None = None, of_deck: Wait | None = None) -> None:
-        self._given, self._of_deck = given, of_deck
+    def __init__(self, given: float | None = None, of_deck: Wait | None = None, before: float = 0.0) -> None:
+        self._given, self._floor = given, of_deck
+        self._springs = of_deck.time if of_deck else np.inf
+        if before > (of_deck.time if of_deck else 0.0):
+            self._floor = Wait(before, "record", "as in the flight before")
         self._evidence = Evidence()
         self._motions: list[_Motion] = []  # of parts along axes
         self._going_on: dict[tuple[int, int], _Motion] = {}  # of these, as long as the same parts move
@@ -253,12 +257,11 @@ class InnerMotion:
         strongest = max(longest.strength, swing.strength)
         own = self._evidence.free_since(swing.end) <= swing.begin
         motion.has_own |= own
-        inner = swing.strength >= _SLOW * strongest
-        most = _BEYOND * self._of_deck.time if self._of_deck and self._of_deck.source == "deck" else np.inf
-        counts = inner and swing.half <= most and (own or not (motion.has_own or self._of_deck))
+        inner = swing.strength >= _SLOW * strongest and not (own and swing.half > _TURNS * self._springs)
+        counts = inner and (own or not (motion.has_own or self._floor))
         half, who = (swing.half, motion.name) if counts and swing.half > longest.half else (longest.half, longest.name)
         over = swing.known if half > longest.half else longest.over
-        longest_swing = max(longest.swing, min(swing.half, most) if inner else 0.0)
+        longest_swing = max(longest.swing, min(swing.half, _BEYOND * self._springs) if inner else 0.0)
         so_far.append(_Known(swing.known, half, strongest, who, over, longest_swing))
 
     def needed(self, start: float, now: float) -> float | None:
@@ -277,7 +280,7 @@ class InnerMotion:
             return Wait(float(time[FEWEST - 1] - time[0]), "at-rest", f"nothing vibrates: {FEWEST} states are enough")
         known = self.longest(now)
         if self._given is None:
-            return None if self._of_deck is None and self._swings_on(now) else known
+            return None if self._floor is None and self._swings_on(now) else known
         if now - start >= self._given and not at_rest:
             check_wait(self._given, known, ", ".join(self._evidence.history.source))
         return Wait(self._given, "given", "as given")
@@ -285,15 +288,15 @@ class InnerMotion:
     def longest(self, now: float) -> Wait | None:
         """Give half of the longest period that is known ``now``, by the deck or the record so far."""
         known = self._so_far(now)
-        if known is None or known.half <= (self._of_deck.time if self._of_deck else 0.0):
-            return self._of_deck
+        if known is None or known.half <= (self._floor.time if self._floor else 0.0):
+            return self._floor
         reason = f"{known.name} took {known.half:.3g} for half a period that was over at {known.over:.6g}"
         return Wait(known.half, "record", reason)
 
     def longest_swing(self, now: float) -> float:
         """Longest half of a swing that is known ``now``, though a push may have made it longer [time]."""
         known = self._so_far(now)
-        return max(known.swing if known else 0.0, self._of_deck.time if self._of_deck else 0.0)
+        return max(known.swing if known else 0.0, self._floor.time if self._floor else 0.0)
 
     def _so_far(self, now: float) -> _Known | None:
         known = self._known[any(one.begins <= now for one in self._motions)]
