@@ -189,8 +189,8 @@ class Driver:
         """
         number = order.number
         if not self.solver.ended_well(number):
-            words = self.solver.last_words(number)
-            raise D2RPickError(f"{self.solver.file(number, '.out')}: the solver failed: {words}; --resume goes on")
+            self._fail(order)
+            return
         cycles, cpu = self.solver.took(number)
         step = (order.until - order.start) / (cycles or 1)
         last_state = order.until - max(3 * self.limits.interval, 2 * step)
@@ -213,6 +213,21 @@ class Driver:
         self.journal.add("ended", order=order, seen=seen, cycles=cycles, cpu=cpu, place=place)
         # a window that is left out is computed from where it begins
         self.solver.keep({number, number - 1, number - 2, *([record[0].number - 1] if order.rigid else [])})
+
+    def _fail(self, order: Order) -> None:
+        """Raise D2RPickError with what the solver said; a leg that failed before begins with a restart that is damaged.
+
+        Then the run goes back by the leg that has written it.
+        """
+        events = [one["event"] for one in self.journal.records]
+        latest = max((place for place, event in enumerate(events) if event in ("ended", "back")), default=0)
+        self.journal.add("failed", order=order)
+        if "failed" not in events[latest:] or not self.legs or self.solver.came_to(order.number, order.start):
+            words = self.solver.last_words(order.number)
+            path = self.solver.file(order.number, ".out")
+            raise D2RPickError(f"{path}: the solver failed: {words}; --resume goes on")
+        self.journal.add("back", legs=len(self.legs) - 1)
+        self.told(f"leg {order.number} failed again before its first state: the leg before it is computed again")
 
     def _place(self, legs: Sequence[Leg], first: Order) -> str:
         """Say so where parts swing too much to be rigid in a window, from its ``first`` leg on, whose end is known."""

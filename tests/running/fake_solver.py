@@ -3,7 +3,7 @@
 ``python fake_solver.py starter|engine DECK`` in the folder of a run.  The engine goes on from the restart of the leg
 before and writes its own; what it prints is what OpenRadioss prints there.  D2RPICK_FAKE names what goes wrong:
 ``fail`` ends leg 2 with an error, ``hang`` lets leg 2 sleep, ``slow`` takes its time for each state, and ``empty`` and
-``cut`` leave no whole restart of leg 3 once, as a disk does that is full.
+``cut`` leave no whole restart of leg 3 once, as a disk does that is full; that of ``damaged`` only looks whole.
 """
 
 import math
@@ -78,8 +78,10 @@ def engine(deck: Path) -> None:
                 print(" ** ERROR: NEGATIVE VOLUME IN ELEMENT 7", flush=True)
                 sys.exit(2)
     left = restart(name, number, f"{step}{' rigid' * rigid}")
-    if wrong in ("empty", "cut") and number == 3 and not Path("full.once").exists():
-        left.write_bytes(left.read_bytes()[: 0 if wrong == "empty" else SIZE // 2])
+    if wrong in ("empty", "cut", "damaged") and number == 3 and not Path("full.once").exists():
+        content = left.read_bytes()
+        kept = {"empty": 0, "cut": SIZE // 2}.get(wrong, len(left.name) + 1)
+        left.write_bytes(content[:kept] + b"?" * (SIZE - kept) * (wrong == "damaged"))
         Path("full.once").touch()
     listing.write_text(
         "  ** CUMULATIVE CPU TIME SUMMARY **\n ELEMENT FORCES..............: .8E+00 80 %\n"

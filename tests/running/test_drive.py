@@ -106,7 +106,7 @@ def test_a_run_is_rigid_in_its_flight_and_comes_to_its_end(whole: tuple[Path, di
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("fault", ["empty", "cut", "slow", "fail"])
+@pytest.mark.parametrize("fault", ["empty", "cut", "slow", "fail", "damaged"])
 def test_the_same_command_gives_the_same_run_whatever_befalls_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: tuple[Path, dict[str, object]], fault: str
 ) -> None:
@@ -119,6 +119,10 @@ def test_the_same_command_gives_the_same_run_whatever_befalls_it(
         assert "NEGATIVE VOLUME" in found.stderr
         monkeypatch.delenv("D2RPICK_FAKE")
         found = run(*asked(tmp_path, "--resume"))
+    if fault == "damaged":  # leg 4 fails on its restart, and only a second time tells that this is why
+        assert "strip_0004.out: the solver failed" in found.stderr
+        found = run(*asked(tmp_path, "--resume"))
+        assert "leg 4 failed again before its first state: the leg before it is computed again" in found.stderr
     if fault in ("empty", "cut"):
         assert "leg 3: it left no whole restart or history, and is begun again" in found.stderr
     check(json.loads(found.stdout), tmp_path)

@@ -80,7 +80,7 @@ def test_the_wait_that_was_measured_in_the_car_is_not_refused() -> None:
 def test_what_is_seen_rests_on_no_later_state(name: str) -> None:
     history = record(name)
     found = quiet_times(history, InnerMotion.of(history).needed)
-    for time in history.time[[300, 560, 640, 900]].tolist():
+    for time in history.time[[300, 640, 900]].tolist():
         early = until(history, time)
         seen = quiet_times(early, InnerMotion.of(early).needed)
         assert [one[:2] for one in seen] == [one[:2] for one in found if one.seen <= time]
@@ -144,7 +144,7 @@ def pushed(tail: float, left: float) -> History:
     return table(time, energy, Momenta(time, momentum, None, EXACT, (0,), masses=np.array([10.0])))
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(tail=floats(5e-4, 2.5e-3), left=floats(0.0, 3e-3), wait=floats(0.01, 0.03))
 def test_no_flight_is_lost_behind_a_push_that_dies_away(tail: float, left: float, wait: float) -> None:
     """Its first states are within what may be left, and later not: the flight begins later, and goes on."""
@@ -155,10 +155,10 @@ def test_no_flight_is_lost_behind_a_push_that_dies_away(tail: float, left: float
     assert flight.end == pytest.approx(0.17, abs=8e-4)
 
 
-@settings(max_examples=5)
-@given(name=sampled_from([CAR, BOX]), sizes=lists(integers(1, 60), min_size=5, max_size=40))
+@settings(max_examples=4)
+@given(name=sampled_from([CAR, BOX]), sizes=lists(integers(1, 200), min_size=4, max_size=12))
 def test_what_is_seen_does_not_depend_on_when_somebody_looked(name: str, sizes: list[int]) -> None:
-    history = until(record(name), 0.4)
+    history = until(record(name), 0.35)
     whole, motion = seen_in(history)
     evidence, grown, begin = Evidence(), InnerMotion(), 0
     for size in [*sizes, history.time.size]:
