@@ -137,6 +137,7 @@ class Solver:
         self.folder, self.name, self.threads = folder, name, threads
         self._lock = folder / ".solver.lock"
         self._process: subprocess.Popen[bytes] | None = None
+        self._signal = 0  # by which the last process was ended; 0: by none
 
     def file(self, number: int, suffix: str) -> Path:
         """Name a file of a leg, 0 for the starter."""
@@ -183,9 +184,10 @@ class Solver:
     def alive(self) -> bool:
         """Whether a solver is at work, also one that an earlier driver started."""
         if self._process is not None:
-            if self._process.poll() is None:
+            code = self._process.poll()
+            if code is None:
                 return True
-            self._process = None
+            self._process, self._signal = None, max(-code, 0)
         lock = _locked(self._lock)
         if lock is not None:
             os.close(lock)
@@ -255,7 +257,8 @@ class Solver:
         errors = [line for place in at for line in listing[place : place + _OF_ERROR]]
         lines = [" ".join(line.split()) for line in errors or text if line.strip(" -*")]
         told = lines[:_LAST_LINES] if errors else lines[-_LAST_LINES:]
-        return printable(" | ".join(told)) or "nothing was printed"
+        ended = f"ended by signal {self._signal}; " if self._signal else ""
+        return ended + (printable(" | ".join(told)) or "nothing was printed")
 
     def keep(self, numbers: Collection[int]) -> None:
         """Remove the restarts of legs but for these, and of the starter's."""

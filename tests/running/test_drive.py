@@ -232,6 +232,14 @@ def test_a_restart_is_whole_that_begins_with_its_name_and_is_as_long_as_the_firs
     assert not solver.whole(1)
 
 
+def test_a_signal_that_ended_a_solver_is_told(tmp_path: Path) -> None:
+    solver = engine.Solver(tmp_path, "strip")
+    solver.start([sys.executable, "-c", "import os; os.kill(os.getpid(), 9)"], 1)
+    while solver.alive:
+        time.sleep(0.01)
+    assert solver.last_words(1) == "ended by signal 9; nothing was printed"
+
+
 def test_of_a_listing_the_lines_with_the_error_are_told(tmp_path: Path) -> None:
     lines = [" read", " ** ERROR IN INPUT", " LINE 12: NODE 7 IS NOT DEFINED", "", *(f" more {n}" for n in range(99))]
     put(tmp_path / "strip_0000.out", "\n".join(lines).encode())
