@@ -268,7 +268,7 @@ def test_how_far_a_run_is_can_be_told_at_any_time(tmp_path: Path) -> None:
         assert driver.progress(9.0) == f"leg 2, rigid: 0.05 to 0.2 of {END:g}"
 
 
-IDLE, SWINGS = Seen(0.0, 0.02, flies=True, idle=True), Seen(0.05, 0.05, flies=True, tr=0.1, swing=0.02)
+IDLE, SWINGS = Seen(0.0, 0.02, flies=True, idle=True), Seen(0.05, 0.05, flies=True, tr=0.1, swing=0.015)
 WITHIN = Limits(1.0, 1e-3, 0.002, 0.01, 0.2)
 FLOWN = Leg(Order(LOAD, 1, 0.0, 0.1), SWINGS, 1000, 1.0)
 
@@ -308,7 +308,7 @@ def test_a_probe_goes_on_from_its_own_restarts_to_the_end_of_the_run() -> None:
 
 
 def test_a_flight_that_is_left_out_is_deformable_from_where_the_parts_would_have_become_rigid() -> None:
-    for contact, reason in ((0.13, "less than 4%"), (0.095, "half swings"), (0.109, "begins before tr")):
+    for contact, reason in ((0.13, "less than 4%"), (0.09, "half swings"), (0.109, "begins before tr")):
         legs = probes(0.2, contact=contact)
         (window,) = windows(legs, WITHIN)
         assert reason in str(window.reason)
