@@ -51,8 +51,9 @@ class Goal(NamedTuple):
     nodes: int
 
 
-_CAR: Final = Goal(1.5e-3, 8e-3, 0.5, 0.85, 0.80, 2, 12)
+_CAR: Final = Goal(1.5e-3, 8e-3, 0.5, 0.85, 0.78, 2, 12)
 _BOX: Final = Goal(2e-3, 8e-3, np.inf, 0.70, 0.60, 3, 8)
+_MOST: Final = 1.03  # of the processor time of the reference, whatever a run does
 GOALS: Final = {name: _CAR if name.startswith("CAR") else _BOX for name in MODELS if name.startswith(("CAR", "DROP"))}
 TOO_SHORT: Final = 2e-3  # a wait that is to be refused, where the deck tells the period of its springs [s]
 _AFTER: Final = 2e-4  # behind td the body is looked at [s]
@@ -123,7 +124,7 @@ def held(name: str, folder: Path, solver: Path) -> Iterator[tuple[str, float, fl
             yield from _window(window, goal, (names, ours), folder / "deck" / f"{name}_0000.rad")
     took = read_timing(str(folder / "reference" / f"{name}_0001.out")).total
     # a reference takes the same for each second; two runs differ by 15 % on a machine that others use
-    for until, limit in ((lands, goal.cost), (history.time[-1], np.inf)):
+    for until, limit in ((lands, goal.cost), (history.time[-1], _MOST)):
         cost = sum(_cost(one, until) for one in found.legs) / took * history.time[-1] / until
         yield f"processor time to {1e3 * until:.1f} ms, of the reference", cost, limit, cost <= limit
 

@@ -351,24 +351,25 @@ def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
 
 
 def _of_journal(text: str) -> list[tuple[float, float]]:
-    """Windows of the rigid legs that ended: each begins with the probe, or another rigid leg, that it goes on from."""
+    """Windows of the rigid legs that a run has kept: a leg takes the place of an earlier one of its number."""
     import json  # not above: start-up
 
-    windows: dict[float, float] = {}
-    tr = None
+    legs: list[tuple[int, bool, float, float]] = []  # number, whether it is rigid, start, end
     for line in text.splitlines():
         try:
             record = json.loads(line)
-            if record["event"] != "ended":
-                continue
-            kind = record["order"][0]
-            start, until, reached = (float(one) for one in (*record["order"][2:4], record["seen"][0]))
-        except (ValueError, KeyError, TypeError, IndexError):
+            if record["event"] == "back":
+                del legs[record["legs"] :]
+            elif record["event"] == "ended":
+                kind, number, start, until = record["order"][:4]
+                legs.append((int(number), kind in {"probe", "rigid"}, float(start), float(until)))
+        except (ValueError, KeyError, TypeError):
             continue  # cut, or of another kind
-        if kind not in {"probe", "rigid"}:
-            tr = None
-            continue
-        tr = start if tr is None else tr
-        if kind == "rigid":
-            windows[tr] = reached if record["cut"] else until
-    return list(windows.items())
+    latest = {leg[0]: leg for leg in legs if leg[0] <= legs[-1][0]}
+    windows: list[tuple[float, float]] = []
+    rigid_before = False
+    for _, (_, rigid, start, until) in sorted(latest.items()):
+        if rigid:
+            windows.append((windows.pop()[0], until) if rigid_before else (start, until))
+        rigid_before = rigid
+    return windows

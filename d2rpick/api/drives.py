@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING
 
 from d2rpick.api.answer import Paged
 from d2rpick.api.cards import Cards, numbers
-from d2rpick.base.errors import D2RPickError
+from d2rpick.base.errors import ConfigurationError, D2RPickError
 from d2rpick.choice.cost import CostModel
 from d2rpick.choice.deck_of_run import doubts_of_solver
 from d2rpick.deck import read_inventory
 from d2rpick.deck.writing import driven_deck
 from d2rpick.histories.opening import open_run
-from d2rpick.running.drive import JOURNAL, Driven, Driver, Journal, Looks
+from d2rpick.running.checks import check_driven
+from d2rpick.running.drive import JOURNAL, Driven, Driver, Journal, Observer
 from d2rpick.running.engine import Commands, Solver, alone
 from d2rpick.running.inner_motion import check_wait, wait_of_deck
 from d2rpick.running.sequence import Limits, windows
@@ -28,8 +29,10 @@ if TYPE_CHECKING:
     from d2rpick.base.errors import Caution
     from d2rpick.running.sequence import Leg
 
-# Of a second: where nothing vibrates so long without a force is flight, and so long before a contact td lies at least.
+# Of a second: so long before a contact td lies at least.
 _SHORTEST = 2e-3
+# What a cycle of rigid parts costs, of a deformable one, where the deck does not tell.
+_UNKNOWN = 0.5
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -77,8 +80,12 @@ class Driving:
         if wait is not None:
             check_wait(wait, known, deck)
         shortest = _SHORTEST * self.deck.second if self.deck.second else 0.0
-        self.limits = Limits(self.deck.end, self.deck.interval, shortest, margin)
-        self.looks = Looks(self.deck.parts, self.inventory, wait, known)
+        share = CostModel(self.inventory).saved(self.deck.parts).value
+        self.limits = Limits(
+            self.deck.end, self.deck.interval, shortest, margin, _UNKNOWN if share is None else 1 - share
+        )
+        check_driven(deck, self.inventory, self.deck.parts, self.limits, wait)
+        self.observer = Observer(self.deck.parts, self.inventory, wait, known)
         self.solver = Solver(folder, self.deck.name, threads)
         self.cautions: tuple[Caution, ...] = tuple(doubts_of_solver(self.deck.parts, self.inventory))
 
@@ -90,21 +97,25 @@ class Driving:
         be resumed, or the disk is full.
         """
         folder = self.folder
+        if missing := self.commands.missing():
+            raise ConfigurationError(f"{missing}: no such program; correct the command of --starter or --engine")
         folder.mkdir(parents=True, exist_ok=True)
         with alone(folder):
             journal = Journal(folder / JOURNAL)
             digest = hashlib.sha256(b"\0".join(self.deck.files.values())).hexdigest()
-            begun = journal.all("begun")
-            if begun and not resume:
+            begun, computed = journal.all("begun"), journal.all("ended")
+            if computed and not resume:
                 raise D2RPickError(f"{folder}: this run has begun; --resume goes on with it, or choose another folder")
-            if begun and begun[0]["deck"] != digest:
+            if computed and begun[0]["deck"] != digest:
                 raise D2RPickError(f"{folder}: begun with another deck than {self.name} is now; name that one")
-            if not begun:
-                if any(not one.name.startswith(".") for one in folder.iterdir()):
-                    raise D2RPickError(f"{folder}: the folder is not empty; choose another one")
+            if not begun and any(not one.name.startswith(".") for one in folder.iterdir()):
+                raise D2RPickError(f"{folder}: the folder is not empty; choose another one")
+            if not computed:  # a deck, or a command, that has been corrected may be another one
+                journal.path.unlink(missing_ok=True)
+                journal = Journal(journal.path)
                 journal.add("begun", deck=digest)
             try:
-                yield Driver(self.deck, self.solver, journal, self.commands, self.limits, self.looks, self._told)
+                yield Driver(self.deck, self.solver, journal, self.commands, self.limits, self.observer, self._told)
             except OSError as error:
                 if error.errno not in (errno.ENOSPC, errno.EDQUOT):
                     raise
@@ -115,11 +126,17 @@ class Driving:
         legs = driver.legs
         last = legs[-1].order.number if legs else 0
         names = [str(self.solver.history(number)) for number in range(1, last + 1)]
+        reasons = [leg.seen.why for leg in legs if leg.seen.why and not leg.seen.idle]
         return Drive(
-            run=open_run(names), deck=self.deck, windows=tuple(windows(legs, self.limits)), legs=tuple(legs),
-            why=self.looks.why, saved=(self._by_model(legs), _by_time(legs, self.deck.end)),
-            cautions=(*self.cautions, *driver.out_of_place), command=tuple(command),
-        )  # fmt: skip
+            run=open_run(names),
+            deck=self.deck,
+            windows=tuple(windows(legs, self.limits)),
+            legs=tuple(legs),
+            why=reasons[-1] if reasons else "",
+            saved=(self._by_model(legs), _by_time(legs, self.deck.end)),
+            cautions=(*self.cautions, *driver.out_of_place),
+            command=tuple(command),
+        )
 
     def _by_model(self, legs: Sequence[Leg]) -> float | None:
         share = CostModel(self.inventory).saved(self.deck.parts).value

@@ -59,13 +59,13 @@ CMD = ("program", "CMD")
 def drive(deck: str, folder: str, resume: bool, dry_run: bool, output: Output, **asked: Any) -> None:
     r"""Compute a Radioss run that switches itself: no reference is needed.
 
-    DECK, a starter deck with one engine file, is copied into RUNDIR.  Each flight begins when no force has acted for
-    the wait; tr is the highest energy within one more.  A rigid probe finds the next contact and is thrown away.  Then
-    the run is rigid to the margin before it, and goes on deformable.  What is interrupted goes on with --resume.
+    DECK, a starter deck with one engine file, is copied into RUNDIR.  It flies when no force has acted for the wait.
+    Then a rigid probe finds the next contact, and the run goes on deformable from the margin before it.  The same
+    command computes the same run.  What is interrupted goes on with --resume.
 
     Examples
     --------
-    d2rpick drive sample_data/flying_box/BOX_0000.rad --wait 0.002 -o driven --dry-run \
+    d2rpick drive sample_data/falling_plate/plate_0000.rad --part 1 --wait 0.02 -o driven --dry-run \
         --starter 'starter -i {deck} -np 4' --engine 'mpirun -np 4 engine -i {deck}'
     """
     import signal
@@ -97,6 +97,7 @@ def _plan(driving: Driving) -> list[str]:
         f"copies    {', '.join(deck.files)} to {driving.folder}",
         f"starts    {shlex.join(commands.words('starter', f'{deck.name}_0000.rad'))}",
         f"          {shlex.join(commands.words('engine', f'{deck.name}_0001.rad'))}, and further legs",
+        *([f"missing   {missing}: no such program"] if (missing := commands.missing()) else []),
         f"switches  {len(deck.parts)} parts by main node {bodies}, to the end at {deck.end:g}",
     ]
 

@@ -260,10 +260,13 @@ def _of_sensors(
     how = (
         f"Each /RBODY with main node {nodes} takes sensor {last}: sens_ID, columns 11 to 20 below its title.",
         f"/BEGIN needs version {STOPS_SINCE} or later, which knows when a sensor of time stops.",
-        "The largest step holds for the whole run: below the deformable step it changes that run; set --step-cap.",
     )
-    told = _told(tuple(windows), printing, (*_OF_SENSORS, *how, *remarks), files, texts)
-    return replace(told, sensors=dict.fromkeys(ids, last))
+    slow = (
+        f"The largest step, {cap:.4g}, holds for the whole run, which takes {end / cap:.0f} cycles at least;"
+        " where it takes fewer without switching, set --step-cap to the deformable step or more."
+    )
+    told = _told(tuple(windows), printing, (*_OF_SENSORS, *how, slow, *remarks), files, texts)
+    return replace(told, sensors=dict.fromkeys(ids, last), notes=(*told.notes, slow))
 
 
 def _sensors(spans: Sequence[Times], first: int, further: Sequence[str] = ()) -> tuple[str, int]:

@@ -272,10 +272,7 @@ def text_of(block: Block) -> bytes:
 
 # Legs that are decided while the run is computed.
 
-_NOT_REPEATED: Final = {"RFILE"}  # restarts are written as the driver needs them
-# Restarts of a leg that are kept, and cycles between them.  One costs as much as some five cycles; of two, one is whole
-# whenever the solver is ended.
-RESTARTS: Final = 2, 1000
+_NOT_REPEATED: Final = {"RFILE"}  # a leg writes the restart at its end alone
 _IN_A_SECOND: Final = {"s": 1.0, "ms": 1e3, "mus": 1e6, "us": 1e6}
 
 
@@ -297,28 +294,17 @@ class DrivenDeck(NamedTuple):
     further: tuple[tuple[tuple[str, ...], bytes], ...]
     notes: tuple[str, ...]
 
-    def leg(
-        self,
-        number: int,
-        until: float,
-        restart: str,
-        cap: float | None,
-        restarts: tuple[int, int] = RESTARTS,
-        *,
-        frozen: bool = False,
-    ) -> bytes:
-        """Write the engine file of a leg: from a restart of the leg before, rigid where a step ``cap`` is given.
+    def leg(self, number: int, until: float, cap: float | None, *, frozen: bool = False) -> bytes:
+        """Write the engine file of a leg, rigid where a step ``cap`` is given.
 
-        ``restarts``: how many of its own are kept, and how many cycles lie between them.  ``frozen``: the parts are
-        rigid there already; OpenRadioss counts the energy of what is switched on twice once more.
+        ``frozen``: the parts are rigid there already; OpenRadioss counts the energy of what is switched on twice once
+        more.
         """
         file = EngineFile(number, until, cap)
-        head, *lines = engine_lines(file, self.name, () if frozen else self.nodes, self.others)
-        head += f"/{restart}" * bool(restart)
+        lines = engine_lines(file, self.name, () if frozen else self.nodes, self.others)
         kept = [text for words, text in self.further if repeated(words, file)]
         more = ["/MON/ON"] * (not any(words[0] == "MON" for words, _ in self.further))
-        own = [head, *lines, *more, f"/RFILE/{restarts[0]}", str(restarts[1])]
-        return "".join(f"{line}\n" for line in own).encode() + b"".join(kept)
+        return "".join(f"{line}\n" for line in (*lines, *more)).encode() + b"".join(kept)
 
 
 def driven_deck(path: str, parts: Collection[int]) -> DrivenDeck:

@@ -377,11 +377,14 @@ def believed(momenta: Momenta, whole: Momenta | None) -> tuple[slice, ...]:
     return stretches(complete(momenta, whole), FEWEST)
 
 
-def complete(momenta: Momenta, whole: Momenta | None) -> NDArray[np.bool_]:
-    """Whether the momenta of parts (n,) are together those of the whole model."""
+def complete(momenta: Momenta, whole: Momenta | None, before: float = 0.0) -> NDArray[np.bool_]:
+    """Whether the momenta of parts (n,) are together those of the whole model.
+
+    ``before`` is the largest momentum of the whole model in states before these.
+    """
     if whole is None or whole.velocity or whole.time.size != momenta.time.size:
         return np.ones(momenta.time.size, np.bool_)
     everything = range(momenta.values.shape[1])
-    largest = np.maximum.accumulate(np.abs(whole.values[:, 0]).max(axis=1))
+    largest = np.maximum(np.maximum.accumulate(np.abs(whole.values[:, 0]).max(axis=1)), before)
     off = np.abs(momenta.of(everything) - whole.values[:, 0]).max(axis=1)
     return np.asarray(off <= _ALL_OF_IT * largest + 2 * momenta.noise(everything))

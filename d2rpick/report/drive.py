@@ -16,10 +16,10 @@ _WINDOW: Final = row(
     Field("wait", "number", "time without force that was asked for"),
     Field("tr", "number"), Field("td", "number"),
     Field("contact", "number?", "first contact of the rigid body; null where the run ended before"),
-    Field("reason", "text?", "why the flight was left out; null where it was switched"),
+    Field("reason", "text?", "why the flight was left out, deformable from tr to td; null where it was switched"),
 )  # fmt: skip
 _LEG: Final = row(
-    Field("kind", "text", "load, search, approach, probe or rigid"),
+    Field("kind", "text", "load, probe or rigid"),
     Field("length", "number"),
     Field("cycles", "integer?"),
     Field("cpu", "number?", "processor time [s]"),
@@ -27,7 +27,7 @@ _LEG: Final = row(
 DOCUMENT: Final = Document("d2rpick/drive/1", "Answer of d2rpick drive; times in the unit of the deck.", row(
     keys.WARNINGS,
     Field("windows", many(_WINDOW)),
-    Field("legs", many(_LEG), "in the order they were computed; what probes computed behind td is thrown away"),
+    Field("legs", many(_LEG), "in the order they were computed, with those that were thrown away"),
     Field("saved_by_model", "number?", "share of a deformable run, by the cost model", lambda one: one.saved[0]),
     Field("saved_by_time", "number?", "the same, by the processor time of the legs", lambda one: one.saved[1]),
 ))  # fmt: skip
@@ -44,13 +44,13 @@ def as_table(found: Driven, shown: Shown) -> str:
 
 
 def windows(found: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
-    """Give names of columns and cells of the windows."""
+    """Give names of columns and cells of the flights; ``deformable`` is what of each was computed so."""
     columns = {
         "flight": lambda one: one.free, "wait": lambda one: f"{one.wait:.4g}",
-        "tr": lambda one: one.tr, "td": lambda one: one.td,
+        "tr": lambda one: None if one.reason else one.tr, "td": lambda one: None if one.reason else one.td,
         "contact": lambda one: one.contact,
-        "margin": lambda one: None if one.contact is None else f"{one.contact - one.td:.3g}",
-        "lost by waiting": lambda one: f"{one.tr - one.free:.3g}",
+        "margin": lambda one: None if one.contact is None or one.reason else f"{one.contact - one.td:.3g}",
+        "deformable": lambda one: f"{(one.contact if one.reason and one.contact else one.tr) - one.free:.3g}",
         "status": lambda one: f"left out: {one.reason}" if one.reason else "switched",
     }  # fmt: skip
     return tables.filled(columns, found.windows)

@@ -1,44 +1,41 @@
-"""Drive a Radioss run that switches itself: start a leg, watch it, say which comes next, until the run is over."""
+"""Drive a Radioss run that switches itself: compute a leg, look at what it shows, say which comes next."""
 
 from __future__ import annotations
 
 import json
 import time
-from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.base.errors import Caution, D2RPickError, FormatError, HistoryError
+from d2rpick.base.errors import Caution, D2RPickError
 from d2rpick.base.files import append_whole, record_of, signed, write_whole
-from d2rpick.choice.deck_of_run import in_deck
 from d2rpick.deck.model import DISCRETE
-from d2rpick.deck.writing import RESTARTS, DrivenDeck
 from d2rpick.histories.names import Selection
-from d2rpick.histories.opening import open_run
-from d2rpick.running.evidence import contact_after, highest_energy, quiet_times
-from d2rpick.running.inner_motion import InnerMotion, Wait, swing_in
-from d2rpick.running.sequence import LOAD, PROBE, RIGID, SEARCH, Leg, Order, Seen, control, next_order, window_of
+from d2rpick.running.evidence import Evidence
+from d2rpick.running.inner_motion import InnerMotion, Wait
+from d2rpick.running.looks import Looks
+from d2rpick.running.sequence import LOAD, Leg, Order, Seen, next_order, together, window_of
+from d2rpick.running.swing import swing_in
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from d2rpick.deck.model import Inventory
+    from d2rpick.deck.writing import DrivenDeck
     from d2rpick.histories.history import History
     from d2rpick.histories.run import Run
-    from d2rpick.running.engine import Commands, Left, Solver
+    from d2rpick.running.engine import Commands, Solver
     from d2rpick.running.sequence import Limits, Window
 
 JOURNAL: Final = "drive.ndjson"
 # Largest step while rigid over the mean one before: a rigid leg costs a few percent of a deformable one then, and the
 # state of a run is written often enough to show a contact.
 _STEP_RATIO: Final = 5.0
-# Restarts that a search or a probe keeps, as others go back to one.  So a search goes back by an eighth of the wait at
-# most, and a probe, which stops soon after a contact, by this share of what is left of the run.
-_KEPT: Final = 9
-_IN_PROBE: Final = 0.02
-# Looks at a leg: so many seconds apart, so many times as long as a look takes, and by this share of the leg.
-_SHORTEST, _LOOKS, _SHARE = 0.1, 2.0, 0.005
+# A flight that did not last for the wait is told where it did for this share of it.
+_TOLD: Final = 0.5
+# Between two looks whether the solver is still at work, and from when on silence is told [s].
+_PAUSE, _SILENT = 0.05, 60.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +59,7 @@ class Driven:
 class Driver:
     """One run in its folder, as far as its journal says.
 
-    ``told`` gets each thing that happens, in a line; ``at`` is the leg that is computed and its time.
+    ``told`` gets each thing that happens, in a line; ``at`` is the leg that is computed and when it began [s].
     """
 
     deck: DrivenDeck
@@ -70,52 +67,52 @@ class Driver:
     journal: Journal
     commands: Commands
     limits: Limits
-    look: Looks
+    observer: Observer
     told: Callable[[str], None]
-    at: tuple[Order, float] | None = None
+    at: Order | None = None
+    _again: set[Order] = field(default_factory=set)
 
     @property
     def legs(self) -> list[Leg]:
-        """Legs that are over, those that were thrown away too."""
-        return [
-            Leg(Order(*one["order"]), Seen(*one["seen"]), one["cut"], restarts, one["cycles"], one["cpu"])
-            for one in self.journal.all("ended")
-            for restarts in [tuple(map(tuple, one["restarts"]))]
-        ]
+        """Legs that are over, those that were thrown away too, but for those behind which the run went back."""
+        found: list[Leg] = []
+        for one in self.journal.records:
+            if one["event"] == "ended":
+                short = tuple(map(tuple, one["seen"][6]))
+                seen = Seen(*one["seen"])._replace(short=short)
+                found.append(Leg(Order(*one["order"]), seen, one["cycles"], one["cpu"]))
+            elif one["event"] == "back":
+                del found[one["legs"] :]
+        return found
 
     @property
     def out_of_place(self) -> tuple[Caution, ...]:
         """What was said of parts that still swung as they became rigid."""
-        said = {one["order"][1]: one["place"] for one in self.journal.all("started")}
-        return tuple(Caution("out-of-place", place) for place in said.values() if place)
+        said = dict.fromkeys(one["place"] for one in self.journal.all("ended"))
+        return tuple(Caution("out-of-place", place) for place in said if place)
 
     def prepare(self) -> None:
         """Copy the deck into the folder and run the starter, unless that is done."""
-        if self.journal.all("prepared"):
+        self._wait_for_end()  # of what an earlier driver has left
+        if self.journal.all("prepared") and self.solver.whole(0):
             return
-        self._wait_for_end()  # of a starter that an earlier driver has left
         for name, content in self.deck.files.items():
             (self.solver.folder / name).parent.mkdir(parents=True, exist_ok=True)
             write_whole(self.solver.folder / name, content)
         first = self.solver.file(1, ".rad")
-        write_whole(first, self.deck.leg(1, self.deck.end, "", None))  # the starter looks for /RBODY/OFF there
+        write_whole(first, self.deck.leg(1, self.deck.end, None))  # the starter looks for /RBODY/OFF there
         self.solver.start(self.commands.words("starter", self.solver.file(0, ".rad").name), 0)
         self._wait_for_end()
         if not self.solver.started_well():
-            raise D2RPickError(f"{self.solver.file(0, '.out')}: the starter failed: {self.solver.last_lines(0)}")
+            raise D2RPickError(f"{self.solver.file(0, '.out')}: the starter failed: {self.solver.last_words(0)}")
         self.journal.add("prepared")
 
-    def _wait_for_end(self) -> None:
-        while self.solver.alive:
-            time.sleep(_SHORTEST)
-
     def progress(self, seconds: float) -> str:
-        """Say which leg is computed and how far it is; until the first one has begun, for how many seconds."""
+        """Say which leg is computed; until the first one has begun, for how many seconds."""
         at = self.at
         if at is None:
             return f"starting ... {seconds:.0f} s"
-        order, time = at
-        return f"leg {order.number}, {order.kind}: {time:.6g} of {self.limits.end:g}"
+        return f"leg {at.number}, {at.kind}: {at.start:.6g} to {at.until:.6g} of {self.limits.end:g}"
 
     def run(self) -> None:
         """Compute leg after leg to the end of the run.
@@ -126,214 +123,184 @@ class Driver:
             If the solver fails, or the disk has no room; the run goes on from there when it is driven again.
         """
         if legs := self.legs:
-            self.told(f"resumed: legs that are over: {len(legs)}, the last at {legs[-1].seen.time:.6g}")
-        while order := next_order(self.legs, self.limits):
-            self._compute(order)
+            self.told(f"resumed: legs that are over: {len(legs)}, the last at {legs[-1].order.until:.6g}")
+        while order := self._next():
+            self.at = order
+            if not self._under_way(order):
+                self._start(order)
+            self._wait_for_end()
+            self._end(order)
         self.at = None
 
-    def _compute(self, order: Order) -> None:
-        resumed = self._under_way(order)
-        if not resumed:
-            self._start(order)
-        elif self.solver.alive:
-            self.told(f"leg {order.number}: the solver is still at work on it")
-        alive = self.solver.alive
-        with self._stopping(order):
-            self._watch(order)
-        left = self.solver.left(order.number)
-        if not left.normal and (alive or not resumed):
-            words = self.solver.last_lines(order.number)
-            raise D2RPickError(f"{self.solver.file(order.number, '.out')}: the solver failed: {words}")
-        self._end(order, left, again=resumed)
+    def _next(self) -> Order | None:
+        """Say which leg comes next, from a restart that is whole: the run goes back until there is one."""
+        legs = self.legs
+        order, count = next_order(legs, self.limits), len(legs)
+        while order is not None and legs and not self.solver.whole(order.number - 1):
+            legs.pop()
+            order = next_order(legs, self.limits)
+        if len(legs) < count:
+            self.journal.add("back", legs=len(legs))
+            at = 0.0 if order is None else order.start
+            self.told(f"the restart of the last leg is not whole: the run goes back to {at:.6g}")
+        return order
 
     def _under_way(self, order: Order) -> bool:
-        """Whether an earlier driver has begun this leg, and nobody has said how it ended."""
+        """Whether this leg was begun, by an earlier driver, and came to its end."""
         last = self.journal.records[-1]
-        return last["event"] == "started" and Order(*last["order"]) == order
+        begun = last["event"] == "started" and Order(*last["order"]) == order
+        return begun and self.solver.ended_well(order.number) and self.solver.whole(order.number)
 
     def _start(self, order: Order) -> None:
-        number, legs = order.number, self.journal.all("ended")
-        ring = self._ring(order)
-        self.solver.check_room(number, 1 - order.start / self.limits.end, ring[0])
-        before = next((one for one in reversed(legs) if one["order"][1] == number - 1), {"restart": ""})
-        restart = before["restart"] if order.restart is None else order.restart
-        cap = self._step_of(order) if order.rigid else None
-        if order.restart is not None:  # known by some cycles; what follows is computed again
-            self.solver.shorten(number - 1, order.start - self.limits.same)
+        number = order.number
+        self.solver.check_room(number, 1 - order.start / self.limits.end)
         self.solver.clear(number)
-        frozen = order.kind == RIGID and order.restart is not None
-        text = self.deck.leg(number, order.until, restart, cap, ring, frozen=frozen)
+        frozen = order.rigid and len(together(order, self.legs)) > 1
+        text = self.deck.leg(number, order.until, self._cap() if order.rigid else None, frozen=frozen)
         write_whole(self.solver.file(number, ".rad"), text)
-        place = self._place(order)
-        self.journal.add("started", order=order, place=place)
-        if place:
-            self.told(f"warning: out-of-place: {place}")
+        self.journal.add("started", order=order)
         self.solver.start(self.commands.words("engine", self.solver.file(number, ".rad").name), number)
-        self.solver.keep_two(number)
-        self.told(f"leg {number}: {order.kind} from {order.start:.6g}")
+        self.told(f"leg {number}: {order.kind} from {order.start:.6g} to {order.until:.6g}")
 
-    def _place(self, order: Order) -> str:
-        """Say so where parts swing too much to become rigid in a leg whose end is known."""
-        if order.kind != RIGID:
-            return ""
-        legs = self.legs
-        planned = window_of(legs, self.limits)
-        before = next(leg.order for leg in reversed(legs) if leg.order.start < planned.tr)
-        return self.look.swing(self._histories(before, legs), planned)
+    def _cap(self) -> float:
+        """Largest step of a rigid leg, by the smallest mean one of the deformable legs before [time]."""
+        known = [leg.length / leg.cycles for leg in self.legs if not leg.order.rigid and leg.cycles]
+        return min(self.deck.interval, _STEP_RATIO * float(f"{min([self.deck.interval, *known]):.3g}"))
 
-    def _step_of(self, order: Order) -> float:
-        """Step of a leg: the smallest mean one of those before, or the interval of the history where none is [time]."""
-        known = [one.length / one.cycles for one in self.legs if one.kind == LOAD and one.cycles and one.length > 0]
-        step = float(f"{min([self.deck.interval, *known]):.3g}")
-        return min(self.deck.interval, _STEP_RATIO * step) if order.rigid else step
-
-    def _ring(self, order: Order) -> tuple[int, int]:
-        """How many restarts a leg keeps, and cycles between them: close where a later leg goes back to one."""
-        share = {SEARCH: 1 / (_KEPT - 1), PROBE: _IN_PROBE}.get(order.kind)
-        cycles = (order.until - order.start) / self._step_of(order)
-        return (_KEPT, max(1, round(share * cycles))) if share else RESTARTS
-
-    def _written(self, order: Order, left: Left) -> list[tuple[float, str]]:
-        """Times and letters of the last restarts that a search or a probe wrote on its way, by their cycles."""
-        if order.kind not in {SEARCH, PROBE} or left.timing is None or not left.timing.cycles:
-            return []
-        many, every = self._ring(order)
-        count = (left.timing.cycles - 1) // every
-        kept = range(max(0, count - many + 1), count)  # the one at the end may have taken the next letter
-        times = self.solver.times(order.number, order.start, [(n + 1) * every for n in kept])
-        return [(time, chr(ord("I") + n % many)) for n, time in zip(kept, times, strict=False)]
-
-    def _watch(self, order: Order) -> None:
-        """Look at a leg until it is over, and tell the engine when to stop."""
-        began, said, size = time.monotonic(), "", -1
-        history = self.solver.history(order.number)
-        while self.solver.alive:
-            looked = time.monotonic()
-            grown = history.stat().st_size if history.exists() else -1
-            if grown != size and (seen := self._seen(order)):
-                size, self.at = grown, (order, seen.time)
-                text = control(order, seen, self.limits)
-                if text and text != said:
-                    self.solver.tell(order.number, text)
-                    said = text
-            now = time.monotonic()
-            time.sleep(max(_SHORTEST, _LOOKS * (now - looked), _SHARE * (now - began)))
-
-    def _seen(self, order: Order) -> Seen | None:
-        legs = self.legs
-        known = max((leg.seen.wait for leg in legs if not leg.seen.idle), default=0.0)
-        return self.look(order, self._histories(order, legs), known)
-
-    def _histories(self, order: Order, legs: Sequence[Leg]) -> list[Path]:
-        return [self.solver.history(number) for number in _segment(order, legs)]
-
-    @contextmanager
-    def _stopping(self, order: Order) -> Iterator[None]:
-        """Let the engine end its leg, with a restart where one is needed, when the driver is interrupted."""
+    def _wait_for_end(self) -> None:
+        """Wait until no solver is at work; tell of silence, and end the solver where the driver is interrupted."""
+        said = _SILENT
         try:
-            yield
-        except (KeyboardInterrupt, D2RPickError):
-            self.solver.tell(order.number, "/KILL\n" if order.rigid else "/STOP\n")
-            self.told("stopping: the solver writes its restart")
-            self._wait_for_end()
-            left = self.solver.left(order.number)
-            if left.normal:
-                self._end(order, left, again=True)
+            while self.solver.alive:
+                time.sleep(_PAUSE)
+                silent = self.solver.silent_for()
+                if silent > said:
+                    said = 2 * silent
+                    self.told(f"the solver has written nothing for {silent:.0f} s; Ctrl-C ends it, then --resume")
+        except KeyboardInterrupt:
+            self.told("stopping: the leg that is being computed is begun again with --resume")
+            self.solver.end()
             raise
 
-    def _end(self, order: Order, left: Left, *, again: bool) -> None:
-        """Write down how a leg has ended; one that left nothing to go on from is begun again.
+    def _end(self, order: Order) -> None:
+        """Write down what a leg has shown; one that is not whole is begun again, once.
 
-        ``again``: also one that ended as it should, but before its first state, since an earlier driver stopped it.
+        D2RPickError where the solver failed.
         """
-        seen = self._seen(order)
-        at_once = again and (seen is None or seen.time <= order.start)
-        if seen is None or at_once or (left.restart is None and not order.rigid) or (order.rigid and not left.normal):
-            if left.normal and not at_once:
-                raise D2RPickError(f"{self.solver.file(order.number, '.out')}: the leg left no state, or no restart")
-            self.told(f"leg {order.number}: it left nothing to go on from, and is begun again at {order.start:.6g}")
+        number = order.number
+        if not self.solver.ended_well(number):
+            self._fail(order)
+            return
+        cycles, cpu = self.solver.took(number)
+        step = (order.until - order.start) / (cycles or 1)
+        last_state = order.until - max(3 * self.limits.interval, 2 * step)
+        if not self.solver.whole(number) or not self.solver.came_to(number, last_state):
+            if order in self._again:
+                where = self.solver.file(number, ".out")
+                raise D2RPickError(f"{where}: the leg left no whole restart; make room on the disk, then --resume")
+            self._again.add(order)
+            self.told(f"leg {number}: it left no whole restart or history, and is begun again at {order.start:.6g}")
             self.journal.add("lost", order=order)
             return
-        took = left.timing
-        self.journal.add(
-            "ended", order=order, seen=seen, cut=not left.normal, restart=left.restart or "",
-            restarts=self._written(order, left), cycles=took.cycles if took else None, cpu=took.total if took else None,
-        )  # fmt: skip
-        self.solver.file(order.number, ".ctl").unlink(missing_ok=True)
+        legs = self.legs
+        record = together(order, legs)
+        before = [leg.seen for leg in legs if leg.order.until <= record[0].start and not leg.seen.idle]
+        known = max((seen.wait or 0.0 for seen in before), default=0.0)
+        seen = self.observer.look(order, [self.solver.history(one.number) for one in record], known)
+        place = self._place([*legs, Leg(order, seen, cycles, cpu)], record[0])
+        if place:
+            self.told(f"warning: out-of-place: {place}")
+        self.journal.add("ended", order=order, seen=seen, cycles=cycles, cpu=cpu, place=place)
+        # a window that is left out is computed from where it begins
+        self.solver.keep({number, number - 1, number - 2, *([record[0].number - 1] if order.rigid else [])})
+
+    def _fail(self, order: Order) -> None:
+        """Raise D2RPickError with what the solver said; a leg that failed before begins with a restart that is damaged.
+
+        Then the run goes back by the leg that has written it.
+        """
+        events = [one["event"] for one in self.journal.records]
+        latest = max((place for place, event in enumerate(events) if event in ("ended", "back")), default=0)
+        self.journal.add("failed", order=order)
+        if "failed" not in events[latest:] or not self.legs or self.solver.came_to(order.number, order.start):
+            words = self.solver.last_words(order.number)
+            path = self.solver.file(order.number, ".out")
+            raise D2RPickError(f"{path}: the solver failed: {words}; --resume goes on")
+        self.journal.add("back", legs=len(self.legs) - 1)
+        self.told(f"leg {order.number} failed again before its first state: the leg before it is computed again")
+
+    def _place(self, legs: Sequence[Leg], first: Order) -> str:
+        """Say so where parts swing too much to be rigid in a window, from its ``first`` leg on, whose end is known."""
+        planned = window_of(legs, self.limits) if legs[-1].seen.contact is not None else None
+        if planned is None or planned.reason or first.number == 1:
+            return ""
+        numbers = [one.number for one in together(first._replace(kind=LOAD), legs)[:-1]]
+        return self.observer.swing([self.solver.history(number) for number in numbers], planned)
 
 
-def _segment(order: Order, legs: Sequence[Leg]) -> Sequence[int]:
-    """Numbers of the legs whose record counts: this one, and before a deformable one those since the last rigid one.
-
-    In rigid legs no quantity of a part is believed, and over them no inner motion goes on.
-    """
-    orders = {leg.order.number: leg.order for leg in legs}
-    first = order.number
-    while not order.rigid and (before := orders.get(first - 1)) and not before.rigid:
-        first -= 1
-    return range(first, order.number + 1)
-
-
-# A leg is told to stop at the end of the wait when so much of it is over.
-_HALF: Final = 0.5
-
-
-class Looks:
+class Observer:
     """Looks at the record of some ``parts`` of a deck, with the ``wait`` that was given or that the deck tells."""
 
     def __init__(
         self, parts: Sequence[int], inventory: Inventory, wait: float | None = None, of_deck: Wait | None = None
     ) -> None:
         springs = sorted(part for part, kinds in inventory.counts.items() if {*kinds} <= DISCRETE)
-        self._selection = Selection(parts=tuple(map(str, parts)), springs=tuple(map(str, springs)))
-        self._inventory, self._wait, self._of_deck = inventory, wait, of_deck
-        self.why = ""  # of the wait
+        selection = Selection(parts=tuple(map(str, parts)), springs=tuple(map(str, springs)))
+        self._looks, self._whole = Looks(selection, inventory), Looks(selection, inventory)
+        self._given, self._of_deck = wait, of_deck
+        self._evidence, self._motion = Evidence(), InnerMotion(None, of_deck)
 
-    def __call__(self, order: Order, histories: Sequence[Path], known: float) -> Seen | None:
-        """Say what is seen of the leg that is ordered, whose history is the last.
+    def look(self, order: Order, histories: Sequence[Path], known: float) -> Seen:
+        """Say what is seen at the end of a leg, whose history is the last.
 
-        ``known`` is the longest wait that the record before these histories asked for [time].  None where there is no
-        state yet.  A wait that was given is kept to where the record shows a longer one: ``why`` says so.
+        ``known`` is the longest wait that the record before these histories asked for [time].  A wait that was given is
+        kept to where the record shows a longer one: ``why`` says so.
         """
-        try:
-            history = self._history(histories)
-        except (FormatError, HistoryError, FileNotFoundError):
-            return None  # the head is being written
-        if not history.time.size or history.time[-1] < order.start:
-            return None
-        now = float(history.time[-1])
-        if order.kind != LOAD:
-            contact = contact_after(history, order.start)
-            return Seen(now, peak=None if order.rigid else highest_energy(history, order.start, now), contact=contact)
-        motion = InnerMotion(history, None, self._floor(known))
-        quiet = quiet_times(history, lambda *times: _half(self._wait or motion.needed(*times)))
-        free = quiet[-1].start if quiet and quiet[-1].end is None else None
-        asked = None if free is None else motion.wait(free, now)
-        at_rest = asked is not None and asked.source == "at-rest"
-        wait = asked if self._wait is None else Wait(self._wait, "given", "as given")
-        if free is None or wait is None:
-            return Seen(now)
-        longer = asked is not None and asked.time > wait.time
-        self.why = f"{wait.reason}, but {asked.reason}" if asked and longer else wait.reason
-        return Seen(now, free, wait.time, idle=at_rest)
+        states, follows = self._looks.new_states([str(path) for path in histories])
+        if not follows:
+            self._evidence, self._motion = Evidence(), InnerMotion(None, self._of_deck, known)
+        if states is not None and states.time.size:
+            self._evidence.take(states)
+            self._motion.take(states, self._evidence)
+        history = self._evidence.history
+        if order.rigid:
+            return Seen(contact=self._evidence.contact_after(float(history.time[0])))
+        return self._seen(order, history)
+
+    def _seen(self, order: Order, history: History) -> Seen:
+        flights, now = self._evidence.flights(self._needed), float(history.time[-1])
+        free = self._evidence.free_since(now)
+        asked = self._motion.wait(free, now)
+        wait, idle = self._needed(free, now), asked is not None and asked.source == "at-rest"
+        why = asked.reason if asked else ""
+        if self._given is not None and not idle:
+            why = f"as given, but {why}" if asked and asked.time > self._given else "as given"
+        least = _TOLD * (wait or 0.0)
+        pauses = self._evidence.pauses(order.start)
+        energies = [history.energy_at(max(time, float(history.time[0]))) for time in (order.start, now)]
+        earlier = energies[0] > energies[1] and order.start >= max(free, order.after)
+        return Seen(
+            free=free,
+            wait=wait,
+            why=why,
+            flies=bool(flights) and flights[-1].end is None,
+            tr=order.start if earlier else order.until,
+            idle=idle,
+            short=tuple(one for one in pauses if wait and least <= one[1] - one[0] and one[0] >= order.after),
+            swing=self._motion.longest_swing(now),
+        )
+
+    def _needed(self, start: float, now: float) -> float | None:
+        asked = self._motion.wait(start, now)
+        if self._given is not None and (asked is None or asked.source != "at-rest"):
+            return self._given
+        return asked and asked.time
 
     def swing(self, histories: Sequence[Path], planned: Window) -> str:
-        """Say so where parts swing too much to be rigid in a window."""
-        found = swing_in(self._history(histories), planned.free, planned.tr)
+        """Say so where parts swing too much to be rigid in a window, by the record before it."""
+        history = self._whole.whole([str(path) for path in histories])
+        found = swing_in(history, planned.free, planned.tr)
         return f"tr = {planned.tr:.6g}: {found.told}" if found and found.flight > planned.td - planned.free else ""
-
-    def _history(self, histories: Sequence[Path]) -> History:
-        return in_deck(open_run([str(path) for path in histories]), self._inventory).history(self._selection)
-
-    def _floor(self, known: float) -> Wait | None:
-        """Give the longest wait that is known from the deck, or from the record of flights before."""
-        if known > (self._of_deck.time if self._of_deck else 0.0):
-            return Wait(known, "record", "as in the flight before")
-        return self._of_deck
-
-
-def _half(wait: float | None) -> float | None:
-    return wait and _HALF * wait
 
 
 class Journal:

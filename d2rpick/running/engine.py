@@ -1,7 +1,6 @@
-"""The solver's processes in the folder of a run: how they are started, told to stop, and what they leave.
+"""The solver's processes in the folder of a run: how they are started and ended, and what they leave.
 
-Control files, restarts and what they are called: Altair's public help for /RFILE and for the run control file, and runs
-with OpenRadioss 2026-08.
+Restarts and what they are called: runs with OpenRadioss 2026-08.
 """
 
 from __future__ import annotations
@@ -9,20 +8,19 @@ from __future__ import annotations
 import os
 import re
 import shlex
+import shutil
+import signal
 import subprocess
+import time
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-import numpy as np
-
 from d2rpick.base.errors import ConfigurationError, D2RPickError, FormatError, printable
-from d2rpick.base.files import write_whole
 from d2rpick.histories.formats.radioss_th import TimeHistory
-from d2rpick.histories.listings import Timing, read_timing
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Collection, Iterator, Sequence
 
 # Where an installation has its programs, and how they are called.
 _PROGRAMS: Final = {
@@ -31,8 +29,16 @@ _PROGRAMS: Final = {
 }
 _HOME: Final = "OPENRADIOSS_PATH"
 _STARTER_ERROR: Final = re.compile(rb"^ *[1-9]\d* +ERROR\(S\)", re.MULTILINE)
+_CYCLES: Final = re.compile(rb"TOTAL NUMBER OF CYCLES *: *(\d+)")
+_TOTAL: Final = re.compile(rb"^ TOTAL\.+: +([\d.E+-]+)", re.MULTILINE)
 _TAIL: Final = 1 << 14
-_LAST_LINES: Final = 5
+# The listing of a starter says first what is wrong, and much behind it: bytes of it, how that begins, and its lines.
+_LISTING, _ERROR, _OF_ERROR = 1 << 22, "** ERROR", 4
+_LAST_LINES: Final = 8
+# A restart that is whole has so much of the size of the starter's.
+_WHOLE: Final = 0.98
+# How long a solver may take to end when it is asked to, and between two looks whether it has [s].
+_ENDS, _PAUSE = 4.0, 0.05
 
 
 class Commands(NamedTuple):
@@ -56,7 +62,23 @@ class Commands(NamedTuple):
             raise ConfigurationError(
                 f"--{program} {template!r}: {{deck}} was expected, where the name of the file goes"
             )
-        return [word.replace("{deck}", deck).replace("{threads}", str(self.threads)) for word in split]
+        return [
+            _whole(split[0]),
+            *(word.replace("{deck}", deck).replace("{threads}", str(self.threads)) for word in split[1:]),
+        ]
+
+    def missing(self) -> str:
+        """Name the first program that is not there, or cannot be started; empty where all can.
+
+        ConfigurationError as of `words`.
+        """
+        programs = (self.words(program, "{deck}")[0] for program in _PROGRAMS)
+        return next((one for one in programs if shutil.which(one) is None), "")
+
+
+def _whole(program: str) -> str:
+    """Give the path of a program that is named by one: it is started in another folder."""
+    return str(Path(program).absolute()) if "/" in program else program
 
 
 def _installed(program: str) -> list[str]:
@@ -105,14 +127,6 @@ def _locked(path: Path) -> int | None:
     return lock
 
 
-class Left(NamedTuple):
-    """What a leg left: whether it ended as it should, its ``restart`` (None: none to go on from), and what it took."""
-
-    normal: bool
-    restart: str | None
-    timing: Timing | None
-
-
 class Solver:
     """The solver in the folder of a run, one process at a time.
 
@@ -123,6 +137,7 @@ class Solver:
         self.folder, self.name, self.threads = folder, name, threads
         self._lock = folder / ".solver.lock"
         self._process: subprocess.Popen[bytes] | None = None
+        self._signal = 0  # by which the last process was ended; 0: by none
 
     def file(self, number: int, suffix: str) -> Path:
         """Name a file of a leg, 0 for the starter."""
@@ -153,11 +168,13 @@ class Solver:
         try:
             _let_stack_grow()
             with self.file(number, ".log").open("wb") as log:
-                # of its own session: Ctrl-C reaches the driver, which lets the solver write its restart
+                # of its own session: Ctrl-C reaches the driver, which ends all processes of the solver
                 self._process = subprocess.Popen(
                     command, cwd=self.folder, env=_surroundings(self.threads), stdin=subprocess.DEVNULL, stdout=log,
                     stderr=subprocess.STDOUT, start_new_session=True, pass_fds=[lock],
                 )  # fmt: skip
+            os.ftruncate(lock, 0)
+            os.pwrite(lock, str(self._process.pid).encode(), 0)
         except OSError as error:
             raise D2RPickError(f"{command[0]}: cannot be started ({error.strerror}); check the command") from None
         finally:
@@ -167,81 +184,95 @@ class Solver:
     def alive(self) -> bool:
         """Whether a solver is at work, also one that an earlier driver started."""
         if self._process is not None:
-            if self._process.poll() is None:
+            code = self._process.poll()
+            if code is None:
                 return True
-            self._process = None
+            self._process, self._signal = None, max(-code, 0)
         lock = _locked(self._lock)
         if lock is not None:
             os.close(lock)
         return lock is None
 
-    def tell(self, number: int, text: str) -> None:
-        """Write the control file of a leg, whole; the engine looks for it every ten cycles."""
-        write_whole(self.file(number, ".ctl"), text.encode())
+    def end(self) -> None:
+        """End the solver, also one that an earlier driver started, with all its processes."""
+        text = self._lock.read_bytes() if self._lock.exists() else b""
+        for sign in (signal.SIGTERM, signal.SIGKILL):
+            if not self.alive or not text.isdigit():
+                return
+            with suppress(ProcessLookupError, PermissionError):
+                os.killpg(int(text), sign)
+            begun = time.monotonic()
+            with suppress(KeyboardInterrupt):  # of somebody who cannot wait
+                while self.alive and time.monotonic() - begun < _ENDS:
+                    time.sleep(_PAUSE)
 
-    def left(self, number: int) -> Left:
-        """Say what a leg that is over has left."""
-        normal = b"NORMAL TERMINATION" in _tail(self.file(number, ".out"))
+    def silent_for(self) -> float:
+        """For how long the solver has written nothing [s]."""
+        times = [one.stat().st_mtime for one in self.folder.glob(f"{self.name}*") if one.exists()]
+        return max(0.0, time.time() - max(times, default=time.time()))
+
+    def ended_well(self, number: int) -> bool:
+        """Whether the listing of a leg says that it came to its end."""
+        return b"NORMAL TERMINATION" in _tail(self.file(number, ".out"))
+
+    def took(self, number: int) -> tuple[int | None, float | None]:
+        """Give cycles and processor time [s] of a leg; None where its listing does not say them."""
+        listing = _tail(self.file(number, ".out"))
+        cycles, total = (found[-1] if (found := one.findall(listing)) else None for one in (_CYCLES, _TOTAL))
+        return None if cycles is None else int(cycles), None if total is None else float(total)
+
+    def whole(self, number: int) -> bool:
+        """Whether the restarts of a leg are whole, 0 for the starter: those of all domains, as long as at first.
+
+        A restart of OpenRadioss begins with its own name, and is as long as the first one but for what has changed of
+        the contacts; a disk that is full leaves shorter ones, although the listing ends as it should.
+        """
+        first, own = self._restarts(0), self._restarts(number)
+        sizes = {path.name[-8:]: path.stat().st_size for path in first}
+        named = all(map(_begins_with_its_name, first))
+        return {path.name[-8:] for path in own} >= sizes.keys() != set() and all(
+            path.stat().st_size >= max(_WHOLE * sizes.get(path.name[-8:], 1), 1)
+            and (not named or _begins_with_its_name(path))
+            for path in own
+        )
+
+    def came_to(self, number: int, end: float) -> bool:
+        """Whether the history of a leg reaches a time [time]."""
+        path = self.history(number)
         try:
-            timing = read_timing(str(self.file(number, ".out")))
-        except FormatError:
-            timing = None
-        restarts = self._restarts(number)
-        if not normal and self.history(number).exists():  # nobody knows whether one that was written last is whole
-            written = self.history(number).stat().st_mtime_ns
-            restarts = [path for path in restarts if path.stat().st_mtime_ns < written]
-        latest = max(restarts, key=lambda path: path.stat().st_mtime_ns, default=None)
-        return Left(normal, None if latest is None else _letter(latest), timing)
+            written = TimeHistory(path.read_bytes(), str(path)).time
+        except (FormatError, OSError):
+            return False
+        return bool(written.size) and float(written[-1]) >= end
 
     def started_well(self) -> bool:
         """Whether the starter has ended without an error, and left a restart."""
-        return bool(self._restarts(0)) and not _STARTER_ERROR.search(_tail(self.file(0, ".out")))
+        return self.whole(0) and not _STARTER_ERROR.search(_tail(self.file(0, ".out")))
 
-    def shorten(self, number: int, time: float) -> None:
-        """Cut the history of a leg behind a time: a reader would find two energies there."""
-        os.truncate(self.history(number), self._states(number).size_until(time))
+    def last_words(self, number: int) -> str:
+        """Give what the solver said of its error, or the last lines that it printed, in one."""
+        listing = _tail(self.file(number, ".out"), _LISTING).decode("latin-1").splitlines()
+        at = [place for place, line in enumerate(listing) if _ERROR in line]
+        text = (_tail(self.file(number, ".log")) or _tail(self.file(number, ".out"))).decode("latin-1").splitlines()
+        errors = [line for place in at for line in listing[place : place + _OF_ERROR]]
+        lines = [" ".join(line.split()) for line in errors or text if line.strip(" -*")]
+        told = lines[:_LAST_LINES] if errors else lines[-_LAST_LINES:]
+        ended = f"ended by signal {self._signal}; " if self._signal else ""
+        return ended + (printable(" | ".join(told)) or "nothing was printed")
 
-    def times(self, number: int, start: float, cycles: Sequence[int]) -> list[float]:
-        """Say when a leg that began at ``start`` had computed so many cycles, by the steps that its history shows.
-
-        Between two states a step grows by the same factor each cycle, if it does; so their geometric mean counts.
-        Nothing where a step is not written.
-        """
-        history = self._states(number)
-        steps = history.channel("time_step") if "time_step" in history.channels else np.zeros(1)
-        if not np.all(steps > 0):
-            return []
-        steps = np.sqrt(steps * np.append(steps[:1], steps[:-1]))
-        counts = np.cumsum(np.diff(history.time, prepend=start) / steps)
-        return [float(one) for one in np.interp(cycles, np.append(0.0, counts), np.append(start, history.time))]
-
-    def _states(self, number: int) -> TimeHistory:
-        path = self.history(number)
-        return TimeHistory(path.read_bytes(), str(path))
-
-    def last_lines(self, number: int) -> str:
-        """Give the last lines that the solver printed, in one."""
-        text = (_tail(self.file(number, ".log")) or _tail(self.file(number, ".out"))).decode("latin-1")
-        lines = [" ".join(line.split()) for line in text.splitlines() if line.strip(" -*")]
-        return printable(" | ".join(lines[-_LAST_LINES:])) or "nothing was printed"
-
-    def keep_two(self, number: int) -> None:
-        """Remove the restarts of legs before the two that come before this one."""
-        for earlier in range(number - 2):
-            for path in self._restarts(earlier):
+    def keep(self, numbers: Collection[int]) -> None:
+        """Remove the restarts of legs but for these, and of the starter's."""
+        for path in self.folder.glob(f"{self.name}_[0-9][0-9][0-9][0-9]_*.rst"):
+            number = int(path.name[len(self.name) + 1 :][:4])
+            if number and number not in numbers:
                 path.unlink(missing_ok=True)
 
-    def check_room(self, number: int, share: float, restarts: int) -> None:
-        """Raise D2RPickError where the disk has no room for a leg that has this share of the run still before it.
-
-        It keeps so many ``restarts`` of the size of the largest so far, and one that is being written.
-        """
-        import shutil
-
+    def check_room(self, number: int, share: float) -> None:
+        """Raise D2RPickError where the disk has no room for a leg that has this share of the run still before it."""
         files = list(self.folder.iterdir())
         restart = max((one.stat().st_size for one in files if one.suffix == ".rst"), default=0)
         histories = sum(self.history(one).stat().st_size for one in range(number) if self.history(one).exists())
-        needed = (restarts + 1) * restart + round(histories * share / max(1 - share, 0.1))
+        needed = 2 * restart + round(histories * share / max(1 - share, 0.1))
         free = shutil.disk_usage(self.folder).free
         if free < needed:
             raise D2RPickError(
@@ -253,15 +284,14 @@ class Solver:
         return list(self.folder.glob(f"{self.name}_{number:04d}_*.rst"))
 
 
-def _letter(restart: Path) -> str:
-    """Give the letter of a restart, as /RUN names it; empty where it has none."""
-    last = restart.stem.rpartition("_")[2]
-    return "" if last.isdecimal() else last
+def _begins_with_its_name(restart: Path) -> bool:
+    with restart.open("rb") as stream:
+        return stream.read(len(restart.name)) == restart.name.encode()
 
 
-def _tail(path: Path) -> bytes:
+def _tail(path: Path, size: int = _TAIL) -> bytes:
     with suppress(OSError), path.open("rb") as stream:
-        stream.seek(max(path.stat().st_size - _TAIL, 0))
+        stream.seek(max(path.stat().st_size - size, 0))
         return stream.read()
     return b""
 

@@ -8,22 +8,22 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.base.errors import ArgumentError, DeckError, name_units
+from d2rpick.base.errors import ArgumentError, DeckError
 from d2rpick.deck import read_inventory
 from d2rpick.deck.engine_files import capped, listed, off
 from d2rpick.deck.ls_dyna_parts import read_entities
-from d2rpick.deck.pieces import inner_period, supports_of
+from d2rpick.deck.pieces import inner_period
 from d2rpick.deck.printed_card import PHYSICS, PrintedCard, Printing, check_ids, comments, shortest
 from d2rpick.deck.radioss_bodies import bodies_for
-from d2rpick.deck.radioss_deck import kept_off, number_of
+from d2rpick.deck.radioss_deck import kept_off
 from d2rpick.deck.radioss_run import parts_off, read_run
-from d2rpick.deck.radioss_sensors import WITHOUT_FORCE
 from d2rpick.deck.reader import read_deck
 from d2rpick.deck.switch_sets import Waiting, header, to_deformable, to_rigid
+from d2rpick.running.checks import NO_CONTACT, contacts_of, refuse_held
 from d2rpick.running.inner_motion import Wait, check_wait, wait_of_deck
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Sequence
+    from collections.abc import Collection, Sequence
 
     from d2rpick.deck.model import Inventory
     from d2rpick.deck.radioss_deck import Starter
@@ -36,6 +36,7 @@ _CAP_SHARE: Final = 300
 # LS-DYNA: how long after it becomes rigid the first contact may not release it, of the wait.
 _SHORT: Final = 100
 _LOADS: Final = ("CLOAD", "PLOAD", "MONVOL", "LOAD", "PRELOAD", "LASER", "PFLUID")
+_UNSEEN: Final = "pushes without a contact, so that a flight is not seen by contacts"
 _OF_ALL: Final = (
     "A first run: no reference tells the level at td, so that none is matched.",
     "Only forces of contacts are seen: nothing else may act on the parts but gravity.",
@@ -46,11 +47,21 @@ _OF_RADIOSS: Final = (
     "A contact of the parts with themselves counts: while it pushes, they do not fly.",
     "Legs behind the end of the run take one step.",
 )
+_OF_WALLS: Final = (
+    "A rigid body that meets a rigid wall in the last step of its leg is stopped in that step: in a computed run it had"
+    " a momentum of 511 after it, for 365 deformable. drive keeps a margin before it."
+)
 _OF_LS_DYNA: Final = (
     "CODE 2 has no wait: parts become rigid without force after TIME1, also before a push and between two of them.",
     "Other contacts, rigid walls and loads are not seen by these switches.",
     "These cards were not tried with the solver.",
 )
+
+
+# LS-DYNA: what acts on parts without a contact, but for gravity.
+_PUSHES, _OF_GRAVITY = ("LOAD_", "AIRBAG_"), ("LOAD_BODY", "LOAD_GRAVITY")
+# The offset must be more than the thickness of the contact, half of both shells: so many times the thickest one.
+_CLEAR: Final = 2
 
 
 class First(NamedTuple):
@@ -90,7 +101,7 @@ def first_card(path: str, parts: Collection[int] = (), wait: float | None = None
         chosen = chosen or parts_off(read_run(path))
     if not chosen:
         raise ArgumentError(f"no parts were given, and {path} keeps no body off; name them with `parts`")
-    _refuse_held(path, inventory, chosen)
+    refuse_held(path, inventory, chosen)
     known = _wait(path, inventory, wait)
     make = _radioss if inventory.solver == "radioss" else _ls_dyna
     return make(path, inventory, chosen, known, after)
@@ -110,15 +121,6 @@ def _wait(path: str, inventory: Inventory, given: float | None) -> Wait:
     return Wait(float(f"{known.time / 2:.3g}"), "deck", f"half of the period {known.time:.3g} of {known.reason}")
 
 
-def _refuse_held(path: str, inventory: Inventory, parts: Collection[int]) -> None:
-    """Raise DeckError where a support holds the parts: its force is none of a contact."""
-    if unknown := sorted(set(parts) - inventory.nodes_by_part.keys()):
-        raise DeckError(f"{path}: {name_units(unknown)}: no elements in the deck; name others")
-    held = supports_of(inventory)[0]
-    for part in sorted(held.keys() & set(parts)):
-        raise DeckError(f"{path}: part {part} is held by {held[part][0].name}: it does not fly; leave it out")
-
-
 # Radioss.
 
 
@@ -128,9 +130,9 @@ def _radioss(path: str, inventory: Inventory, parts: Sequence[int], wait: Wait, 
         raise DeckError(f"{path}: the run has {len(run.legs)} engine files; its starter deck and one were expected")
     _refuse_loads(run.starter)
     (leg,) = run.legs
-    forces = list(_forces(run.starter))
+    forces = list(contacts_of(run.starter))
     if not forces:
-        raise DeckError(f"{path}: no contact and no rigid wall, so nothing would end a flight")
+        raise DeckError(f"{path}: {NO_CONTACT}")
     at_rest = after is None and _falls(run, inventory, parts)
     start = wait.time if after is None else max(after, wait.time)
     sensors, contact, flight = _sensors(forces, wait.time, start, bodies.sensor)
@@ -147,23 +149,14 @@ def _radioss(path: str, inventory: Inventory, parts: Sequence[int], wait: Wait, 
         files[f"{leg.name}_{number:04d}.rad"] = "\n".join(lines) + "\n"
     how = f"at rest in free fall: rigid from 0; then {_waited(wait)}" if at_rest else _waited(wait)
     told = (note.format(cap=cap) for note in _OF_RADIOSS)
-    notes = (how, *bodies.notes, *_OF_ALL, *told)
+    notes = (how, *bodies.notes, *_OF_ALL, *told, *((_OF_WALLS,) if run.starter.named("RWALL") else ()))
     head = "".join(f"# {line}\n" for line in comments([*notes, *PHYSICS]))
     return First(PrintedCard(head, (), files, starter=bodies.cards + sensors), wait, notes)
 
 
 def _refuse_loads(starter: Starter) -> None:
     for card in starter.named(*_LOADS):
-        raise DeckError(f"{card.at}: /{card.name} pushes without a contact, so that a flight is not seen by contacts")
-
-
-def _forces(starter: Starter) -> Iterator[tuple[str, int]]:
-    """Kind of sensor and id of each contact and rigid wall."""
-    for card in starter.named("INTER"):
-        if card.words[1:] and card.words[1] not in WITHOUT_FORCE:
-            yield "INTER", next(number for at in (2, 3) if (number := number_of(card, at)) or at == 3)
-    for card in starter.named("RWALL"):
-        yield "RWALL", number_of(card, -1)
+        raise DeckError(f"{card.at}: /{card.name} {_UNSEEN}")
 
 
 def _falls(run: Run, inventory: Inventory, parts: Collection[int]) -> bool:
@@ -196,8 +189,14 @@ def _waited(wait: Wait) -> str:
 
 
 def _ls_dyna(path: str, inventory: Inventory, parts: Sequence[int], wait: Wait, after: float | None) -> First:
-    entities = read_entities(read_deck(path), "CONTACT")
+    deck = read_deck(path)
+    entities = read_entities(deck, "CONTACT")
     able = [one for one in entities.found if one.triggers]
+    for card in deck.cards:
+        if card.name.startswith(_PUSHES) and not card.name.startswith(_OF_GRAVITY):
+            raise DeckError(
+                f"{card.at}: *{card.name} pushes without a contact, so that a flight is not seen by contacts"
+            )
     if not entities.all_known or len(able) != 1:
         found = f"{len(able)} contacts" if entities.all_known else "contacts that are not all known"
         raise DeckError(
@@ -207,13 +206,29 @@ def _ls_dyna(path: str, inventory: Inventory, parts: Sequence[int], wait: Wait, 
     contact, ids = able[0].id or able[0].number, check_ids(parts)
     printing = Printing(part=tuple(ids), bodies=inventory.bodies(ids))
     one, other = printing.swset
-    hint = ("TIME1 is 0: give the time of the last push (--after) where it is known.",) * (after is None)
-    notes = (_waited(wait), *_OF_ALL, *_OF_LS_DYNA, *hint)
+    falls = bool(inventory.boundary.gravity) and not deck.named("INITIAL_VELOCITY")
+    hint = ("TIME1 is 0: give the time of the last push (--after) where it is known.",) * (after is None and not falls)
+    fall = ("At rest in free fall: rigid from 0, TIME1 0.",) * (after is None and falls)
+    offset, where = _offset(inventory, able[0].keyword)
+    notes = (_waited(wait), *fall, *_OF_ALL, *_OF_LS_DYNA, where, *hint)
     lines = [f"$ {line}" for line in comments([*notes, *PHYSICS])]
     short = wait.time / _SHORT
     lines += header(one, shortest(after or 0.0), shortest(short), (len(ids), 0), Waiting(2, contact, short, other, 1))
     lines += to_rigid(ids, printing)
-    lines += header(other, "0.0", "0.0", (0, len(ids)), Waiting(4, contact, wait.time, one, -1))
+    lines += header(other, "0.0", "0.0", (0, len(ids)), Waiting(4, contact, wait.time, one, -1, offset=offset))
     lines += to_deformable(ids)
     text = "\n".join(lines) + "\n"
     return First(PrintedCard(text, (), {"switches.k": text}), wait, notes)
+
+
+def _offset(inventory: Inventory, keyword: str) -> tuple[float, str]:
+    """Give how far apart the surfaces of a contact are when the parts become deformable again [length], and say so."""
+    sections = [part.section for part in inventory.parts.values()]
+    thickest = max((one.thickness for one in sections if one.thickness), default=0.0)
+    if keyword.startswith("CONTACT_AUTOMATIC_") and thickest > 0:
+        offset = float(shortest(_CLEAR * thickest))
+        return (
+            offset,
+            f"OFFSET {offset:g}: the parts are deformable before the contact, {_CLEAR} shell thicknesses from it.",
+        )
+    return 0.0, "OFFSET 0: the parts become deformable in the contact; only automatic contacts of shells have a margin."

@@ -1,4 +1,4 @@
-"""How parts swing inside a body, by what a run shows so far: what is to be waited for, and what becomes out of place.
+"""How parts swing inside a body, by what a run shows so far: what is to be waited for.
 
 Before it counts as flight nothing must act for half of the longest inner period.
 Inside a load contacts open and close again, as parts on springs swing to and fro: the longest gap is shorter than half
@@ -8,22 +8,20 @@ such a gap for flight, and a body that is frozen there never makes the push that
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import RangeError
 from d2rpick.deck.pieces import inner_period
-from d2rpick.flight.flight import Flight
-from d2rpick.flight.momentum import believed
-from d2rpick.flight.position_error import MOST_OF_PATH, drift_in_flight
 from d2rpick.flight.window import FEWEST
-from d2rpick.histories.samples import integral, window
-from d2rpick.running.evidence import times_without_force
+from d2rpick.histories.samples import window
+from d2rpick.running.evidence import Evidence
+from d2rpick.running.record import Column
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import History, Momenta, Samples
@@ -34,10 +32,15 @@ _SWING: Final = 1 / 3
 _INNER, _SHARE = 0.1, float(np.arccos(-0.8) - np.arccos(0.8)) / np.pi
 # A swing with less than this share of the strongest mean force of all is that of a body that turns.
 _SLOW: Final = 0.05
+# A swing of fewer states is a jump, as of an energy in the first state.
+_RESOLVED: Final = 4
 # What moves at less than this share of the speed of all stands still against them.
 _SLOWEST: Final = 1e-3
 # What has swung for so many times its longest half period goes on for nobody knows how long.
 _LONGER: Final = 2.0
+# A swing that no push disturbed and that takes more than so many times half of the period of the deck is that of a body
+# that turns; one that was pushed counts as so long at most.
+_TURNS, _BEYOND = 1.5, 2.5
 # A period is known no better: a wait that is given may be so much shorter.
 _EXACT: Final = 0.9
 # Parts of a smaller share of the mass move the others too little.
@@ -49,75 +52,217 @@ _ROUND_OFF: Final = 1e-6
 class Wait(NamedTuple):
     """Time without force that counts as flight [time], where it comes from and why.
 
-    ``source``: "given", "record", "deck" or "at-rest".
+    ``source``: "given", "record", "deck" or "at-rest".  ``least``: what half of a period of the deck cannot be below
+    [time]; else it is the wait itself.
     """
 
     time: float
     source: str
     reason: str
+    least: float | None = None
 
 
 class _HalfPeriod(NamedTuple):
-    """Half a period of an inner motion from state ``begin`` to ``end``, known from a state on.
+    """Half a period of an inner motion from one time to another, ``known`` from a third one on [time].
 
     ``half`` is what it took [time], ``strength`` its mean change by time, 0 where it is less than a swing.
     """
 
-    begin: int
-    end: int
-    known: int
+    begin: float
+    end: float
+    known: float
     half: float
     strength: float
 
 
-class _Motion(NamedTuple):
-    """Something that swings by ``name``: its ``values`` (n,), the least change that is a swing (n,), its swings.
+class _Motion:
+    """Something that swings by ``name``: the states of its ``values`` so far, and its swings.
 
-    Half a period takes ``times`` as long as a swing of the values.  ``sets_out`` are the first state of the first one
-    and that from which it is known; None where nothing moves.
+    Half a period takes ``times`` as long as a swing of the values.
     """
 
-    name: str
-    time: Samples
-    values: Samples
-    room: Samples
-    swings: tuple[_HalfPeriod, ...]
-    sets_out: tuple[int, int] | None
-    times: float = 1.0
+    def __init__(self, name: str, times: float = 1.0) -> None:
+        self.name, self._times = name, times
+        self.has_own = False  # whether it has shown a swing that no push disturbed
+        self.swings: list[_HalfPeriod] = []
+        self._columns = {what: Column() for what in ("time", "values", "room")}
+        self._lowest, self._highest = np.inf, -np.inf
+        self._turn: int | None = None  # state of the last turn; None before anything moves
+        self._far, self._rising = 0, False
+        self._sets_out: float | None = None
+
+    @property
+    def begins(self) -> float:
+        """Time of the first state [time]."""
+        return float(self._columns["time"].rows[0])
+
+    @property
+    def ends(self) -> float:
+        """Time of the last state [time]."""
+        return float(self._columns["time"].rows[-1])
+
+    def add(self, time: Samples, values: Samples, least: Samples) -> Iterator[_HalfPeriod]:
+        """Append states (k,), whose least change that is a swing is at least ``least`` (k,); give the swings seen."""
+        lows = np.minimum(np.minimum.accumulate(values), self._lowest)
+        highs = np.maximum(np.maximum.accumulate(values), self._highest)
+        self._lowest, self._highest = float(lows[-1]), float(highs[-1])
+        room = np.maximum(_SWING * (highs - lows), least)
+        begin = self._columns["time"].size
+        moved = np.flatnonzero(highs - lows > room)
+        for what, rows in (("time", time), ("values", values), ("room", room)):
+            self._columns[what].add(rows)
+        every, limits = self._columns["values"].rows, room.tolist()
+        if self._turn is None:
+            if not moved.size:
+                return
+            state = begin + int(moved[0])
+            self._sets_out = float(time[moved[0]])
+            self._turn = _last_extreme(every[: state + 1])
+            self._far, self._rising = state, bool(every[state] > every[self._turn])
+            begin, limits = state, limits[int(moved[0]) :]
+        for state, (value, limit) in enumerate(zip(every[begin:].tolist(), limits, strict=True), start=begin):
+            yield from self._turned(state, value, limit, every)
+
+    def _turned(self, state: int, value: float, room: float, every: Samples) -> Iterator[_HalfPeriod]:
+        """Follow the swing by a state; give it where the next one has gone back by its room."""
+        if (value >= every[self._far]) if self._rising else (value <= every[self._far]):
+            self._far = state
+        elif abs(every[self._far] - value) > room:
+            assert self._turn is not None
+            if self._far - self._turn >= _RESOLVED:
+                self.swings.append(self._half_period(self._turn, self._far, state, room))
+                yield self.swings[-1]
+            self._turn, self._far, self._rising = self._far, state, not self._rising
+
+    def _half_period(self, begin: int, end: int, state: int, room: float) -> _HalfPeriod:
+        time, values = self._columns["time"].rows, self._columns["values"].rows[begin : end + 1]
+        way = np.abs(values - values[0])
+        begun = int(np.flatnonzero(way <= _INNER * way[-1])[-1])
+        ended = begun + int(np.argmax(way[begun:] >= (1 - _INNER) * way[-1]))
+        half = self._times * float(time[begin + ended] - time[begin + begun]) / _SHARE
+        strength = float(way[-1]) / half if way[-1] > room else 0.0
+        return _HalfPeriod(float(time[begin]), float(time[end]), float(time[state]), half, strength)
 
     def going_on(self, now: float) -> tuple[float, float, float] | None:
         """Tell what swings ``now``: its mean change by time, how long it has, and the longest half period before."""
-        state = int(np.searchsorted(self.time, now, side="right")) - 1
-        if self.sets_out is None or not self.sets_out[1] <= state or now > self.time[-1]:
+        time, values = self._columns["time"].rows, self._columns["values"].rows
+        state = int(np.searchsorted(time, now, side="right")) - 1
+        if self._turn is None or self._sets_out is None or self._sets_out > now:
             return None
-        before = [one for one in self.swings if one.known <= state]
-        begin = before[-1].end if before else self.sets_out[0]
-        middle = (begin + state) // 2
-        change, lately = (abs(float(self.values[state] - self.values[one])) for one in (begin, middle))
-        if change <= self.room[state] or lately <= self.room[state] / 2:
+        before = [one for one in self.swings if one.known <= now]
+        turned = before[-1].end if before else self._sets_out
+        begin = int(np.searchsorted(time, turned))
+        room = float(self._columns["room"].rows[state])
+        change, lately = (abs(float(values[state] - values[one])) for one in (begin, (begin + state) // 2))
+        if change <= room or lately <= room / 2:
             return None  # it has come to rest, or turns with the body
-        took = self.times * (now - float(self.time[begin]))
+        took = self._times * (now - turned)
         return change / took, took, max((one.half for one in before), default=0.0)
 
 
 class _Known(NamedTuple):
-    """What is known ``since`` a time: ``half`` a period of something [time], 0 where it tells none, and mean force."""
+    """What is known ``since`` a time: the longest ``half`` period, when it was ``over`` [time], and what it was of.
+
+    ``strength`` is that of the strongest mean force so far, ``swing`` the longest of all, pushed or not [time].
+    """
 
     since: float
     half: float
     strength: float
     name: str
+    over: float
+    swing: float
 
 
 class InnerMotion:
     """The wait that a record asks for at each of its states, by what it has shown of its inner motion up to there.
 
-    ``given`` is asked for by the user [time]; ``of_deck`` is what the deck tells, or the record of flights before, of
-    which the one at hand may show more.
+    ``given`` is asked for by the user, ``before`` by the record of flights before [time], ``of_deck`` by the deck.
     """
 
-    def __init__(self, history: History, given: float | None = None, of_deck: Wait | None = None) -> None:
-        self._history, self._given, self._of_deck = history, given, of_deck
+    def __init__(self, given: float | None = None, of_deck: Wait | None = None, before: float = 0.0) -> None:
+        self._given, self._floor = given, of_deck
+        self._springs = of_deck.time if of_deck else np.inf
+        if before > (of_deck.time if of_deck else 0.0):
+            self._floor = Wait(before, "record", "as in the flight before")
+        self._evidence = Evidence()
+        self._motions: list[_Motion] = []  # of parts along axes
+        self._going_on: dict[tuple[int, int], _Motion] = {}  # of these, as long as the same parts move
+        self._energy = _Motion("the internal energy", times=2.0)
+        self._heavy: tuple[int, ...] = ()
+        self._largest = self._highest = 0.0  # speed of the centre of mass, and energy
+        self._known: dict[bool, list[_Known]] = {True: [], False: []}  # by motions of parts; by the energy
+
+    @classmethod
+    def of(cls, history: History, given: float | None = None, of_deck: Wait | None = None) -> InnerMotion:
+        """Give that of a whole record."""
+        evidence, motion = Evidence(), cls(given, of_deck)
+        evidence.take(history)
+        motion.take(history, evidence)
+        return motion
+
+    def take(self, states: History, evidence: Evidence) -> None:
+        """Append states, which the ``evidence`` has taken already."""
+        self._evidence = evidence
+        momenta = next((one for one in states.momenta if one.parts is not None and one.masses is not None), None)
+        for swing, motion in sorted(self._of_parts(momenta) if momenta else (), key=lambda pair: pair[0].known):
+            self._learn(swing, motion)
+        for swing in self._of_energy(states):
+            self._learn(swing, self._energy)
+
+    def _of_parts(self, momenta: Momenta) -> Iterator[tuple[_HalfPeriod, _Motion]]:
+        """Follow the momenta of heavy parts against the centre of mass of all that move."""
+        masses = momenta.masses
+        assert masses is not None
+        assert momenta.parts is not None
+        for states, moving, believed in self._evidence.alike(momenta.time.size):
+            members = [i for i in moving if masses[i] > 0]
+            whole = float(masses[members].sum())
+            heavy = tuple(i for i in members if _HEAVY < masses[i] / whole < 1 - _HEAVY)
+            if heavy != self._heavy or not believed:
+                self._going_on.clear()
+            self._heavy = heavy
+            if not heavy or not believed:
+                continue
+            centre = momenta.values[states][:, members].sum(axis=1) / whole
+            fastest = np.maximum(np.maximum.accumulate(np.abs(centre).max(axis=1)), self._largest)
+            self._largest = float(fastest[-1])
+            for i in heavy:
+                against = momenta.values[states, i] - masses[i] * centre
+                for axis, values in enumerate(against.T):
+                    if (i, axis) not in self._going_on:
+                        self._going_on[i, axis] = _Motion(momenta.parts[i].name)
+                        self._motions.append(self._going_on[i, axis])
+                    motion = self._going_on[i, axis]
+                    for swing in motion.add(momenta.time[states], values, masses[i] * _SLOWEST * fastest):
+                        yield swing, motion
+
+    def _of_energy(self, states: History) -> Iterator[_HalfPeriod]:
+        """Follow the internal energy, which swings twice as often as what deforms."""
+        if not states.time.size:
+            return
+        highest = np.maximum(np.maximum.accumulate(np.abs(states.energy)), self._highest)
+        self._highest = float(highest[-1])
+        yield from self._energy.add(states.time, states.energy, _SLOWEST * highest)
+
+    def _learn(self, swing: _HalfPeriod, motion: _Motion) -> None:
+        """Let a swing that is over make the wait longer: not that of a body that turns, nor one that was pushed.
+
+        Where no deck tells anything, and this motion has not shown a swing without a push before, pushed ones count.
+        """
+        if swing.strength <= 0:
+            return
+        so_far = self._known[motion is not self._energy]
+        longest = so_far[-1] if so_far else _Known(swing.known, 0.0, 0.0, motion.name, swing.known, 0.0)
+        strongest = max(longest.strength, swing.strength)
+        own = self._evidence.free_since(swing.end) <= swing.begin
+        motion.has_own |= own
+        inner = swing.strength >= _SLOW * strongest and not (own and swing.half > _TURNS * self._springs)
+        counts = inner and (own or not (motion.has_own or self._floor))
+        half, who = (swing.half, motion.name) if counts and swing.half > longest.half else (longest.half, longest.name)
+        over = swing.known if half > longest.half else longest.over
+        longest_swing = max(longest.swing, min(swing.half, _BEYOND * self._springs) if inner else 0.0)
+        so_far.append(_Known(swing.known, half, strongest, who, over, longest_swing))
 
     def needed(self, start: float, now: float) -> float | None:
         """Wait [time], where nothing has acted from ``start`` to ``now``; None where it is not known yet.
@@ -131,26 +276,36 @@ class InnerMotion:
         """Give the same with its reason."""
         at_rest = self._at_rest(start, now)
         if self._given is None and at_rest:
-            time = self._history.time
+            time = self._evidence.history.time
             return Wait(float(time[FEWEST - 1] - time[0]), "at-rest", f"nothing vibrates: {FEWEST} states are enough")
         known = self.longest(now)
         if self._given is None:
-            return None if self._swings_on(now) else known
+            return None if self._floor is None and self._swings_on(now) else known
         if now - start >= self._given and not at_rest:
-            check_wait(self._given, known, ", ".join(self._history.source))
+            check_wait(self._given, known, ", ".join(self._evidence.history.source))
         return Wait(self._given, "given", "as given")
 
     def longest(self, now: float) -> Wait | None:
         """Give half of the longest period that is known ``now``, by the deck or the record so far."""
-        known = max((one for one in self._known if one.since <= now), key=lambda one: one.half, default=None)
-        if known is None or (self._of_deck and self._of_deck.time >= known.half):
-            return self._of_deck
-        reason = f"{known.name} took {known.half:.3g} for half a period that was over at {known.since:.6g}"
+        known = self._so_far(now)
+        if known is None or known.half <= (self._floor.time if self._floor else 0.0):
+            return self._floor
+        reason = f"{known.name} took {known.half:.3g} for half a period that was over at {known.over:.6g}"
         return Wait(known.half, "record", reason)
+
+    def longest_swing(self, now: float) -> float:
+        """Longest half of a swing that is known ``now``, though a push may have made it longer [time]."""
+        known = self._so_far(now)
+        return max(known.swing if known else 0.0, self._floor.time if self._floor else 0.0)
+
+    def _so_far(self, now: float) -> _Known | None:
+        known = self._known[any(one.begins <= now for one in self._motions)]
+        place = bisect_right(known, now, key=lambda one: one.since)
+        return known[place - 1] if place else None
 
     def _at_rest(self, start: float, now: float) -> bool:
         """Whether nothing has acted since the record began, and nothing vibrates."""
-        history = self._history
+        history = self._evidence.history
         if history.time.size < FEWEST or start > history.time[FEWEST - 1]:
             return False
         balance = history.balance
@@ -161,170 +316,32 @@ class InnerMotion:
 
     def _swings_on(self, now: float) -> bool:
         """Whether something swings that has taken much longer already than all of its swings before."""
-        strongest = max((one.strength for one in self._known if one.since <= now), default=0.0)
-        going = (motion.going_on(now) for motion in self._motions if motion.time[0] <= now)
+        known = self._so_far(now)
+        strongest = known.strength if known else 0.0
+        of_parts = [one for one in self._motions if one.begins <= now <= one.ends]
+        going = (one.going_on(now) for one in of_parts or [self._energy])
         return any(s >= _SLOW * strongest and took > _LONGER * before for s, took, before in filter(None, going))
-
-    @cached_property
-    def _known(self) -> tuple[_Known, ...]:
-        """Half periods in the order in which they become known, without those of a body that turns."""
-        free = [*times_without_force(self._history)]
-        before = self._of_deck is not None and self._of_deck.source == "record"
-        found = sorted(one for motion in self._motions for one in _own(motion, free, has_own=before))
-        strongest = np.maximum.accumulate([one.strength for one in found])
-        return tuple(one for one, most in zip(found, strongest, strict=True) if one.strength >= _SLOW * most)
-
-    @cached_property
-    def _motions(self) -> tuple[_Motion, ...]:
-        return tuple(_of_parts(self._history)) or tuple(_of_energy(self._history))
 
 
 def wait_of_deck(inventory: Inventory) -> Wait | None:
-    """Give half of what the longest period cannot be below, by a deck; None where its springs are not known.
-
-    The record shows what it is more than that; half of that was longer than any gap in the load of a car.
-    """
+    """Give half of the longest period of the springs of a deck; None where these are not known."""
     found = inner_period(inventory)
-    return found and Wait(found.least / 2, "deck", f"half of {found.least:.3g}, the least period of {found.reason}")
+    if found is None:
+        return None
+    return Wait(found.time / 2, "deck", f"half of the period {found.time:.3g} of {found.reason}", found.least / 2)
 
 
 def check_wait(given: float, known: Wait | None, name: str) -> None:
-    """RangeError where a wait that was given is below half of a known period."""
-    if known and given < _EXACT * known.time:
+    """RangeError where a wait that was given is below half of what a known period cannot be below."""
+    least = known and (known.time if known.least is None else known.least)
+    if known and least and given < _EXACT * least:
         raise RangeError(
-            f"{name}: `wait` {given:g} is below {known.time:.3g}, half of a period that is known: {known.reason}; "
+            f"{name}: `wait` {given:g} is below {least:.3g}, half of a period that is known: {known.reason}; "
             "a gap in the load would pass for flight"
         )
-
-
-def _own(motion: _Motion, free: Sequence[tuple[float, float]], *, has_own: bool) -> Iterator[_Known]:
-    """Give the half periods of a motion: where it ``has_own``, without a force, in ``free`` times, of others 0.
-
-    A push within a swing makes it longer or shorter.
-    """
-    for one in motion.swings:
-        begin, end, known = (float(motion.time[state]) for state in (one.begin, one.end, one.known))
-        own = any(start <= begin and end <= stop for start, stop in free)
-        if one.strength > 0:
-            has_own |= own
-            yield _Known(known, one.half if own or not has_own else 0.0, one.strength, motion.name)
-
-
-def _of_parts(history: History) -> Iterator[_Motion]:
-    """Momenta of the heavy parts against the centre of mass of all that move."""
-    whole = next((one for one in history.momenta if one.parts is None), None)
-    for momenta in history.momenta:
-        if momenta.parts is None or momenta.masses is None:
-            continue
-        masses = momenta.masses
-        members = [i for i in momenta.moving if masses[i] > 0]
-        heavy = [i for i in members if _HEAVY < masses[i] / masses[members].sum() < 1 - _HEAVY]
-        for states in believed(momenta, whole) if heavy else ():
-            time, values = momenta.time[states], momenta.values[states]
-            centre = values[:, members].sum(axis=1) / masses[members].sum()
-            least = _SLOWEST * np.maximum.accumulate(np.abs(centre).max(axis=1))
-            for i in heavy:
-                against = values[:, i] - masses[i] * centre
-                yield from (_motion(momenta.parts[i].name, time, one, masses[i] * least) for one in against.T)
-
-
-def _of_energy(history: History) -> Iterator[_Motion]:
-    """Internal energy, which swings twice as often as what deforms."""
-    if history.time.size:
-        least = _SLOWEST * np.maximum.accumulate(np.abs(history.energy))
-        yield _motion("the internal energy", history.time, history.energy, least, times=2.0)
-
-
-def _motion(name: str, time: Samples, values: Samples, least: Samples, times: float = 1.0) -> _Motion:
-    extent = np.maximum.accumulate(values) - np.minimum.accumulate(values)
-    room = np.maximum(_SWING * extent, least)
-    sets_out = int(np.argmax(extent > room)) if (extent > room).any() else None
-    if sets_out is None:
-        return _Motion(name, time, values, room, (), None)
-    first = _last_extreme(values[: sets_out + 1])
-    swings = []
-    for begin, end, known in _turns(values.tolist(), room.tolist(), first, sets_out):
-        way = np.abs(values[begin : end + 1] - values[begin])
-        begun = int(np.flatnonzero(way <= _INNER * way[-1])[-1])
-        ended = begun + int(np.argmax(way[begun:] >= (1 - _INNER) * way[-1]))
-        half = times * float(time[begin + ended] - time[begin + begun]) / _SHARE
-        swings.append(_HalfPeriod(begin, end, known, half, float(way[-1]) / half if way[-1] > room[known] else 0.0))
-    return _Motion(name, time, values, room, tuple(swings), (first, sets_out), times)
 
 
 def _last_extreme(values: Samples) -> int:
     """Last state at which values (n,) are as far from the last of them as they ever are."""
     away = np.abs(values - values[-1])
     return int(np.flatnonzero(away == away.max())[-1])
-
-
-def _turns(values: list[float], room: list[float], turn: int, first: int) -> Iterator[tuple[int, int, int]]:
-    """Give the states at which a swing begins and ends, and that at which the next one has gone back by ``room``."""
-    far, rising = first, values[first] > values[turn]
-    for state in range(first, len(values)):
-        value = values[state]
-        if (value >= values[far]) if rising else (value <= values[far]):
-            far = state
-        elif abs(values[far] - value) > room[state]:
-            yield turn, far, state
-            turn, far, rising = far, state, not rising
-
-
-class Swing(NamedTuple):
-    """A part that swings against the others: its ``name``, and how far the body may be out of place [length].
-
-    In a flight that is shorter than ``flight`` [time] that is more than 1 % of the path, beyond which a body is out of
-    place.  ``at_most``: two parts alone may turn instead, which puts nothing out of place.
-    """
-
-    name: str
-    error: float
-    flight: float
-    at_most: bool = False
-
-    @property
-    def told(self) -> str:
-        """What is to be known before the body becomes rigid."""
-        what, limit = ("still swings against the others", "about")
-        if self.at_most:
-            what, limit = "swings against the other, or both turn", "at most"
-        return (
-            f"{self.name} {what}: at td the body may be off by {limit} {self.error:.3g},"
-            f" more than {MOST_OF_PATH:.0%} of its path in a flight shorter than {self.flight:.3g}"
-        )
-
-
-def swing_in(history: History, start: float, tr: float) -> Swing | None:
-    """Find how far the body that becomes rigid at ``tr`` may be out of place, in a flight since ``start`` [time].
-
-    td is not known: it is taken for the state so far at which the parts stand farthest from where they are at tr.  None
-    where the momenta of the parts do not tell.
-    """
-    momenta = next((one for one in history.momenta if one.parts is not None), None)
-    if momenta is None or momenta.parts is None:
-        return None
-    flying = tuple(momenta.parts[i] for i in momenta.moving)
-    drift = drift_in_flight(history, Flight(start, tr, "momentum", flying))
-    if drift is None:
-        name, error, path = _of_two(momenta, start, tr)
-    else:
-        name, error, path = drift.part.name, np.max(drift.errors(drift.time, float(drift.time[-1]))), drift.path[-1]
-    return (
-        Swing(name, float(error), float(error / path) / MOST_OF_PATH * (tr - start), drift is None)
-        if path > 0
-        else None
-    )
-
-
-def _of_two(momenta: Momenta, start: float, tr: float) -> tuple[str, float, float]:
-    """Name the lighter of two parts, how far off the other is at most, and the path; 0 for others."""
-    inside = window(momenta.time, start, tr)
-    time, masses = momenta.time[inside], momenta.masses
-    pair = [] if masses is None else [i for i in momenta.moving if i in momenta.chosen and masses[i] > 0]
-    if momenta.parts is None or masses is None or len(pair) != 2 or time.size < 2:
-        return "", 0.0, 0.0
-    light, heavy = sorted(pair, key=lambda i: float(masses[i]))
-    centre = momenta.values[inside][:, pair].sum(axis=1) / masses[pair].sum()
-    away = integral(time, momenta.values[inside][:, heavy] / masses[heavy] - centre)
-    off, path = np.linalg.norm(away - away[-1], axis=1).max(), integral(time, np.linalg.norm(centre, axis=1))[-1]
-    return momenta.parts[light].name, float(off), float(path)

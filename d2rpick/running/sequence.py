@@ -1,42 +1,55 @@
 """Which leg comes next in a first run that is switched while it runs: from what the legs so far have shown.
 
-What each kind of leg does is said in docs/first-run.md.  One that is thrown away has the number of the leg that takes
-its place.  A probe with a restart shortly before td is kept up to there.
+A leg ends at a time that was fixed before it began, so that the same command computes the same legs, however fast the
+machine is.  One that is thrown away has the number of the leg that takes its place.
 """
 
 from __future__ import annotations
 
-from itertools import takewhile
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import D2RPickError
 from d2rpick.flight.margin import SHARE
+from d2rpick.flight.window import FEWEST
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Sequence
 
-LOAD, SEARCH, APPROACH, PROBE, RIGID = "load", "search", "approach", "probe", "rigid"
+LOAD, PROBE, RIGID = "load", "probe", "rigid"
 RIGID_KINDS: Final = (PROBE, RIGID)
-# A search ends when nothing higher came for this share of it: the rest would be computed twice.
-_PASSED: Final = 0.25
 # Where a leg ends, its history does so up to one state earlier; times within it are the same.
 _STATES: Final = 1.5
-# Cycles are counted from the last state before a leg, though it begins up to one interval later: that many small steps
-# are five times as long when rigid, and a restart may come so much later than it seems.
-_EARLY: Final = 8.0
-_MOST_LEGS: Final = 99
+# The solver numbers so many legs; flights are looked for as long as so many are left, which takes the run to its end.
+_MOST_LEGS, _KEPT_BACK = 99, 10
+# A leg while nothing acts is at least this share of the wait: at one of its ends the energy is higher.
+_LEAST: Final = 0.25
+# A leg where nothing tells how long to wait, of the run.
+_UNKNOWN: Final = 0.02
+# A leg of a probe lasts for the wait, this share of what it has flown, or of the run: what it computes too much costs
+# some hundredths of a deformable run of the flight, and so does a leg more.
+_OF_FLOWN, _OF_RUN = 0.4, 0.02
+# The restart of a leg, written and read, costs as much as so many deformable cycles (some five, measured).
+_RESTART: Final = 10
+# A flight of fewer half swings is too short to be switched: what still swings touches the ground at another time than
+# the body that is frozen does.  Two soft boxes that bounced low landed 33 and 55 ms late when rigid, after 2.4 and 2.8
+# of them; of cars and boxes that flew for 3.2 of them and more the landing moved by 3.4 ms at most.
+_SWINGS: Final = 3.0
+# A window moves the landing behind it by up to 2 ms, the one after that by up to 37 ms (two computed boxes): one that
+# saves less than this share of a deformable run is not worth that.
+_WORTH: Final = 0.04
 
 
 class Limits(NamedTuple):
-    """What the legs keep to [time]: ``shortest`` is the wait of a flight without energy, and the least margin.
+    """What the legs keep to [time]: ``shortest`` is the least margin.
 
-    ``interval`` is that of the history.
+    ``interval`` is that of the history.  ``rigid_cycle`` is what a cycle of rigid parts costs, of a deformable one [-].
     """
 
     end: float
     interval: float
     shortest: float
     margin: float | None = None
+    rigid_cycle: float = 0.5
 
     def margin_of(self, flight: float, *, idle: bool = False) -> float:
         """Margin before the contact at the end of a flight of this length [time]; ``idle``: nothing vibrates in it."""
@@ -53,9 +66,9 @@ class Limits(NamedTuple):
 
 
 class Order(NamedTuple):
-    """A leg to be computed: to ``until`` at most, from a restart at ``start``; flights from before ``after`` are over.
+    """A leg to be computed, from the end of the leg before it to ``until`` [time].
 
-    ``restart`` is its letter, None for the last one of the leg before.
+    Flights that began before ``after`` are not switched any more [time].
     """
 
     kind: str
@@ -63,7 +76,6 @@ class Order(NamedTuple):
     start: float
     until: float
     after: float = 0.0
-    restart: str | None = None
 
     @property
     def rigid(self) -> bool:
@@ -72,31 +84,31 @@ class Order(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """What the record of a leg shows up to its last state, at ``time``.
+    """What the record shows up to the end of a leg.
 
-    ``free``: since when no force acts, None where one does; ``wait``: how long that is asked for; ``peak``: when the
-    energy was highest in the leg; ``idle``: no energy was ever stored; ``contact``: the first one in the leg.
+    ``free``: since when no force acts [time]; ``wait``: how long that is asked for [time], None where it is not known,
+    and ``why``; ``flies``: whether it has lasted for so long; ``tr``: the end of the leg with the higher energy [time];
+    ``idle``: no energy was ever stored; ``short``: begin and end of flights in the leg that did not last for the wait;
+    ``contact``: the first one of the rigid body [time]; ``swing``: the longest half of a swing so far, pushed or not
+    [time].
     """
 
-    time: float
-    free: float | None = None
-    wait: float = 0.0
-    peak: float | None = None
+    free: float = 0.0
+    wait: float | None = None
+    why: str = ""
+    flies: bool = False
+    tr: float = 0.0
     idle: bool = False
+    short: tuple[tuple[float, float], ...] = ()
     contact: float | None = None
+    swing: float = 0.0
 
 
 class Leg(NamedTuple):
-    """A leg that is over; ``cut``: the solver was ended from outside, and its last restart is what counts.
-
-    ``restarts`` are those that it wrote on its way, each with its time and letter; ``cycles`` and processor time
-    ``cpu`` [s] are None where unknown.
-    """
+    """A leg that is over; ``cycles`` and processor time ``cpu`` [s] are None where unknown."""
 
     order: Order
     seen: Seen
-    cut: bool = False
-    restarts: tuple[tuple[float, str], ...] = ()
     cycles: int | None = None
     cpu: float | None = None
 
@@ -108,15 +120,14 @@ class Leg(NamedTuple):
     @property
     def length(self) -> float:
         """How long it was [time]."""
-        return self.seen.time - self.order.start
-
-    def whole(self, limits: Limits) -> bool:
-        """Whether it reached its end."""
-        return self.seen.time > self.order.until - limits.same
+        return self.order.until - self.order.start
 
 
 class Window(NamedTuple):
-    """A flight that was switched, or left out with a ``reason``; ``free`` since when, ``contact`` when seen rigid."""
+    """A flight that was switched, or left out with a ``reason``; ``free`` since when, ``contact`` when seen rigid.
+
+    One that is left out is deformable from ``tr`` to ``td`` all the same.
+    """
 
     free: float
     tr: float
@@ -129,154 +140,134 @@ class Window(NamedTuple):
 def next_order(legs: Sequence[Leg], limits: Limits) -> Order | None:
     """Say which leg comes next; None when the run is over.
 
-    Raises
-    ------
-    D2RPickError
-        If a leg got nowhere, or the solver has no number for one more.
+    D2RPickError where the solver has no number for one more.
     """
-    if not legs:
-        return Order(LOAD, 1, 0.0, limits.end)
-    last = legs[-1]
-    if last.order.number > 1 and last.seen.time <= last.order.start and not last.cut:
-        raise D2RPickError(f"leg {last.order.number} stopped where it began, at {last.seen.time:.6g}; see its listing")
-    order = _NEXT[last.order.kind](legs, limits)
+    if not legs:  # as many states as show a fall of parts that are at rest
+        return Order(LOAD, 1, 0.0, min((FEWEST + 2) * limits.interval, limits.end))
+    last = legs[-1].order
+    if last.rigid and legs[-1].seen.contact is not None:
+        order: Order | None = _before_contact(legs, limits)
+    elif last.until >= limits.end:
+        order = None
+    elif last.kind == PROBE:
+        order = _following(last, PROBE, _probed(legs, _became_rigid(legs).start, limits))
+    elif last.kind == RIGID:
+        order = _following(last, LOAD, _loaded(legs[-1], limits))._replace(after=last.until)
+    else:
+        order = _after_load(legs, limits)
     if order and order.number > _MOST_LEGS:
         raise D2RPickError(f"the run needs more than {_MOST_LEGS} legs, which the solver cannot number; raise `wait`")
     return order
 
 
-def _after_load(legs: Sequence[Leg], limits: Limits) -> Order | None:
-    last, seen = legs[-1], legs[-1].seen
-    if last.whole(limits):
-        return None
-    if last.cut or not lasts(last.order, seen, limits):
-        return _following(last, LOAD, limits.end)
-    if not _room(seen, seen.time, limits):
-        return _following(last, LOAD, limits.end)._replace(after=seen.time)
-    if seen.idle:
-        return _following(last, PROBE, limits.end)
-    return _following(last, SEARCH, min(seen.time + seen.wait, limits.end))
+def _following(last: Order, kind: str, until: float) -> Order:
+    return Order(kind, last.number + 1, last.until, until, last.after)
 
 
-def _after_search(legs: Sequence[Leg], limits: Limits) -> Order | None:
-    last, seen = legs[-1], legs[-1].seen
-    if last.cut or last.seen.contact is not None or seen.peak is None:
-        return _following(last, LOAD, limits.end) if seen.time < limits.end - limits.same else None
-    if seen.peak <= last.order.start + limits.same:
-        return last.order._replace(kind=PROBE, until=limits.end)
-    if seen.peak >= seen.time - limits.same:
-        return _following(last, PROBE, limits.end)
-    before = [one for one in last.restarts if one[0] < seen.peak - limits.same]
-    if not before:
-        return last.order._replace(kind=APPROACH, until=seen.peak)
-    start, letter = max(before)
-    return _following(last, APPROACH, seen.peak)._replace(start=start, restart=letter)
+def _after_load(legs: Sequence[Leg], limits: Limits) -> Order:
+    last, seen = legs[-1].order, legs[-1].seen
+    switches = seen.flies and seen.free >= last.after and limits.end - last.until > _WORTH * limits.end
+    if not switches or last.number > _MOST_LEGS - _KEPT_BACK:
+        return _following(last, LOAD, _loaded(legs[-1], limits))
+    if seen.idle or seen.tr > last.start:
+        return _following(last, PROBE, _probed(legs, last.until, limits))
+    return last._replace(kind=PROBE, until=_probed(legs, last.start, limits, now=last.start))
 
 
-def _passed(order: Order, seen: Seen, limits: Limits) -> bool:
-    """Whether nothing higher came for so long that a search is over."""
-    return seen.peak is not None and seen.time - seen.peak >= _PASSED * (order.until - order.start) - limits.same
+def _loaded(leg: Leg, limits: Limits) -> float:
+    """When a deformable leg after this one ends: when a flight that has begun, or may begin now, lasts for the wait."""
+    now, seen, numbers = leg.order.until, leg.seen, _MOST_LEGS - _KEPT_BACK - leg.order.number
+    if numbers <= 0:
+        return limits.end
+    free = seen.free if not leg.order.rigid and seen.free >= leg.order.after and not seen.flies else now
+    wait = seen.wait or _UNKNOWN * limits.end
+    until = max(free + wait, now + _LEAST * wait, now + (limits.end - now) / numbers)
+    return until if until < limits.end - limits.same else limits.end
 
 
-def _after_approach(legs: Sequence[Leg], limits: Limits) -> Order | None:
-    last = legs[-1]
-    kind, until = (PROBE, limits.end) if last.whole(limits) else (APPROACH, last.order.until)
-    return _following(last, LOAD if last.cut else kind, limits.end if last.cut else until)
+def _probed(legs: Sequence[Leg], tr: float, limits: Limits, now: float | None = None) -> float:
+    """When the next leg of a probe that began at ``tr`` ends."""
+    now = legs[-1].order.until if now is None else now
+    until = now + max(_flown(legs).wait or 0.0, _OF_FLOWN * (now - tr), _OF_RUN * limits.end, FEWEST * limits.interval)
+    return until if until < limits.end - limits.same else limits.end
 
 
-def _after_probe(legs: Sequence[Leg], limits: Limits) -> Order | None:
-    last = legs[-1]
-    if last.seen.contact is None:
-        return None if last.whole(limits) and not last.cut else last.order
-    found, first = window_of(legs, limits), _frozen(legs)
-    if found.reason:
-        return first._replace(kind=LOAD, until=limits.end, after=found.tr + limits.same)
-    before = [one for one in last.restarts if one[0] < found.td - _EARLY * limits.interval]
-    if not before:
-        return first._replace(kind=RIGID, until=found.td)
-    start, letter = max(before)
-    return _following(last, RIGID, found.td)._replace(start=start, restart=letter)
-
-
-def _after_rigid(legs: Sequence[Leg], limits: Limits) -> Order | None:
-    last = legs[-1]
-    if last.seen.contact is not None:
-        return _after_probe(legs, limits)
-    if last.cut or not last.whole(limits):
-        return last.order
-    return _following(last, LOAD, limits.end)._replace(after=last.seen.time)
-
-
-_NEXT: Final[Mapping[str, Callable[[Sequence[Leg], Limits], Order | None]]] = {
-    LOAD: _after_load,
-    SEARCH: _after_search,
-    APPROACH: _after_approach,
-    PROBE: _after_probe,
-    RIGID: _after_rigid,
-}
-
-
-def _following(last: Leg, kind: str, until: float) -> Order:
-    start = last.order.start if last.cut else last.seen.time  # nobody knows when its last restart was written
-    return Order(kind, last.order.number + 1, start, until, last.order.after)
-
-
-def lasts(order: Order, seen: Seen, limits: Limits, share: float = 1.0) -> bool:
-    """Whether what is seen has been a flight for this share of the wait."""
-    if seen.free is None or seen.free < order.after:
-        return False
-    return seen.time - seen.free >= share * _wait(seen, limits) - limits.same
-
-
-def _room(seen: Seen, time: float, limits: Limits) -> bool:
-    """Whether a window that begins at a time can last for two waits before the run ends."""
-    return limits.end - time >= 2 * _wait(seen, limits)
-
-
-def _wait(seen: Seen, limits: Limits) -> float:
-    return min(seen.wait, limits.shortest) if seen.idle and limits.shortest else seen.wait
+def _before_contact(legs: Sequence[Leg], limits: Limits) -> Order:
+    """Go on from the last leg of a probe that ended before td, or deformable where the window does not pay."""
+    window, first = window_of(legs, limits), _became_rigid(legs)
+    if window.reason:
+        number, now = first.number, first.start
+        until = _loaded(Leg(Order(RIGID, number - 1, now, now), _flown(legs)), limits)
+        return Order(LOAD, number, now, until, after=now + limits.same)
+    before = [one for one in together(legs[-1].order, legs) if one.until <= window.td]
+    last = before[-1] if before else None
+    if last is None:
+        return first._replace(kind=RIGID, until=window.td)
+    if last.until == window.td:
+        until = _loaded(Leg(last, _flown(legs)), limits)
+        return _following(last, LOAD, until)._replace(after=last.until)
+    return _following(last, RIGID, window.td)
 
 
 def window_of(legs: Sequence[Leg], limits: Limits) -> Window:
     """Give the window before the contact that the last of these legs has shown, or the end of the run without one."""
-    seen, tr = legs[-1].seen, _frozen(legs).start
-    flown = next(leg.seen for leg in reversed(legs) if leg.order.kind == LOAD)
-    free = tr if flown.free is None else flown.free
-    wait = _wait(flown, limits)
-    if seen.contact is None:
-        return Window(free, tr, seen.time, None, wait)
-    td = seen.contact - limits.margin_of(seen.contact - free, idle=flown.idle)
-    reason = f"shorter than two waits, {2 * wait:.4g}" if td - tr < 2 * wait else None
-    return Window(free, tr, td, seen.contact, wait, reason)
+    tr, before, contact = _became_rigid(legs).start, _flown(legs), legs[-1].seen.contact
+    wait = before.wait or 0.0
+    if contact is None:
+        return Window(before.free, tr, legs[-1].order.until, None, wait)
+    flight = contact - before.free
+    td = contact - limits.margin_of(flight, idle=before.idle)
+    ends = [one.until for one in together(legs[-1].order, legs) if 0 <= td - one.until <= limits.same]
+    td = max(ends, default=td)  # a leg that ended there need not go on by a state
+    reason = _why_left_out(legs, td - tr, limits)
+    if not before.idle and flight < _SWINGS * before.swing:
+        reason = f"shorter than {_SWINGS:g} half swings of {before.swing:.3g}: its landing is not known"
+    return Window(before.free, tr, td, contact, wait, reason)
 
 
-def _frozen(legs: Sequence[Leg]) -> Order:
+def _why_left_out(legs: Sequence[Leg], rigid_time: float, limits: Limits) -> str | None:
+    """Say why a window is not worth its probe and restarts, by the cycles so far: processor times differ each time."""
+    if rigid_time <= 0:
+        return "its margin begins before tr"
+    frozen = _became_rigid(legs)
+    probed = [leg for leg in legs if leg.order.rigid and leg.order.start >= frozen.start]
+    took = sum((leg.cycles or 0) * limits.rigid_cycle + _RESTART for leg in probed)
+    saved = (rigid_time - took / _cycles(legs)) / limits.end
+    return None if saved >= _WORTH else f"saves {max(saved, 0.0):.1%} of the run, less than {_WORTH:.0%}"
+
+
+def _cycles(legs: Sequence[Leg]) -> float:
+    """Deformable cycles by time, so far [1/time]."""
+    loaded = [leg for leg in legs if not leg.order.rigid and leg.cycles]
+    return sum(leg.cycles or 0 for leg in loaded) / sum(leg.length for leg in loaded) if loaded else float("inf")
+
+
+def together(order: Order, legs: Sequence[Leg]) -> list[Order]:
+    """Give the legs before a leg, and it, as far back as the parts were rigid as they are in it, or deformable."""
+    latest, found = {leg.order.number: leg.order for leg in legs}, [order]
+    while (before := latest.get(found[0].number - 1)) and before.rigid is order.rigid:
+        found.insert(0, before)
+    return found
+
+
+def _became_rigid(legs: Sequence[Leg]) -> Order:
     """Order of the leg in which the parts became rigid, of those that the last leg goes on with."""
-    *_, first = takewhile(lambda leg: leg.order.rigid, reversed(legs))
-    return first.order
+    return together(legs[-1].order, legs)[0]
+
+
+def _flown(legs: Sequence[Leg]) -> Seen:
+    """What was seen of the flight when it was decided to switch."""
+    return next(leg.seen for leg in reversed(legs) if leg.order.kind == LOAD)
 
 
 def windows(legs: Sequence[Leg], limits: Limits) -> list[Window]:
-    """Give the windows of all flights so far that were switched or left out, in their order."""
-    found: dict[int, Window] = {}
+    """Give all flights so far that were switched or left out, in their order."""
+    found: dict[float, Window] = {}
     for count, leg in enumerate(legs, start=1):
-        ended_by_itself = leg.order.kind == PROBE and leg.whole(limits) and not leg.cut
-        if leg.order.rigid and (leg.seen.contact is not None or ended_by_itself):
-            found[_frozen(legs[:count]).number] = window_of(legs[:count], limits)
-    return list(found.values())
-
-
-def control(order: Order, seen: Seen, limits: Limits) -> str:
-    """Say what the engine is to be told by what is seen of a leg that is being computed; nothing where it goes on."""
-    if seen.time <= order.start:
-        return ""  # its first state is still to come
-    if order.rigid:
-        return "/KILL\n" if seen.contact is not None else ""
-    if order.kind == SEARCH:
-        return "/STOP\n" if _passed(order, seen, limits) else ""
-    if order.kind != LOAD or seen.free is None or not lasts(order, seen, limits, 0.5):
-        return ""
-    ready = seen.free + _wait(seen, limits)
-    if not _room(seen, ready, limits):
-        return ""
-    return f"/TIME/{ready:.9g}\n/STOP\n" if ready > seen.time else "/STOP\n"
+        for start, end in leg.seen.short:
+            told = "over before the wait"
+            found[start] = Window(start, start, end, end, leg.seen.wait or 0.0, told)
+        if leg.order.rigid and (leg.seen.contact is not None or leg.order.until >= limits.end):
+            window = window_of(legs[:count], limits)
+            found[window.free] = window
+    return [found[start] for start in sorted(found)]

@@ -1,7 +1,7 @@
 """Watch a run while it is computed: what happens in it, event after event, and what is new since the last look.
 
-Nothing is started, stopped or changed, and each event is told by the states up to the one at which it is seen.  A look
-costs what reading the record costs, so the time to the next one is a hundred times that: one percent of a core.
+Nothing is started, stopped or changed, and each event is told by the states up to the one at which it is seen.  The
+time to the next look is a hundred times what one costs: one percent of a core.
 """
 
 from __future__ import annotations
@@ -12,14 +12,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import FormatError, HistoryError, RangeError
-from d2rpick.choice.deck_of_run import in_deck
-from d2rpick.choice.question import Reference
 from d2rpick.flight.window import FEWEST
 from d2rpick.histories.listings import WITH_AN_ERROR, ending
-from d2rpick.histories.opening import open_run
 from d2rpick.histories.source import expand, later_legs
-from d2rpick.running.evidence import contact_after, highest_energy, quiet_times, rigid_times
-from d2rpick.running.inner_motion import InnerMotion, swing_in, wait_of_deck
+from d2rpick.running.evidence import Evidence, highest_energy, range_of_energy
+from d2rpick.running.inner_motion import InnerMotion, wait_of_deck
+from d2rpick.running.looks import Looks
+from d2rpick.running.swing import swing_in
 
 if TYPE_CHECKING:
     import os
@@ -28,11 +27,7 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import History
     from d2rpick.histories.names import Selection
-    from d2rpick.running.evidence import Quiet
-
-# A switch is advised where the internal energy is this share of the way from the lowest to the highest of one wait:
-# in a trough of computed runs the energy after td was half of what it should be, from a peak 0.9 of it and more.
-_HIGH: Final = 0.75
+    from d2rpick.running.witness import Quiet
 
 
 class Event(NamedTuple):
@@ -51,16 +46,20 @@ class Event(NamedTuple):
     tr: float | None = None
 
 
-def events_of(history: History, motion: InnerMotion) -> tuple[Event, ...]:
+def events_of(
+    evidence: Evidence, motion: InnerMotion, decided: dict[tuple[float, float], tuple[Event, ...]] | None = None
+) -> tuple[Event, ...]:
     """Give all that has happened, in the order in which it was seen; RangeError where a wait is too short.
 
-    The events of a run so far are the first of those of the whole run.
+    The events of a run so far are the first of those of the whole run.  What is ``decided`` of flights, by their start
+    and when they were seen, is not looked for again.
     """
-    quiet, rigid = quiet_times(history, motion.needed), rigid_times(history)
-    found = [event for one in quiet for event in _flight(history, motion, one)]
+    quiet, rigid, history = evidence.flights(motion.needed), evidence.rigid_times(), evidence.history
+    decided = {} if decided is None else decided
+    found = [event for one in quiet for event in _flight(history, motion, one, decided)]
     found = [one for one in found if one.tr is None or not any(start <= one.tr <= end for start, _, end in rigid)]
     if history.time.size and not (quiet and quiet[0].start <= history.time[0]):
-        begun = contact_after(history, float(history.time[0]), 1)
+        begun = evidence.contact_after(float(history.time[0]), 1)
         found += [] if begun is None else [Event("load", begun, begun, "a force acts")]
     for start, seen, end in rigid:
         if start <= history.time[min(FEWEST, history.time.size) - 1]:
@@ -72,7 +71,20 @@ def events_of(history: History, motion: InnerMotion) -> tuple[Event, ...]:
     return tuple(sorted(found, key=lambda one: one.seen or 0.0))
 
 
-def _flight(history: History, motion: InnerMotion, one: Quiet) -> Iterator[Event]:
+def _flight(
+    history: History, motion: InnerMotion, one: Quiet, decided: dict[tuple[float, float], tuple[Event, ...]]
+) -> Iterator[Event]:
+    advice = decided.get(one[:2]) or (_begins(motion, one), *_advice(history, motion, one))
+    if one.end is not None or any(event.tr is not None for event in advice):
+        decided[one[:2]] = advice
+    yield from advice
+    if one.end is not None:
+        told = f"a force acts, {one.end - one.start:.4g} after the flight began"
+        yield Event("contact", one.end, one.end, told)
+
+
+def _begins(motion: InnerMotion, one: Quiet) -> Event:
+    """Tell that a flight is seen, by what evidence, and why not before."""
     what = "momentum less gravity" if one.source == "momentum" else "the energy of the contacts"
     wait = motion.wait(one.start, one.seen)
     why = f"the wait is {one.wait:.4g}: {wait.reason}" if wait else ""
@@ -80,27 +92,28 @@ def _flight(history: History, motion: InnerMotion, one: Quiet) -> Iterator[Event
     told += (
         "; nothing tells when it lands" if one.level is None else f"; on level ground it lands about {one.level:.4g}"
     )
-    yield Event("flight", one.start, one.seen, told, one.wait, one.left)
+    return Event("flight", one.start, one.seen, told, one.wait, one.left)
+
+
+def _advice(history: History, motion: InnerMotion, one: Quiet) -> Iterator[Event]:
+    """Advise when to switch in a flight."""
+    wait = motion.wait(one.start, one.seen)
     if wait and wait.source == "at-rest":
         told = "switch now: nothing vibrates, so that any tr is right, and the earlier it is the more it saves"
         yield Event("switch", one.seen, one.seen, told, one.wait, tr=one.seen)
     else:
         yield from _switch(history, one)
-    if one.end is not None:
-        told = f"a force acts, {one.end - one.start:.4g} after the flight began"
-        yield Event("contact", one.end, one.end, told)
 
 
 def _switch(history: History, one: Quiet) -> Iterator[Event]:
     """Advise a switch where the internal energy is high, within one more wait; else where it was highest in it."""
     last = one.seen + one.wait
     for now, energy in zip(*(values.tolist() for values in history.between(one.seen, last)), strict=True):
-        before = history.between(now - one.wait, now)[1]
-        low, high = float(before.min()), float(before.max())
+        low, high, enough = range_of_energy(history, now, one.wait)
         where = f"the internal energy is {energy:.4g}, of {low:.4g} to {high:.4g} within one wait"
         if one.end is not None and now >= one.end:
             return
-        if energy >= low + _HIGH * (high - low):
+        if energy >= enough:
             yield Event("switch", now, now, f"switch now: {where}{_swings(history, one, now)}", one.wait, tr=now)
             return
         if now == one.seen:
@@ -120,9 +133,10 @@ def _swings(history: History, one: Quiet, tr: float) -> str:
     return f"; {swing.told}" if swing and swing.flight > tr - one.start else ""
 
 
-# Share of a core, shortest time between two looks, and after what time without a new state a run is silent [s].
+# Share of a core, shortest time between two looks, longest one where they read what is new, and how long a run that
+# is silent writes nothing [s].
 _SHARE: Final = 0.01
-_SHORTEST, _SILENT = 0.5, 60.0
+_SHORTEST, _LONGEST, _SILENT = 0.5, 5.0, 60.0
 _PACKED: Final = "normally: its history is packed"
 _FLYING: Final = ("flight", "contact")
 _WRITTEN: Final = (
@@ -142,11 +156,17 @@ class Watch:
     ) -> None:
         self._names, self._selection, self._wait, self._inventory = names, selection, wait, inventory
         self._of_deck = wait_of_deck(inventory) if inventory else None
+        self._looks = Looks(selection, inventory)
+        self._begin_again()
         self._files: list[tuple[str, os.stat_result]] = []
         self._told: tuple[Event, ...] = ()
         self._error: FormatError | HistoryError | None = None
         self._now, self._silent, self._undecided = float("-inf"), _SILENT, False
         self.ended: str | None = None
+
+    def _begin_again(self) -> None:
+        self._evidence, self._motion = Evidence(), InnerMotion(self._wait, self._of_deck)
+        self._decided: dict[tuple[float, float], tuple[Event, ...]] = {}
 
     def news(self) -> Iterator[Event]:
         """Tell what is new; nothing of a run that has not begun.
@@ -165,12 +185,20 @@ class Watch:
                 self._error = None
             except (FormatError, HistoryError) as error:
                 self._error = error  # it may be about to be written
+                self._looks = Looks(self._selection, self._inventory)
+        if files and not self.ended and self._now > float("-inf"):
+            yield from self._end(files[-1][0])
         silent = self._age()
         if self._error and silent > _SILENT:
             raise self._error
         if silent > self._silent and not self.ended:
             self._silent = 2 * silent
             yield self._event("silent", f"nothing was written for {silent:.0f} s")
+
+    @property
+    def reads_what_is_new(self) -> bool:
+        """Whether the next look reads what is new alone."""
+        return self._looks.grow
 
     def state(self) -> Event:
         """Tell how it stands, with the time since which it flies, if it does."""
@@ -186,13 +214,17 @@ class Watch:
     def _read(self, names: Sequence[str], *, replaced: bool) -> Iterator[Event]:
         if not names:
             return
-        history = Reference.of(in_deck(open_run(names, self._selection), self._inventory), self._selection).history
-        if not history.time.size:
+        states, follows = self._looks.new_states(names)
+        if states is None or not states.time.size:
             return
-        if not history.momenta and (history.balance is None or history.balance.sliding is None):
+        if not states.momenta and (states.balance is None or states.balance.sliding is None):
             raise RangeError(f"{', '.join(names)}: {_WRITTEN}")
-        motion = InnerMotion(history, self._wait, self._of_deck)
-        events, told, now = events_of(history, motion), self._told, float(history.time[-1])
+        if not follows:
+            self._begin_again()
+        self._evidence.take(states)
+        self._motion.take(states, self._evidence)
+        history, motion = self._evidence.history, self._motion
+        events, told, now = events_of(self._evidence, motion, self._decided), self._told, float(history.time[-1])
         if self._now == float("-inf"):
             yield Event("begun", float(history.time[0]), now, f"the run has come to {now:.6g}")
         elif replaced or now < self._now:
@@ -201,7 +233,10 @@ class Watch:
         self._now, self._told = now, events
         self._undecided = self._wait is None and motion.longest(now) is None
         yield from events[len(told) :]
-        self.ended = _PACKED if names[-1].endswith(".gz") else ending(names[-1])
+
+    def _end(self, name: str) -> Iterator[Event]:
+        """Tell that the run has ended, once, where the listing beside its last file says so."""
+        self.ended = _PACKED if name.endswith(".gz") else ending(name)
         if self.ended:
             yield self._event("failed" if self.ended == WITH_AN_ERROR else "ended", f"the run has ended {self.ended}")
 
@@ -232,6 +267,7 @@ def follow(
         begun = time.process_time()
         yield from watch.news()
         pause = max(_SHORTEST, (time.process_time() - begun) / _SHARE)
+        pause = min(pause, _LONGEST) if watch.reads_what_is_new else pause  # the first look costs more than others
         left = end - time.monotonic()
         if left <= 0 or (watch.ended and lasting is None):
             yield watch.state()

@@ -71,7 +71,8 @@ def test_every_solver_prints_what_it_is_given(solver: str) -> None:
     card = cards(windows, ALL, solver, ["a\nremark"])
     assert card.windows == tuple(windows)
     assert " a\\nremark\n" in card.text
-    assert card.notes == ()
+    assert all("cycles at least" in note for note in card.notes)
+    assert len(card.notes) == (solver == "radioss-sensors")  # one step for the whole run
     assert all(content in card.text for content in card.files.values())
     assert hasattr(ALL, SOLVERS[solver].switches)
     assert all(hasattr(ALL, name) for name in SOLVERS[solver].takes)
@@ -98,17 +99,15 @@ def test_a_file_of_windows() -> None:
 
 
 def test_windows_are_read_from_the_journal_of_a_driven_run() -> None:
-    """A rigid leg that was ended from outside goes on from its last restart; a probe alone is no window."""
-    legs = [("load", 0.0, 0.06, 0.06, False), ("probe", 0.06, 0.2, 0.15, False), ("rigid", 0.06, 0.145, 0.1, True),
-            ("rigid", 0.09, 0.145, 0.1449, False), ("load", 0.145, 0.9, 0.16, False), ("probe", 0.16, 0.9, 0.17, False),
-            ("load", 0.16, 0.9, 0.2, False), ("probe", 0.2, 0.9, 0.32, False),
-            ("rigid", 0.29, 0.3, 0.2998, False)]  # fmt: skip
-    lines = [
-        json.dumps({"event": "ended", "order": [kind, 2, start, until, 0.0, None], "seen": [seen, None], "cut": cut})
-        for kind, start, until, seen, cut in legs
-    ]
+    """A leg takes the place of those of its number: of a probe that went too far, or of a flight that was left out."""
+    legs = [("load", 1, 0.0, 0.06), ("probe", 2, 0.06, 0.1), ("probe", 3, 0.1, 0.2), ("rigid", 3, 0.1, 0.145),
+            ("load", 4, 0.145, 0.16), ("probe", 5, 0.16, 0.17), ("load", 5, 0.16, 0.2), ("probe", 6, 0.2, 0.3),
+            ("probe", 7, 0.3, 0.32), ("load", 7, 0.3, 0.4), ("load", 8, 0.4, 0.5)]  # fmt: skip
+    lines = [json.dumps({"event": "ended", "order": [*leg, 0.0], "seen": []}) for leg in legs]
     text = "\n".join(['{"event": "prepared"}', *lines, lines[-1][:40]])
     assert read_windows(text, "drive.ndjson") == ((0.06, 0.145), (0.2, 0.3))
+    back = "\n".join([*lines, '{"event": "back", "legs": 5}'])  # to before the second flight
+    assert read_windows(back, "drive.ndjson") == ((0.06, 0.145),)
     with pytest.raises(DeckError, match="no window was found"):
         read_windows('{"event": "prepared"}\n', "drive.ndjson")
 

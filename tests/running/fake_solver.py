@@ -1,8 +1,9 @@
 """A solver for tests: a box that is pushed, flies, lands and flies again, one state of its history after the other.
 
-``python fake_solver.py starter|engine DECK`` in the folder of a run.  The engine obeys its control file, writes
-restarts, and goes on from them; what it prints is what OpenRadioss prints there.  D2RPICK_FAKE names what goes wrong:
-``fail`` ends leg 2 with an error, ``slow`` has no state of it before it is told to stop.
+``python fake_solver.py starter|engine DECK`` in the folder of a run.  The engine goes on from the restart of the leg
+before and writes its own; what it prints is what OpenRadioss prints there.  D2RPICK_FAKE names what goes wrong:
+``fail`` ends leg 2 with an error, ``hang`` lets leg 2 sleep, ``slow`` takes its time for each state, and ``empty`` and
+``cut`` leave no whole restart of leg 3 once, as a disk does that is full; that of ``damaged`` only looks whole.
 """
 
 import math
@@ -17,7 +18,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from tests.made_t01 import MadePart, headed
 
 PUSHES = ((0.0, 0.03), (0.17, 0.19))  # of the box; it reaches the ground a little later while it is rigid
-LATER, STEP, PACE = 0.002, 1e-3, 0.016
+LATER, STEP, PACE = 0.002, 1e-3, 0.02
+SIZE = 400  # bytes of a restart
 MASS = 10.0
 CODES = (1, 2, 3, 4, 5, 6)
 
@@ -37,62 +39,53 @@ def state(now: float, *, rigid: bool) -> tuple[list[float], list[float]]:
     return [*part, STEP], [9e9, 0.0, 0.0, 0.0, 0.0, 0.0] if rigid else part
 
 
+def restart(name: str, number: int, content: str = "") -> Path:
+    """Name the restart of a leg, and write it, if it has a content."""
+    path = Path(f"{name}_{number:04d}_0001.rst")
+    if content:
+        path.write_text(f"{path.name} {content}".ljust(SIZE))
+    return path
+
+
 def engine(deck: Path) -> None:
-    """Compute a leg from the restart that its deck names."""
-    text = deck.read_text()
-    head = re.search(r"/RUN/(\w+)/(\d+)(?:/(\w))?\n\s*(\S+)", text)
+    """Compute a leg from the restart of the leg before."""
+    text, wrong = deck.read_text(), os.environ.get("D2RPICK_FAKE", "")
+    head = re.search(r"/RUN/(\w+)/(\d+)\n\s*(\S+)", text)
     assert head
-    name, number, letter, end = head[1], int(head[2]), head[3], float(head[4])
-    many, every = map(int, re.findall(r"/RFILE/(\d+)\n(\d+)", text)[0])
-    before = Path(f"{name}_{number - 1:04d}_0001{f'_{letter}' if letter else ''}.rst")
-    begins, *held = before.read_text().split()
-    start, stop, step = float(begins), end, 0
+    name, number, end = head[1], int(head[2]), float(head[3])
+    own_name, begins, *held = restart(name, number - 1).read_text().split()
+    assert own_name == restart(name, number - 1).name
     assert not (held and "/RBODY/ON" in text), "OpenRadioss adds to the energy of what is rigid already"
     rigid = "/RBODY/ON" in text or bool(held and "/RBODY/OFF" not in text)
     history, listing = Path(f"{name}T{number:02d}"), Path(f"{name}_{number:04d}.out")
     listing.write_text(" started\n")
+    step = int(begins)
     made = headed([MadePart(1, "strip of shells", CODES)], globals_=len(CODES) + 1)
-    killed, normal, last = False, True, start
-    if number == 2 and os.environ.get("D2RPICK_FAKE") == "slow":
-        while not Path(f"{name}_{number:04d}.ctl").exists():
-            time.sleep(PACE)
-        stop = start
+    if wrong == "hang" and number == 2:
+        time.sleep(1000)
+    cycles = 0
     with history.open("wb") as stream:
-        while True:
-            now = start + (step + (start > 0)) * STEP  # a restart does not repeat a state
-            if now > stop + 1e-9 or killed:
-                break
-            last = now
-            made.state(now, *state(now, rigid=rigid))
+        while step * STEP <= end + 1e-9:
+            made.state(step * STEP, *state(step * STEP, rigid=rigid))
             stream.write(made.data)
             stream.flush()
             made.data.clear()
-            time.sleep(PACE)
-            step += 1
-            control = Path(f"{name}_{number:04d}.ctl")
-            if control.exists():
-                told = control.read_text()
-                control.write_text("CURRENT STATE")
-                killed = "/KILL" in told
-                asked = re.search(r"/TIME/(\S+)", told)
-                stop = (float(asked[1]) if asked else now) if "/STOP" in told else stop
-            if step % every == 0:
-                letter = chr(ord("I") + (step // every - 1) % many)
-                Path(f"{name}_{number:04d}_0001_{letter}.rst").write_text(f"{now!r}{' rigid' * rigid}")
-            if number == 2 and step == 5 and os.environ.get("D2RPICK_FAKE") == "fail":
-                normal = False
-                break
-    if not normal:
-        listing.write_text(" ** ERROR: NEGATIVE VOLUME\n")
-        print(" ** ERROR: NEGATIVE VOLUME IN ELEMENT 7", flush=True)
-        sys.exit(2)
-    if not killed:
-        reached = max(last, min(now, stop))
-        letter = chr(ord("I") + (step // every) % many)
-        Path(f"{name}_{number:04d}_0001_{letter}.rst").write_text(f"{reached!r}{' rigid' * rigid}")
+            step, cycles = step + 1, cycles + 1
+            if wrong == "slow":
+                time.sleep(PACE)
+            if wrong == "fail" and number == 2 and cycles == 5:
+                listing.write_text(" ** ERROR: NEGATIVE VOLUME\n")
+                print(" ** ERROR: NEGATIVE VOLUME IN ELEMENT 7", flush=True)
+                sys.exit(2)
+    left = restart(name, number, f"{step}{' rigid' * rigid}")
+    if wrong in ("empty", "cut", "damaged") and number == 3 and not Path("full.once").exists():
+        content = left.read_bytes()
+        kept = {"empty": 0, "cut": SIZE // 2}.get(wrong, len(left.name) + 1)
+        left.write_bytes(content[:kept] + b"?" * (SIZE - kept) * (wrong == "damaged"))
+        Path("full.once").touch()
     listing.write_text(
         "  ** CUMULATIVE CPU TIME SUMMARY **\n ELEMENT FORCES..............: .8E+00 80 %\n"
-        f" TOTAL.......................: .1E+01 100 %\n     NORMAL TERMINATION\n TOTAL NUMBER OF CYCLES  : {step}\n"
+        f" TOTAL.......................: .1E+01 100 %\n     NORMAL TERMINATION\n TOTAL NUMBER OF CYCLES  : {cycles}\n"
     )
 
 
@@ -101,5 +94,5 @@ if __name__ == "__main__":
     if kind == "engine":
         engine(main)
     else:
-        Path(f"{main.stem}_0001.rst").write_text("0.0")
+        restart(main.stem.removesuffix("_0000"), 0, "0")
         Path(f"{main.stem}.out").write_text("     NORMAL TERMINATION\n     0 ERROR(S)\n")

@@ -39,6 +39,7 @@ def test_legs_end_by_sensors_of_flight_and_of_contact(tmp_path: Path) -> None:
     assert found.wait == pytest.approx(PERIOD / 2, rel=1e-2)
     assert "springs" in found.reason
     assert not any("stays active" in note for note in found.notes)  # it goes off: runs computed with OpenRadioss
+    assert any("a momentum of 511 after it, for 365" in note for note in found.notes)
     starter = Path(found.files[0]).read_text()
     kinds = re.findall(r"/SENSOR/(\w+)/(\d+)", starter)
     assert kinds == [("INTER", "1"), ("RWALL", "2"), ("OR", "3"), ("NOT", "4"), ("TIME", "5"), ("AND", "6")]
@@ -123,3 +124,42 @@ def test_ls_dyna_gets_a_pair_of_switches_with_contact_codes(tmp_path: Path) -> N
 def test_a_contact_that_triggers_nothing_is_refused(tmp_path: Path, contact: str) -> None:
     with pytest.raises(d2.DeckError, match="0 contacts between surfaces"):
         d2.first(dyna(tmp_path / "ref", contact), tmp_path / "next", parts=1, wait=0.02)
+
+
+SHELL = "*SECTION_SHELL\n         1         2\n     0.002     0.002     0.002     0.002\n"
+CURVE = "".join(f"{time:20.1f}{1.0:20.1f}\n" for time in (0.0, 10.0))
+FALLS = f"*LOAD_BODY_Z\n         1       9.81\n*DEFINE_CURVE\n         1\n{CURVE}"
+
+
+def offsets(files: tuple[str, ...]) -> list[str]:
+    text = Path(files[1]).read_text().splitlines()
+    return [text[at + 1].split()[-1] for at, line in enumerate(text) if line.startswith("$#    nrbf")]
+
+
+def test_ls_dyna_switches_back_before_the_contact_where_its_keyword_has_an_offset(tmp_path: Path) -> None:
+    deck = Path(dyna(tmp_path / "ref"))
+    deck.write_text(deck.read_text().replace("*NODE", f"{SHELL}*NODE"))
+    found = d2.first(deck, tmp_path / "next", parts="1-3", wait=0.02)
+    assert offsets(found.files) == ["0.0", "0.004"]
+    other = Path(dyna(tmp_path / "other", "SURFACE_TO_SURFACE_ID"))
+    found = d2.first(other, tmp_path / "without", parts="1-3", wait=0.02)
+    assert offsets(found.files) == ["0.0", "0.0"]
+    assert any("deformable in the contact" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("more", ["*LOAD_NODE_POINT\n", "*AIRBAG_SIMPLE_AIRBAG_MODEL\n", "*LOAD_SEGMENT\n"])
+def test_loads_of_ls_dyna_that_push_without_a_contact_are_refused(tmp_path: Path, more: str) -> None:
+    deck = Path(dyna(tmp_path / "ref"))
+    deck.write_text(deck.read_text().replace("*END", f"{FALLS}{more}{9 * f'{1:10d}'}\n*END"))
+    with pytest.raises(d2.DeckError, match="pushes without a contact"):
+        d2.first(deck, tmp_path / "next", parts=1, wait=0.02)
+
+
+@pytest.mark.parametrize("thrown", [True, False])
+def test_what_falls_from_rest_is_rigid_from_the_start_in_ls_dyna_too(tmp_path: Path, thrown: bool) -> None:
+    deck = Path(dyna(tmp_path / "ref"))
+    velocity = "*INITIAL_VELOCITY_GENERATION\n         1         2\n" * thrown
+    deck.write_text(deck.read_text().replace("*END", f"{FALLS}{velocity}*END"))
+    notes = d2.first(deck, tmp_path / "next", parts="1-3", wait=0.02).notes
+    assert any("give the time of the last push" in note for note in notes) is thrown
+    assert any("At rest in free fall" in note for note in notes) is not thrown

@@ -6,10 +6,10 @@ import numpy as np
 from hypothesis import given, settings, strategies as st
 
 from d2rpick.histories.history import EXACT, Balance, History, Momenta
-from d2rpick.running.inner_motion import InnerMotion
 from d2rpick.running.watch import events_of
 from tests.energies import sure
 from tests.records import table, until
+from tests.running.seen import seen_in
 
 # Pushes [s] of half a sine, and the period of what swings inside from the first on [s].
 PUSHES = ((0.1, 0.13), (0.17, 0.2), (0.62, 0.66))
@@ -35,12 +35,12 @@ def made(gravity: float = 9.81) -> History:
 
 
 def told(history: History, wait: float | None = None) -> list[tuple[str, float | None, float | None]]:
-    return [one[:3] for one in events_of(history, InnerMotion(history, wait))]
+    return [one[:3] for one in events_of(*seen_in(history, wait))]
 
 
 def test_a_gap_between_two_pushes_is_no_flight() -> None:
     """It lasts for 40 ms, half of the period for 60."""
-    found = events_of(made(), InnerMotion(made()))
+    found = events_of(*seen_in(made()))
     events = [one.event for one in found if one.event in ("flight", "contact")]
     assert events == ["flight", "contact", "flight", "contact", "flight"]
     first, last, _ = [one for one in found if one.event == "flight"]
@@ -62,12 +62,12 @@ def test_the_events_of_a_run_so_far_are_the_first_of_all(state: int, wait: float
 @given(st.integers(0, int(END / STEP) - 1))
 def test_a_switch_is_advised_where_the_energy_is_high_and_nothing_acts(state: int) -> None:
     history = until(made(), float(made().time[state])) if state > 20 else made()
-    for one in events_of(history, InnerMotion(history)):
+    for one in events_of(*seen_in(history)):
         if one.event == "switch" and one.tr is not None and one.tr > PUSHES[1][1]:
             assert not any(start <= one.tr <= end for start, end in PUSHES)
             assert history.energy_at(one.tr) >= 0.7 * 50
 
 
 def test_a_constant_force_that_is_not_gravity_is_no_flight() -> None:
-    found = events_of(made(5.0), InnerMotion(made(5.0), 0.06))
+    found = events_of(*seen_in(made(5.0), 0.06))
     assert "flight" not in {one.event for one in found}

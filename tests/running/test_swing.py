@@ -5,14 +5,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from d2rpick.deck import read_inventory
 from d2rpick.flight.flight import Flight
 from d2rpick.flight.position_error import Drift, drift_in_flight
 from d2rpick.histories.history import EXACT, History, Momenta
 from d2rpick.histories.names import Part
-from d2rpick.running.drive import Looks
-from d2rpick.running.inner_motion import swing_in
-from d2rpick.running.sequence import Window
+from d2rpick.running.swing import swing_in
 from tests.command import ENERGY, ROOT, run
 from tests.energies import sure
 from tests.reading import read_history, solved
@@ -61,14 +58,6 @@ def test_of_two_parts_the_most_that_the_heavy_one_may_be_off_is_told(swings: flo
 def test_nothing_is_said_where_no_momenta_of_parts_tell() -> None:
     history = read_history([ENERGY])
     assert swing_in(history, 0.01, 0.03) is None
-
-
-def test_it_is_said_before_the_switch_where_the_flight_is_too_short_for_it() -> None:
-    parts = [part.id for part in solved("carT01.gz").run.parts]
-    looks = Looks(parts, read_inventory(str(ROOT / "sample_data" / "flying_box" / "BOX_0000.rad")))
-    short, long = (looks.swing([CAR], Window(FREE, 0.0676, td, None, 0.024)) for td in (0.12, 0.25))
-    assert short.startswith("tr = 0.0676: engine still swings against the others")
-    assert not long
 
 
 def test_an_advised_switch_says_it() -> None:

@@ -1,0 +1,86 @@
+"""What a first run needs to switch itself, looked at before anything is computed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from d2rpick.base.errors import DeckError, RangeError, name_units
+from d2rpick.deck.model import DISCRETE
+from d2rpick.deck.pieces import supports_of
+from d2rpick.deck.radioss_deck import number_of
+from d2rpick.deck.radioss_run import read_run
+from d2rpick.deck.radioss_sensors import WITHOUT_FORCE
+from d2rpick.flight.window import FEWEST
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator
+
+    from d2rpick.deck.model import Inventory
+    from d2rpick.deck.radioss_deck import Starter
+    from d2rpick.running.sequence import Limits
+
+
+NO_CONTACT: Final = "no contact and no rigid wall, so nothing would end a flight"
+
+
+def refuse_held(path: str, inventory: Inventory, parts: Collection[int]) -> None:
+    """Raise DeckError where a support holds the parts: its force is none of a contact."""
+    if unknown := sorted(set(parts) - inventory.nodes_by_part.keys()):
+        raise DeckError(f"{path}: {name_units(unknown)}: no elements in the deck; name others")
+    held = supports_of(inventory)[0]
+    for part in sorted(held.keys() & set(parts)):
+        raise DeckError(f"{path}: part {part} is held by {held[part][0].name}: it does not fly; leave it out")
+
+
+def contacts_of(starter: Starter) -> Iterator[tuple[str, int]]:
+    """Kind of sensor and id of each contact and rigid wall."""
+    for card in starter.named("INTER"):
+        if card.words[1:] and card.words[1] not in WITHOUT_FORCE:
+            yield "INTER", next(number for at in (2, 3) if (number := number_of(card, at)) or at == 3)
+    for card in starter.named("RWALL"):
+        yield "RWALL", number_of(card, -1)
+
+
+def check_driven(path: str, inventory: Inventory, parts: Collection[int], limits: Limits, wait: float | None) -> None:
+    """Look whether a Radioss run can be driven.
+
+    Raises
+    ------
+    DeckError
+        If a support holds the parts, nothing is there to end a flight, or the history has not all parts.
+    RangeError
+        If no flight can last for the ``wait``, or keep the margin of the ``limits``, in the run.
+    """
+    refuse_held(path, inventory, parts)
+    starter = read_run(path).starter
+    if starter is None or not any(contacts_of(starter)):
+        raise DeckError(f"{path}: {NO_CONTACT}")
+    _check_history(path, starter, {part for part in parts if not {*inventory.counts[part]} <= DISCRETE})
+    least = FEWEST * limits.interval
+    if wait is not None and not least <= wait < limits.end / 2:
+        raise RangeError(
+            f"{path}: `wait` {wait:g}: a time from {least:g}, {FEWEST} states of the history, to {limits.end / 2:g},"
+            " half of the run, was expected"
+        )
+    if limits.margin is not None and not limits.margin < limits.end / 2:
+        raise RangeError(
+            f"{path}: `margin` {limits.margin:g}: less than {limits.end / 2:g}, half of the run, was expected"
+        )
+
+
+def _check_history(path: str, starter: Starter, parts: Collection[int]) -> None:
+    """Raise DeckError where the time history has not the energies and momenta of all ``parts``."""
+    cards = [card for card in starter.named("TH") if card.words[1:2] == ("PART",)]
+    written: set[int] = set()
+    for card in cards:
+        texts = [row.text.split() for row in card.rows[1:] if not row.text.startswith("#")]
+        variables = {word for words in texts for word in words if not word.isdigit()}
+        ids = {int(word) for words in texts for word in words if word.isdigit()}
+        if variables & {"DEF", "XMOM"}:
+            written |= ids or {*parts}
+    if missing := sorted({*parts} - written):
+        where = cards[0].at if cards else path
+        raise DeckError(
+            f"{where}: no momenta of {name_units(missing)} in the time history; /TH/PART with DEF and MASS of all parts"
+            " that are switched was expected"
+        )
