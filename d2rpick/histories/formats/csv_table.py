@@ -157,8 +157,11 @@ class Table(Database):
         self.source, self._text = text.name, text
         layout = find_layout(text)
         self._begin = text.place(layout.start)
-        self._layout = layout = with_thousands(layout, _sampled_rows(text, self._begin, layout))
-        self._numeric = numeric_columns(layout, self._sample())
+        sample = _sampled_rows(text, self._begin, layout)
+        self._layout = layout = with_thousands(layout, sample)
+        # cells, with decimal points, of rows at the start, at the end and evenly between
+        self._sample = [[layout.plain(cell) for cell in row] for row in sample]
+        self._numeric = numeric_columns(layout, self._sample)
         self._own_times = own_times(layout)
         self._time, notes = time_column(text.name, layout, selection.time, selection.energy, self._numeric)
         self._columns = labelled(layout, self._time)
@@ -170,7 +173,7 @@ class Table(Database):
         self._read: dict[int, Samples] = {}
         self._together = True  # until a line shows otherwise
         if not is_skipped(text.unended):
-            self.complete = _is_whole(text.unended, self._sample(), layout, self._needed)
+            self.complete = _is_whole(text.unended, self._sample, layout, self._needed)
             if self.complete:
                 text.take_rest()
             else:
@@ -192,7 +195,7 @@ class Table(Database):
             if column in self._numeric:
                 channels.append(name)
                 continue
-            words = [row[column] for row in self._sample() if row[column]]
+            words = [row[column] for row in self._sample if row[column]]
             if words:
                 notes.append(f"column {column + 1} {name!r} holds no numbers ({words[0]!r}) and was left out")
         return tuple(channels), notes
@@ -230,7 +233,7 @@ class Table(Database):
         for column in self._needed[1:]:
             energy = if_written(partial(self._values, column))
             if energy is not None and energy.size == times.size:
-                rows = self._sample()[: self._text.some]
+                rows = self._sample[: self._text.some]
                 others = {name: [row[place] for row in rows] for name, place in self._columns.items()}
                 refuse_rows_of_parts(self.source, times, energy, others)
 
@@ -257,7 +260,7 @@ class Table(Database):
     def _printed(self) -> list[list[str]]:
         """Sampled rows that show how numbers were printed."""
         # not behind a curve's end, and no words below a table
-        return [row for row in self._sample() if as_number(row[self._time], ".") is not None]
+        return [row for row in self._sample if as_number(row[self._time], ".") is not None]
 
     def _asked(self, selection: Selection) -> list[int]:
         """Columns that must be whole in a last line without end: those asked for, or what is taken by default."""
@@ -268,11 +271,6 @@ class Table(Database):
                 raise
             return [self._time, *self._columns.values()]
         return [self._time, *(self._columns[name] for name in names)]
-
-    def _sample(self) -> list[list[str]]:
-        """Cells, with decimal points, of rows at the start, at the end and evenly between."""
-        rows = _sampled_rows(self._text, self._begin, self._layout)
-        return [[self._layout.plain(cell) for cell in row] for row in rows]
 
     def _values(self, column: int) -> Samples:
         if column in self._failed:
