@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from d2rpick.api import arguments
-from d2rpick.api.deck_in_folder import naming, with_deck_in_folder
+from d2rpick.api.deck_in_folder import find_deck_in_folder, name_deck
 from d2rpick.api.request import Request
 from d2rpick.base.errors import ArgumentError, Caution, FormatError, listing, name_units
 from d2rpick.base.tuples import NamedTuple
@@ -82,7 +82,7 @@ def request_of(
         channel=tuple(f"{quantity}={name}" for quantity, name in chosen.channels),
         **arguments.chosen(choosing),
     )
-    return with_deck_in_folder(request)
+    return find_deck_in_folder(request)
 
 
 def open_run(request: Request, names: Sequence[str] = ()) -> Run:
@@ -142,7 +142,7 @@ def ask(run: Run, request: Request, *, card_alone: bool = False, merge: int | No
         from d2rpick.choice.deck_of_run import with_deck
 
         settings, cautions = with_deck(settings, reference, model)
-        cautions = (*naming(request), *cautions)
+        cautions = (*name_deck(request), *cautions)
     asked = Asked(run, request, reference, selection, settings, model, parts, cautions, of_this_run=not foreign)
     return asked if merge is None else _merged(asked, merge)
 

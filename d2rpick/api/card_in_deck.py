@@ -16,15 +16,15 @@ OBJECTION: Final = "card-objection"
 UNJOINED: Final = "parts-not-joined"
 
 
-def objections(card: PrintedCard, asked: Asked, parts: int) -> Iterator[Caution]:
+def collect_objections(card: PrintedCard, asked: Asked, parts: int) -> Iterator[Caution]:
     """Say what ``check`` has against a deck with the card in it; without a deck, what nobody knows of its parts.
 
     ``parts`` is how many the card switches by their ids.
     """
     if asked.deck is None:
         if parts > 1:
-            told = "no deck of the run was read, so nobody knows whether these parts share nodes"
-            yield Caution(UNJOINED, f"{told}; name the main deck with `deck`, or merge the parts with `merge`")
+            message = "no deck of the run was read, so nobody knows whether these parts share nodes"
+            yield Caution(UNJOINED, f"{message}; name the main deck with `deck`, or merge the parts with `merge`")
         return
     from tempfile import TemporaryDirectory
 
@@ -38,8 +38,8 @@ def objections(card: PrintedCard, asked: Asked, parts: int) -> Iterator[Caution]
         except DeckError as error:
             yield Caution(OBJECTION, f"the card does not go into the deck: {error}")
             return
-        for one in checked.findings:
-            if one.severity is not INFO:
-                place = one.file.removeprefix(f"{folder}/")
-                told = f"{one.rule} ({one.severity}): {one.message.replace(f'{folder}/', '')}"
-                yield Caution(OBJECTION, f"check of the deck with this card, {place}:{one.line}: {told}")
+        for finding in checked.findings:
+            if finding.severity is not INFO:
+                place = finding.file.removeprefix(f"{folder}/")
+                message = f"{finding.rule} ({finding.severity}): {finding.message.replace(f'{folder}/', '')}"
+                yield Caution(OBJECTION, f"check of the deck with this card, {place}:{finding.line}: {message}")

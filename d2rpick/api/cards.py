@@ -168,9 +168,9 @@ class Cards:
         deck, parts = asked.deck, [part.id for part in asked.reference.history.parts or ()]
         if deck is None:
             return self, ()
-        from d2rpick.deck.suiting import suiting
+        from d2rpick.deck.suiting import find_suiting
 
-        found = suiting(deck, parts)
+        found = find_suiting(deck, parts)
         cards = replace(self, solver=self.solver or found.solver)
         if found.solver == "ls-dyna" and str(cards.solver).startswith("ls-dyna"):
             cards = replace(
@@ -262,7 +262,7 @@ def judged(
     ArgumentError
         If nobody says whom it switches, or an option belongs to another solver.
     """
-    from d2rpick.api.card_in_deck import objections
+    from d2rpick.api.card_in_deck import collect_objections
     from d2rpick.choice.answers import verify_of
     from d2rpick.choice.judged_card import judged_card
     from d2rpick.deck.printing import SOLVERS
@@ -277,7 +277,7 @@ def judged(
     card, verdicts = found
     card = replace(card, notes=(*notes, *card.notes))
     apart = 0 if printing.merge or SOLVERS[solver].switches != "part" else len(printing.part)
-    return JudgedCard(card, verdicts, tuple(objections(card, asked, apart)))
+    return JudgedCard(card, verdicts, tuple(collect_objections(card, asked, apart)))
 
 
 def all_cautions(card: JudgedCard) -> tuple[Caution, ...]:

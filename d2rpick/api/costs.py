@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Unpack
 from d2rpick.api import arguments
 from d2rpick.api.answer import Answer, Paged, frame_of, written
 from d2rpick.api.asked import model_of, request_of
-from d2rpick.api.deck_in_folder import naming
+from d2rpick.api.deck_in_folder import name_deck
 from d2rpick.base.errors import ArgumentError
 from d2rpick.choice import calibration, sets_of_parts
 from d2rpick.choice.cost import Weights, weights_as_toml
@@ -124,7 +124,7 @@ def tabled(run: Run, request: Request, tr: float | None, td: float | None) -> Pa
     found = sets_of_parts.parts_of(run.files, request.settings, model, given=ids, times=times, beside=beside)
     window = [text for name, time in (("tr", tr), ("td", td)) if time is not None for text in (f"--{name}", repr(time))]
     command = ("parts", *window, *request.asking(), *positional(request.history))
-    return PartTable.of(found, run=run, command=command, cautions=naming(request))
+    return PartTable.of(found, run=run, command=command, cautions=name_deck(request))
 
 
 def check_times(tr: float | None, td: float | None) -> Times | float | None:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 FOUND: Final = "deck-in-folder"
 
 
-def with_deck_in_folder(request: Request) -> Request:
+def find_deck_in_folder(request: Request) -> Request:
     """Take the main deck in the folder of the run, unless a deck is named or none is wanted.
 
     Raises
@@ -24,9 +24,9 @@ def with_deck_in_folder(request: Request) -> Request:
     folder = request.folder
     if folder is None:
         return request
-    from d2rpick.deck import decks_of_run  # not above: most runs are files
+    from d2rpick.deck import find_decks_of_run  # not above: most runs are files
 
-    decks = decks_of_run(folder)
+    decks = find_decks_of_run(folder)
     if len(decks) > 1:
         raise ArgumentError(
             f"{folder}: {len(decks)} main decks ({listing(decks, most=5)}); name the deck of the run with `deck`,"
@@ -38,9 +38,9 @@ def with_deck_in_folder(request: Request) -> Request:
     return replace(request, deck=decks[0], deck_in_folder=True)
 
 
-def naming(request: Request) -> tuple[Caution, ...]:
+def name_deck(request: Request) -> tuple[Caution, ...]:
     """Name the deck that was found in the folder of the run."""
     if not request.deck_in_folder:
         return ()
-    told = f"{request.deck} is the main deck in the folder of the run and was read; `no_deck` does without it"
-    return (Caution(FOUND, told),)
+    message = f"{request.deck} is the main deck in the folder of the run and was read; `no_deck` does without it"
+    return (Caution(FOUND, message),)

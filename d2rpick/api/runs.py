@@ -106,9 +106,9 @@ class Run:
         """The only main deck in the folder that was read."""
         if self.folder is None:
             return None
-        from d2rpick.deck import decks_of_run
+        from d2rpick.deck import find_decks_of_run
 
-        decks = decks_of_run(self.folder)
+        decks = find_decks_of_run(self.folder)
         return decks[0] if len(decks) == 1 else None
 
     def to_frame(self, parts: Parts | None = None) -> pd.DataFrame:

@@ -51,10 +51,10 @@ class CardRequest(NamedTuple):
 
 def _pushed(printing: Printing, history: History) -> Printing:
     """Say when something pushes the parts, and how fast they come to it, as far as momenta of parts show it."""
-    from d2rpick.flight.contact_times import contact_times  # not above: other cards do without
+    from d2rpick.flight.contact_times import find_contact_times  # not above: other cards do without
 
     momenta = next((one for one in history.momenta if one.parts), None)
-    found = contact_times(momenta) if momenta else None
+    found = find_contact_times(momenta) if momenta else None
     return printing._replace(pushed=found.spans, speed=found.speed) if found else printing
 
 

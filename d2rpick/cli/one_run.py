@@ -47,12 +47,12 @@ def info(request: Request, output: Output) -> None:
     d2rpick info sample_data/energy.glstat
     d2rpick info -f json sample_data/rollover.csv
     """
-    from d2rpick.api.deck_in_folder import naming
+    from d2rpick.api.deck_in_folder import name_deck
 
     selection = request.selection()
     with opened(request, output) as (run, output):
         overview = replace(run, chosen=selection).overview(request.deck or False)
-    output.notes((), (*naming(request), *overview.cautions))
+    output.notes((), (*name_deck(request), *overview.cautions))
     form = output.output_format
     shown = output.shown()
     output.result(in_words(write("overview", form, overview, shown), form, shown.width))

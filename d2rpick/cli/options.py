@@ -162,9 +162,9 @@ def takes(
                     more = {"given": given & {*taken}} if table is Request else {}
                     values[table.__name__.lower()] = table(**{name: values.pop(name) for name in taken}, **more)
             if "no_deck" in names:
-                from d2rpick.api.deck_in_folder import with_deck_in_folder
+                from d2rpick.api.deck_in_folder import find_deck_in_folder
 
-                values["request"] = with_deck_in_folder(values["request"])
+                values["request"] = find_deck_in_folder(values["request"])
             return function(*args, **values)
 
         if "quiet" in names:

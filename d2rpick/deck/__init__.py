@@ -64,7 +64,7 @@ def main_decks(folder: str) -> list[str]:
     return found
 
 
-def decks_of_run(folder: str) -> list[str]:
+def find_decks_of_run(folder: str) -> list[str]:
     """Find the main decks that lie in the folder of a run and have parts.
 
     Restart decks and files of switching cards alone have none.  A run of Radioss is named by its starter deck.

@@ -11,7 +11,7 @@ import math
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base.errors import DeckError
-from d2rpick.deck.force_switching import ForceSwitch, force_windows
+from d2rpick.deck.force_switching import ForceSwitch, follow_pair
 from d2rpick.deck.radioss_sensors import either, inactive
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class Timing(NamedTuple):
     windows: Spans
 
 
-def pair_timing(windows: Sequence[Times], pushes: Pushes) -> Timing:
+def time_pair(windows: Sequence[Times], pushes: Pushes) -> Timing:
     """Time a pair of LS-DYNA: it becomes rigid without force, after the wait, and deformable shortly before a force.
 
     The OFFSET is how far the parts fly from the td of the first window to the contact after it.
@@ -56,23 +56,23 @@ def pair_timing(windows: Sequence[Times], pushes: Pushes) -> Timing:
     DeckError
         If no wait gives as many windows as are planned.
     """
-    after = [_after(td, pushes.spans) for _, td in windows]
-    leads = [start - td for (_, td), (start, _) in zip(windows, after, strict=True) if start < math.inf]
+    contacts_after = [_find_after(td, pushes.spans) for _, td in windows]
+    leads = [start - td for (_, td), (start, _) in zip(windows, contacts_after, strict=True) if start < math.inf]
     lead = min(leads, default=0.0) if pushes.speed else 0.0
-    seen = tuple((start - lead, end) for start, end in pushes.spans)
-    last = after[-1]
-    latest = windows[-1][1] if last[0] == math.inf else (last[0] + last[1]) / 2  # in the contact behind them
+    advanced = tuple((start - lead, end) for start, end in pushes.spans)
+    landing = contacts_after[-1]
+    latest = windows[-1][1] if landing[0] == math.inf else (landing[0] + landing[1]) / 2  # in the contact behind them
     rigid = ForceSwitch(True, False, windows[0][0], latest)
 
-    def windows_of(wait: float) -> Sequence[tuple[float, float | None]]:
-        return force_windows(rigid, ForceSwitch(False, True, delay=wait), seen, math.inf)
+    def follow(wait: float) -> Sequence[tuple[float, float | None]]:
+        return follow_pair(rigid, ForceSwitch(False, True, delay=wait), advanced, math.inf)
 
     waits = [tr - td for (_, td), (tr, _) in itertools.pairwise(windows)]
-    wait, found = _least_wait(waits, windows, windows_of, "pair of switch sets")
-    return Timing(windows[0][0], latest, wait, lead * (pushes.speed or 0.0), found)
+    wait, switched = _find_least_wait(waits, windows, follow, "pair of switch sets")
+    return Timing(windows[0][0], latest, wait, lead * (pushes.speed or 0.0), switched)
 
 
-def sensor_timing(windows: Sequence[Times], pushes: Pushes) -> Timing:
+def time_sensor(windows: Sequence[Times], pushes: Pushes) -> Timing:
     """Time a sensor of Radioss: parts are deformable while it is active, up to the wait after each force.
 
     Up to the first window, and from the last one on, they are deformable in any case.
@@ -82,46 +82,46 @@ def sensor_timing(windows: Sequence[Times], pushes: Pushes) -> Timing:
     DeckError
         If no wait gives as many windows as are planned.
     """
-    before = [_before(tr, pushes.spans) for tr, _ in windows]
+    contacts_before = [_find_before(tr, pushes.spans) for tr, _ in windows]
     first, last = windows[0][0], windows[-1][1]
 
-    def windows_of(wait: float) -> Sequence[tuple[float, float | None]]:
+    def follow(wait: float) -> Sequence[tuple[float, float | None]]:
         pushed = tuple((start, end + wait) for start, end in pushes.spans)
         active = either([pushed, ((0.0, first),) if first > 0 else (), ((last, math.inf),)])
         return inactive(active)
 
-    waits = [tr - end for (tr, _), (_, end) in zip(windows, before, strict=True) if end > -math.inf]
-    wait, found = _least_wait(waits, windows, windows_of, "sensor")
-    return Timing(first, last, wait, 0.0, found)
+    waits = [tr - end for (tr, _), (_, end) in zip(windows, contacts_before, strict=True) if end > -math.inf]
+    wait, switched = _find_least_wait(waits, windows, follow, "sensor")
+    return Timing(first, last, wait, 0.0, switched)
 
 
-def _least_wait(
+def _find_least_wait(
     waits: Sequence[float],
     windows: Sequence[Times],
-    windows_of: Callable[[float], Sequence[tuple[float, float | None]]],
+    follow: Callable[[float], Sequence[tuple[float, float | None]]],
     what: str,
 ) -> tuple[float, Spans]:
     """Give the least wait whose windows are as many as those planned, none of which begins before it is planned."""
-    found: list[Times] = []
+    switched: list[Times] = []
     for wait in sorted({0.0, *waits}):
-        found = [(tr, math.inf if td is None else td) for tr, td in windows_of(wait)]
-        if len(found) == len(windows) and found[-1][1] < math.inf:
-            early = (got < wanted * (1 - _ROUNDING) for (got, _), (wanted, _) in zip(found, windows, strict=True))
+        switched = [(tr, math.inf if td is None else td) for tr, td in follow(wait)]
+        if len(switched) == len(windows) and switched[-1][1] < math.inf:
+            early = (got < wanted * (1 - _ROUNDING) for (got, _), (wanted, _) in zip(switched, windows, strict=True))
             if not any(early):
-                return wait, tuple(found)
-    listed = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in found) or "none"
+                return wait, tuple(switched)
+    achieved = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in switched) or "none"
     planned = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in windows)
     raise DeckError(
-        f"no wait lets a {what} switch in the planned windows ({planned}): its windows would be {listed}; plan a window"
+        f"no wait lets a {what} switch in the planned windows ({planned}): its windows would be {achieved}; plan one"
         " for each flight, or switch by time"
     )
 
 
-def _after(time: float, spans: Sequence[Times]) -> Times:
+def _find_after(time: float, spans: Sequence[Times]) -> Times:
     """Give the first span that begins after a time; infinite without one."""
     return next((span for span in spans if span[0] >= time), (math.inf, math.inf))
 
 
-def _before(time: float, spans: Sequence[Times]) -> Times:
+def _find_before(time: float, spans: Sequence[Times]) -> Times:
     """Give the last span that ends before a time; minus infinite without one."""
     return next((span for span in reversed(spans) if span[1] <= time), (-math.inf, -math.inf))

@@ -26,14 +26,14 @@ class EngineFile(NamedTuple):
     cap: float | None
 
 
-def own_cap(tr: float, td: float) -> float:
+def choose_step_cap(tr: float, td: float) -> float:
     """Largest step while rigid [time]."""
     return float(f"{(td - tr) / _CAP_SHARE:.2g}")
 
 
 def legs(windows: Sequence[Times], end: float, step_cap: float | None) -> list[EngineFile]:
     """Give the engine runs that the windows ask for; a window from 0 on needs none before it."""
-    caps = [step_cap or own_cap(tr, td) for tr, td in windows]
+    caps = [step_cap or choose_step_cap(tr, td) for tr, td in windows]
     switches = zip(windows, caps, strict=True)
     stops = [(time, cap) for (tr, td), own in switches for time, cap in ((tr, None), (td, own)) if time > 0]
     if len(stops) >= _MOST_LEGS:

@@ -30,7 +30,7 @@ class ForceSwitch(NamedTuple):
     paired: bool = True
 
 
-def force_windows(
+def follow_pair(
     first: ForceSwitch, other: ForceSwitch | None, contacts: Spans, end: float
 ) -> list[tuple[float, float | None]]:
     """Give the windows in which a set and its pair make their parts rigid.
@@ -52,7 +52,7 @@ def force_windows(
     Examples
     --------
     >>> rigid, back = ForceSwitch(True, False, 0.02), ForceSwitch(False, True, delay=0.01)
-    >>> force_windows(rigid, back, [(0.0, 0.03), (0.05, 0.052), (0.054, 0.07)], 0.1)
+    >>> follow_pair(rigid, back, [(0.0, 0.03), (0.05, 0.052), (0.054, 0.07)], 0.1)
     [(0.03, 0.05), (0.07, None)]
     """
     windows: list[tuple[float, float | None]] = []
@@ -92,7 +92,7 @@ def _next(with_force: bool, since: float, contacts: Spans) -> float:
     return math.inf if with_force else since
 
 
-def delay_without_chatter(windows: Sequence[tuple[float, float]], contacts: Spans) -> float | None:
+def find_delay_without_chatter(windows: Sequence[tuple[float, float]], contacts: Spans) -> float | None:
     """Give the least TIME3 of the set that makes parts deformable for it to switch in these windows alone.
 
     Each contact after which a window begins has to be over before; None where no contact comes before any.

@@ -16,7 +16,7 @@ from d2rpick.deck.ls_dyna_parts import Parts, SectionCard, material_of, read_par
 from d2rpick.deck.mesh import Mesh, layout, lines_of
 from d2rpick.deck.model import Formulation, Inventory, Material, PartData, Section, placed
 from d2rpick.deck.reader import Deck, cuts, holds_mesh
-from d2rpick.deck.unswitchable import unswitchable_of_ls_dyna
+from d2rpick.deck.unswitchable import find_unswitchable_in_ls_dyna
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -236,7 +236,7 @@ def _codes(lines: Lines, fields: Layout) -> Integers:
 
 def _parts(deck: Deck, parts: Parts, mesh: Mesh) -> dict[int, PartData]:
     kinds, sections, materials = mesh.kinds, read_sections(deck), dict(_materials(deck, parts))
-    unswitchable = unswitchable_of_ls_dyna(deck, parts)
+    unswitchable = find_unswitchable_in_ls_dyna(deck, parts)
     found: dict[int, PartData] = {}
     for part, name in parts.materials.items():
         material = materials.get(name)

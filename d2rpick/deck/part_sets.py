@@ -14,19 +14,19 @@ _MOST_LISTED: Final = 10  # parts one by one
 _PER_LINE: Final = 8
 
 
-def numbered(groups: Iterable[Sequence[int]], first: int) -> dict[tuple[int, ...], int]:
+def number_sets(groups: Iterable[Sequence[int]], first: int) -> dict[tuple[int, ...], int]:
     """Number a set for each of the groups of parts that are too many to be listed."""
     many = dict.fromkeys(tuple(sorted(group)) for group in groups if len(group) > _MOST_LISTED)
     return {group: first + place for place, group in enumerate(many)}
 
 
-def named(parts: Sequence[int], part_sets: PartSets) -> list[tuple[int, str]]:
+def name_parts(parts: Sequence[int], part_sets: PartSets) -> list[tuple[int, str]]:
     """Name parts with their kind (PTYPE): by their set where there is one."""
     number = part_sets.get(tuple(sorted(parts)))
     return [(part, "PART") for part in parts] if number is None else [(number, "PSET")]
 
 
-def cards_of_set(parts: Sequence[int], number: int) -> Iterator[str]:
+def write_part_set(parts: Sequence[int], number: int) -> Iterator[str]:
     """Write the set of some parts."""
     yield f"$ Part set {number}: give it another id where the deck has one of that."
     yield from ("*SET_PART_LIST", "$#     sid", f"{number:10d}")

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.base import __version__
 from d2rpick.base.errors import DeckError
 from d2rpick.deck import printed_card
-from d2rpick.deck.engine_files import capped, engine_lines, legs, off, own_cap
-from d2rpick.deck.part_sets import PartSets, cards_of_set, numbered
+from d2rpick.deck.engine_files import capped, choose_step_cap, engine_lines, legs, off
+from d2rpick.deck.part_sets import PartSets, number_sets, write_part_set
 from d2rpick.deck.printed_card import LONGEST, PHYSICS, PrintedCard, Solver, check_ids, comments, shortest
-from d2rpick.deck.switch_sets import Waiting, groups_by_lead, header, to_deformable, to_rigid
+from d2rpick.deck.switch_sets import Waiting, group_by_lead, header, to_deformable, to_rigid
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -61,9 +61,9 @@ def _ls_dyna(windows: Sequence[Times], printing: Printing, remarks: Sequence[str
     spans = ", ".join(f"{tr} to {td}" for tr, td in texts)
     lines = [*comments([f"Rigid from {spans}; written by d2rpick {__version__}"]), *told]
     lines = [f"$ {line}" for line in lines]
-    part_sets = numbered((ids, *groups_by_lead(ids, printing).values()), printing.swset[0])
+    part_sets = number_sets((ids, *group_by_lead(ids, printing).values()), printing.swset[0])
     for members, number in part_sets.items():
-        lines += cards_of_set(members, number)
+        lines += write_part_set(members, number)
     for pair, numbers in zip(texts, sets, strict=True):
         lines += _window(pair, numbers, ids, printing, part_sets)
     text = "\n".join(lines) + "\n"
@@ -74,7 +74,7 @@ def _window(
     texts: tuple[str, str], sets: tuple[int, int], ids: Sequence[int], printing: Printing, part_sets: PartSets
 ) -> Iterator[str]:
     rigid, free = [*to_rigid(ids, printing, part_sets)], [*to_deformable(ids, part_sets)]  # with a comment each
-    cap = printing.step_cap or own_cap(*map(float, texts))
+    cap = printing.step_cap or choose_step_cap(*map(float, texts))
     deleted = [flag * _DELETE for flag in (printing.delete_nodal_bodies, printing.delete_node_sets)]
     activated = [flag * _ACTIVATE for flag in (printing.delete_nodal_bodies, printing.delete_node_sets)]
     yield from (*header(sets[0], texts[0], shortest(cap), (len(rigid) - 1, 0), constraints=deleted), *rigid)
@@ -91,16 +91,16 @@ def _ls_dyna_contact(windows: Sequence[Times], printing: Printing, remarks: Sequ
     DeckError
         As `_ls_dyna` does, and if no wait gives as many windows as are planned.
     """
-    from d2rpick.deck.contact_timing import pair_timing  # not above: other cards do without
+    from d2rpick.deck.contact_timing import time_pair  # not above: other cards do without
 
     windows, ids = printed_card.check_windows(windows), check_ids(printing.part)
     kind, number, pushes = _force_of(printing)
     free, forced = _CODES[kind]
-    timing = pair_timing(windows, pushes)
+    timing = time_pair(windows, pushes)
     first, second = printing.swset
-    part_sets = numbered((ids, *groups_by_lead(ids, printing).values()), first)
+    part_sets = number_sets((ids, *group_by_lead(ids, printing).values()), first)
     rigid, back = [*to_rigid(ids, printing, part_sets)], [*to_deformable(ids, part_sets)]
-    cap = printing.step_cap or min(own_cap(*times) for times in timing.windows)
+    cap = printing.step_cap or min(choose_step_cap(*times) for times in timing.windows)
     waits = Waiting(free, number, 0.0, second, 1, latest=timing.latest)
     returns = Waiting(forced, number, timing.wait, first, -1, offset=timing.offset)
     spans = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in timing.windows)
@@ -108,7 +108,7 @@ def _ls_dyna_contact(windows: Sequence[Times], printing: Printing, remarks: Sequ
     told += (*_warnings(ids, printing), *_BY_FORCE[:2], _OF_OFFSET, *comments(remarks))
     lines = [f"$ {line}" for line in told]
     for members, name in part_sets.items():
-        lines += cards_of_set(members, name)
+        lines += write_part_set(members, name)
     lines += (*header(first, shortest(timing.earliest), shortest(cap), (len(rigid) - 1, 0), waits), *rigid)
     lines += (*header(second, "0.0", "0.0", (0, len(back) - 1), returns), *back)
     text = "\n".join(lines) + "\n"
@@ -220,11 +220,11 @@ def _radioss_contact(windows: Sequence[Times], printing: Printing, remarks: Sequ
     DeckError
         As `_radioss` does, and if no wait gives as many windows as are planned.
     """
-    from d2rpick.deck.contact_timing import sensor_timing
+    from d2rpick.deck.contact_timing import time_sensor
 
     windows, _, _ = _of_run(windows, printing)
     kind, number, pushes = _force_of(printing)
-    timing = sensor_timing(windows, pushes)
+    timing = time_sensor(windows, pushes)
     row = f"{number:10d}{'NF':>10}{-1.0:20}{0.0:20}{0.0:20}"
     sensor = f"/SENSOR/{kind}/{{}}\nforce, or shortly after\n{shortest(timing.wait, 20):>20}\n{row}\n"
     spans = [(0.0, timing.earliest)] * (timing.earliest > 0) + [(timing.latest, math.inf)]

@@ -13,7 +13,7 @@ from d2rpick.base.caching import cached_property
 from d2rpick.base.graph import reached
 from d2rpick.deck.card import Card, Field, Row, Scope, Value
 from d2rpick.deck.expression import ExpressionError, number, real
-from d2rpick.deck.radioss_rigid import BODY, MADE_HERE, Body, Merge, RigidBodies, rigid_bodies
+from d2rpick.deck.radioss_rigid import BODY, MADE_HERE, Body, Merge, RigidBodies, make_rigid_bodies
 from d2rpick.deck.source import Block, SourceFile
 
 if TYPE_CHECKING:
@@ -243,7 +243,7 @@ class Starter:
     def rigid(self) -> RigidBodies:
         """Rigid bodies as the engine has them."""
         written = [*self._written_bodies(), *self._bodies_of_parts()]
-        return rigid_bodies(written, [*self._merges()], self._last_node)
+        return make_rigid_bodies(written, [*self._merges()], self._last_node)
 
     def _written_bodies(self) -> Iterator[Body]:
         for card in self.named("RBODY"):

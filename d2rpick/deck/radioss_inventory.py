@@ -17,9 +17,15 @@ from d2rpick.deck.mesh import KINDS, NOT_COUNTED, Mesh, elements_of, nodes_of
 from d2rpick.deck.model import Formulation, Inventory, Material, PartData, Section
 from d2rpick.deck.radioss_deck import SOLIDS, Starter, below_title, blocks, kept_off, keyword, number_of, reals, whole
 from d2rpick.deck.radioss_flaws import flaws_of
-from d2rpick.deck.radioss_run import Run, find_run_windows, left_rigid, parts_of_fixed_bodies, sensors_of_parts
+from d2rpick.deck.radioss_run import (
+    Run,
+    find_parts_of_fixed_bodies,
+    find_run_windows,
+    find_sensors_of_parts,
+    left_rigid,
+)
 from d2rpick.deck.reader import cuts, holds_mesh
-from d2rpick.deck.unswitchable import unswitchable_of_radioss
+from d2rpick.deck.unswitchable import find_unswitchable_in_radioss
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -68,7 +74,7 @@ def read(run: Run) -> Inventory:
     windows = find_run_windows(run).windows.windows if run.legs else ()
     joints = _joints(run, starter)
     switched = run.named if run.legs else {body.node.value for body in starter.bodies}  # all without an engine file
-    rigid = _always_rigid(windows) | parts_of_fixed_bodies(run)
+    rigid = _always_rigid(windows) | find_parts_of_fixed_bodies(run)
     return Inventory(
         "radioss", _parts(starter, mesh, rigid), mesh.elements, mesh.coordinates, notes,
         not notes, joints=model.placed(joints.found, mesh.table), switched=model.placed(joints.switched, mesh.table),
@@ -98,8 +104,8 @@ def _notes(run: Run, starter: Starter) -> Iterator[str]:
 
 def _parts(starter: Starter, mesh: Mesh, rigid: set[int]) -> Mapping[int, PartData]:
     materials, properties = dict(_materials(starter)), dict(_properties(starter))
-    kinds, unturned, unswitchable = mesh.kinds, starter.unturned, unswitchable_of_radioss(starter)
-    sensors = sensors_of_parts(starter)
+    kinds, unturned, unswitchable = mesh.kinds, starter.unturned, find_unswitchable_in_radioss(starter)
+    sensors = find_sensors_of_parts(starter)
     found: dict[int, PartData] = {}
     for part, line in starter.parts.items():
         section = _section(properties.get(line.prop), kinds.get(part, set()), turns=part not in unturned)

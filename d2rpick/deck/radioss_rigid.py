@@ -65,62 +65,62 @@ class RigidBodies(NamedTuple):
     groups: Mapping[int, Group]
 
 
-def rigid_bodies(written: Sequence[Body], merges: Sequence[Merge], last_node: Callable[[], int]) -> RigidBodies:
+def make_rigid_bodies(in_deck: Sequence[Body], merges: Sequence[Merge], last_node: Callable[[], int]) -> RigidBodies:
     """Give the bodies of a deck as the engine has them.
 
     Parameters
     ----------
-    written : sequence of Body
+    in_deck : sequence of Body
         As the deck has them, those that are made of parts last.
     merges : sequence of Merge
         All lines of /MERGE/RBODY.
     last_node : callable
         Gives the highest id of a node; asked only if a body has no main node.
     """
-    bodies = [*_with_main_nodes(written, last_node)]
+    bodies = [*_add_main_nodes(in_deck, last_node)]
     if not merges:
         return RigidBodies(tuple(bodies), {}, {})
-    named = {(OF_PART, body.part) if body.part else (BODY, body.id): body for body in bodies}
+    by_name = {(OF_PART, body.part) if body.part else (BODY, body.id): body for body in bodies}
     mains: dict[int, int] = {}
-    further: dict[int, list[Group]] = {}
+    further_groups: dict[int, list[Group]] = {}
     for merge in merges:
-        main, other = named.get((merge.main_kind, merge.main)), named.get((merge.kind, merge.other))
+        main, joined = by_name.get((merge.main_kind, merge.main)), by_name.get((merge.kind, merge.other))
         if main is None:
             continue
-        if other and other is not main:
-            mains[other.node.value] = main.node.value
+        if joined and joined is not main:
+            mains[joined.node.value] = main.node.value
         elif merge.kind in (NODE, GROUP):
             group = "GRNOD" if merge.kind == GROUP else "NODE"
-            further.setdefault(main.node.value, []).append((group, (merge.other,)))
+            further_groups.setdefault(main.node.value, []).append((group, (merge.other,)))
 
-    def top(node: int) -> int:
-        return reached([node], lambda one: [mains[one]] if one in mains else [])[-1]
+    def find_top(node: int) -> int:
+        return reached([node], lambda node_above: [mains[node_above]] if node_above in mains else [])[-1]
 
     members: dict[int, list[Group]] = {}
     for body in bodies:
-        own = [("GRNOD", (body.group,))] if body.group else []
-        members.setdefault(top(body.node.value), []).extend([*own, *further.get(body.node.value, ())])
+        own_group = [("GRNOD", (body.group,))] if body.group else []
+        members.setdefault(find_top(body.node.value), []).extend([*own_group, *further_groups.get(body.node.value, ())])
     groups: dict[int, Group] = {}
-    found: dict[int, Body] = {}
+    by_node: dict[int, Body] = {}
     for body in bodies:
         node = body.node.value
         if node not in mains:
-            found[node] = body._replace(group=_united(members[node], groups))
-    joined_to = {node: found[top(node)] for node in mains if top(node) in found}
-    return RigidBodies(tuple(found.values()), joined_to, groups)
+            by_node[node] = body._replace(group=_unite(members[node], groups))
+    joined_to = {node: by_node[find_top(node)] for node in mains if find_top(node) in by_node}
+    return RigidBodies(tuple(by_node.values()), joined_to, groups)
 
 
-def _with_main_nodes(written: Sequence[Body], last_node: Callable[[], int]) -> Iterator[Body]:
+def _add_main_nodes(in_deck: Sequence[Body], last_node: Callable[[], int]) -> Iterator[Body]:
     """Number the main nodes that the starter makes: above all nodes, by the ids of the bodies, those of parts last."""
-    lacking = sorted((body for body in written if not body.node.value), key=lambda body: (body.part, body.id))
+    lacking = sorted((body for body in in_deck if not body.node.value), key=lambda body: (body.part, body.id))
     first = last_node() + 1 if lacking else 0
     numbers = {body: number for number, body in enumerate(lacking, start=first)}
-    for body in written:
+    for body in in_deck:
         number = numbers.get(body)
         yield body if number is None else body._replace(node=replace(body.node, value=number))
 
 
-def _united(members: Sequence[Group], groups: dict[int, Group]) -> int:
+def _unite(members: Sequence[Group], groups: dict[int, Group]) -> int:
     """Give the id of a group that has all members, and add it, and those of single nodes, to ``groups``."""
     if not members:
         return 0
@@ -129,13 +129,13 @@ def _united(members: Sequence[Group], groups: dict[int, Group]) -> int:
     ids: list[int] = []
     for kind, numbers in members:
         if kind == "NODE":
-            ids.append(_added((kind, numbers), groups))
+            ids.append(_add((kind, numbers), groups))
         else:
             ids += numbers
-    return _added(("GRNOD", tuple(ids)), groups)
+    return _add(("GRNOD", tuple(ids)), groups)
 
 
-def _added(group: Group, groups: dict[int, Group]) -> int:
+def _add(group: Group, groups: dict[int, Group]) -> int:
     """Add a group under an id that no other has, and give that; those of parts lie below twice `MADE_HERE`."""
     number = 2 * MADE_HERE + len(groups)
     groups[number] = group

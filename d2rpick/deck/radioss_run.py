@@ -182,7 +182,7 @@ def find_run_windows(run: Run, contacts: Contacts | None = None) -> RunWindows:
             for unit in _units(node, parts):
                 windows += _follow(unit, node, sets, run.legs[0])
     for node in sorted(sensors):
-        windows += _by_sensor(run, bodies[node], parts, course_of(run, parts.get(node, ()), contacts))
+        windows += _by_sensor(run, bodies[node], parts, find_course(run, parts.get(node, ()), contacts))
     for body in bodies.values():
         if body.part and not body.sensor and body.node.value not in switched:
             windows.append(_always(body))
@@ -217,7 +217,7 @@ def _follow(unit: Unit, node: int, sets: tuple[LegSwitch, ...], first: Leg) -> l
     return [window for window in follow(unit, events)[0] if window.td is None or window.td > 0]
 
 
-def course_of(run: Run, parts: Collection[int], contacts: Contacts | None) -> Course:
+def find_course(run: Run, parts: Collection[int], contacts: Contacts | None) -> Course:
     """Give what is known of the course of a run for sensors that switch some parts."""
     known = contacts is not None and parts and run.starter is not None and only_force(run.starter)
     return Course(run.resets, contacts(parts) if known and contacts else None)
@@ -280,7 +280,7 @@ def parts_off(run: Run) -> tuple[int, ...]:
     return tuple(sorted(set().union(*held.values())))
 
 
-def parts_of_fixed_bodies(run: Run) -> set[int]:
+def find_parts_of_fixed_bodies(run: Run) -> set[int]:
     """Parts of the bodies that are on from the start to the end, since no leg and no sensor switches them.
 
     Without engine files all bodies of /RBODY may be switched; those of parts with Irigid are rigid all the same.
@@ -294,7 +294,7 @@ def parts_of_fixed_bodies(run: Run) -> set[int]:
     return set().union(*held.values())
 
 
-def sensors_of_parts(starter: Starter) -> dict[int, int]:
+def find_sensors_of_parts(starter: Starter) -> dict[int, int]:
     """Give the sensors that switch the rigid bodies of parts, by part."""
     sensors = {body.node.value: body for body in starter.bodies if body.sensor and not starter.moved}
     held = rigid_parts(starter, {node: body.group for node, body in sensors.items()}) if sensors else {}

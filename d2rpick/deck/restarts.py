@@ -37,7 +37,7 @@ def is_restart(path: str) -> bool:
     return bool(deck.named(_KEYWORD)) and not read_parts(deck).materials
 
 
-def joined(main: Deck, restarts: Sequence[str]) -> Deck:
+def join_restarts(main: Deck, restarts: Sequence[str]) -> Deck:
     """Give a run with its restarts as one deck, in which the cards of these have a time.
 
     Without an end of each run, after that of the one before, their times stay unknown.
@@ -47,11 +47,11 @@ def joined(main: Deck, restarts: Sequence[str]) -> Deck:
     DeckError
         If a restart cannot be read.
     """
-    legs = sorted(map(read_deck, restarts), key=lambda deck: end.value if (end := _end(deck)) else float("inf"))
-    ends = [_end(deck) for deck in (main, *legs)]
-    known = [end.value for end in ends if end]
+    legs = sorted(map(read_deck, restarts), key=lambda deck: end.value if (end := _find_end(deck)) else float("inf"))
+    ends = [_find_end(deck) for deck in (main, *legs)]
+    known_ends = [end.value for end in ends if end]
     # the end of the last run is that of no other: it may be unknown
-    timed = all(ends[:-1]) and all(one < other for one, other in pairwise(known))
+    timed = all(ends[:-1]) and all(one < other for one, other in pairwise(known_ends))
     run = Deck(main.path, scope=main.scope, long=main.long)
     for deck, end in zip((main, *legs), [None, *ends[:-1]], strict=True):
         for name in ("cards", "disabled", "encrypted", "included", "unread", "problems", "sources", "ends"):
@@ -61,7 +61,7 @@ def joined(main: Deck, restarts: Sequence[str]) -> Deck:
     return run
 
 
-def _end(deck: Deck) -> Value[float] | None:
+def _find_end(deck: Deck) -> Value[float] | None:
     """Give the ENDTIM of a deck; None for none above 0."""
     rows = [(card, card.rows[0]) for card in deck.named("CONTROL_TERMINATION") if card.rows]
     found = rows[-1][0].real(rows[-1][1], 0) if rows else None

@@ -32,7 +32,7 @@ class Suiting(NamedTuple):
     delete_node_sets: bool = False
 
 
-def suiting(path: str, parts: Collection[int]) -> Suiting:
+def find_suiting(path: str, parts: Collection[int]) -> Suiting:
     """Find what a deck asks of a card that switches some parts.
 
     Raises
@@ -43,22 +43,23 @@ def suiting(path: str, parts: Collection[int]) -> Suiting:
     if run_files(path):
         run = read_run(path)
         legs = run.legs
-        known = bool(legs) and in_order(legs) and not legs[-1].sensor
-        return Suiting("radioss", name_of_files(run), legs[-1].stop.value if known else None)
+        has_end = bool(legs) and in_order(legs) and not legs[-1].sensor
+        return Suiting("radioss", find_name_of_files(run), legs[-1].stop.value if has_end else None)
     deck = read_deck(path)
     bodies = [*read_constraints(deck, "nodal rigid body")]
-    others = [*read_constraints(deck, "extra nodes", "joint")]
-    return Suiting("ls-dyna", None, None, _free(deck), _all_on(bodies, parts, deck), _all_on(others, parts, deck))
+    further = [*read_constraints(deck, "extra nodes", "joint")]
+    nodal, by_set = (_lie_on(some, parts, deck) for some in (bodies, further))
+    return Suiting("ls-dyna", None, None, _find_free_ids(deck), nodal, by_set)
 
 
-def name_of_files(run: Run) -> str | None:
+def find_name_of_files(run: Run) -> str | None:
     """Give the name that the files of a run begin with, by which the engine finds its restart; else that in /RUN."""
     if run.starter and (root := root_of(run.starter.sources[0].name)):
         return root
     return run.legs[0].name if run.legs else None
 
 
-def _free(deck: Deck) -> tuple[int, int]:
+def _find_free_ids(deck: Deck) -> tuple[int, int]:
     """Two ids from which on no switch set and no part set of the deck has any."""
     sets = (one.header.swset.value for one in read_switching(deck) if one.header)
     highest = max((*sets, *read_parts(deck).sets), default=0)
@@ -66,16 +67,16 @@ def _free(deck: Deck) -> tuple[int, int]:
     return first, first + 1
 
 
-def _all_on(constraints: Sequence[Constraint], parts: Collection[int], deck: Deck) -> bool:
+def _lie_on(constraints: Sequence[Constraint], parts: Collection[int], deck: Deck) -> bool:
     """Whether there are constraints, and each lies on these parts alone: to delete them is to delete all of a kind."""
     if not constraints:
         return False
     from d2rpick.deck.ls_dyna_inventory import first_parts  # loads numpy
 
     cards = element_cards(deck, searched=True)
-    others = read_parts(deck).materials.keys() - set(parts)
-    own, foreign = first_parts(cards, parts), first_parts(cards, others)
+    rest = read_parts(deck).materials.keys() - set(parts)
+    touching, beyond = first_parts(cards, parts), first_parts(cards, rest)
     return all(
-        one.part in parts or (any(node in own for node in one.nodes) and not any(node in foreign for node in one.nodes))
-        for one in constraints
+        constraint.part in parts or (constraint.nodes & touching.keys() and not constraint.nodes & beyond.keys())
+        for constraint in constraints
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from d2rpick.deck.part_sets import NO_SETS, PartSets, named
+from d2rpick.deck.part_sets import NO_SETS, PartSets, name_parts
 from d2rpick.deck.printed_card import shortest
 
 if TYPE_CHECKING:
@@ -19,26 +19,26 @@ _COUNT_HEAD = "$#    nrbf      ncsf       rwf     dtmax       d2r       r2d    o
 def to_rigid(ids: Sequence[int], printing: Printing, part_sets: PartSets = NO_SETS) -> Iterator[str]:
     """Write the parts that become rigid, those that lead first, or the sets that they make up."""
     yield "$#     pid       lrb     ptype"
-    for lead, some in groups_by_lead(ids, printing).items():
-        yield from (f"{name:10d}{lead:10d}{kind:>10}" for name, kind in named(some, part_sets))
+    for lead, some in group_by_lead(ids, printing).items():
+        yield from (f"{name:10d}{lead:10d}{kind:>10}" for name, kind in name_parts(some, part_sets))
 
 
 def to_deformable(ids: Sequence[int], part_sets: PartSets = NO_SETS) -> Iterator[str]:
     """Write the parts that become deformable, or their set."""
     yield "$#     pid     ptype"
-    yield from (f"{name:10d}{kind:>10}" for name, kind in named(ids, part_sets))
+    yield from (f"{name:10d}{kind:>10}" for name, kind in name_parts(ids, part_sets))
 
 
-def groups_by_lead(ids: Sequence[int], printing: Printing) -> dict[int, list[int]]:
+def group_by_lead(ids: Sequence[int], printing: Printing) -> dict[int, list[int]]:
     """Give the parts by their lead, those without one first, under 0."""
-    leads = _leads(ids, printing)
-    found: dict[int, list[int]] = {}
+    leads = _find_leads(ids, printing)
+    by_lead: dict[int, list[int]] = {}
     for part in sorted(ids, key=lambda part: part in leads):
-        found.setdefault(leads.get(part, 0), []).append(part)
-    return found
+        by_lead.setdefault(leads.get(part, 0), []).append(part)
+    return by_lead
 
 
-def _leads(ids: Sequence[int], printing: Printing) -> dict[int, int]:
+def _find_leads(ids: Sequence[int], printing: Printing) -> dict[int, int]:
     """Give the lead of each part that is merged into another."""
     if printing.merge is not None:
         return {part: printing.merge for part in ids if part != printing.merge}
@@ -75,13 +75,13 @@ def header(
     ``counts`` are D2R and R2D, ``constraints`` NRBF and NCSF: 0 leaves constraints as they are, 1 deletes them and 2
     activates them.
     """
-    on = waits or Waiting()
+    waiting = waits or Waiting()
     yield "*DEFORMABLE_TO_RIGID_AUTOMATIC"
     yield _SET_HEAD
     yield (
-        f"{swset:10d}{on.code:10d}{time:>10s}{shortest(on.latest):>10s}{shortest(on.delay):>10s}"
-        f"{on.contact:10d}{on.other:10d}{on.paired:10d}"
+        f"{swset:10d}{waiting.code:10d}{time:>10s}{shortest(waiting.latest):>10s}{shortest(waiting.delay):>10s}"
+        f"{waiting.contact:10d}{waiting.other:10d}{waiting.paired:10d}"
     )
     yield _COUNT_HEAD
     nrbf, ncsf = constraints
-    yield f"{nrbf:10d}{ncsf:10d}{0:10d}{step_cap:>10s}{counts[0]:10d}{counts[1]:10d}{shortest(on.offset):>10s}"
+    yield f"{nrbf:10d}{ncsf:10d}{0:10d}{step_cap:>10s}{counts[0]:10d}{counts[1]:10d}{shortest(waiting.offset):>10s}"

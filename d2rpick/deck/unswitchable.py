@@ -47,21 +47,21 @@ _ISMSTR: Final = 1  # its place in the first line of the property
 _GAINS: Final = "so it may gain stress when it is switched back"
 
 
-def unswitchable_of_ls_dyna(deck: Deck, parts: Parts) -> dict[int, Unswitchable]:
+def find_unswitchable_in_ls_dyna(deck: Deck, parts: Parts) -> dict[int, Unswitchable]:
     """Find the parts of a deck that must not be switched, by their sections and materials."""
     sections = read_sections(deck)
     laws = {material_of(card, card.data[0], 0): card.name for card in deck.named("MAT") if card.data}
-    found: dict[int, Unswitchable] = {}
+    reasons: dict[int, Unswitchable] = {}
     for part, material in parts.materials.items():
         section, law = sections.get(parts.sections.get(part, 0)), laws.get(material, "").removesuffix("_TITLE")
         if section and section.kind == "SOLID" and section.elform in _FLOWING:
-            found[part] = _flowing(f"{_FLOWING[section.elform]}, ELFORM {section.elform}")
+            reasons[part] = _flowing(f"{_FLOWING[section.elform]}, ELFORM {section.elform}")
         elif _REFERENCE_BY_NAME.match(law) or _REFERENCE_BY_NUMBER.match(law):
-            found[part] = _with_reference(f"*{law}")
-    return found
+            reasons[part] = _with_reference(f"*{law}")
+    return reasons
 
 
-def unswitchable_of_radioss(starter: Starter) -> dict[int, Unswitchable]:
+def find_unswitchable_in_radioss(starter: Starter) -> dict[int, Unswitchable]:
     """Find the parts of a starter deck that must not be switched, by their materials and properties."""
     from d2rpick.deck.radioss_deck import number_of  # not above: a deck of LS-DYNA does without
 
@@ -70,15 +70,15 @@ def unswitchable_of_radioss(starter: Starter) -> dict[int, Unswitchable]:
     }
     laws = {number_of(card, 2): card.words[1] for card in starter.named("MAT") if card.words[2:]}
     strains = _strains(starter)
-    found: dict[int, Unswitchable] = {}
+    reasons: dict[int, Unswitchable] = {}
     for part, line in starter.parts.items():
         if line.material in flowing:
-            found[part] = _flowing(f"/{flowing[line.material]}/MAT/{line.material}")
+            reasons[part] = _flowing(f"/{flowing[line.material]}/MAT/{line.material}")
         elif laws.get(line.material) in _LAWS_WITH_REFERENCE:
-            found[part] = _with_reference(f"/MAT/{laws[line.material]}")
+            reasons[part] = _with_reference(f"/MAT/{laws[line.material]}")
         elif strains.get(line.prop, 0) in _TOTAL_STRAIN:
-            found[part] = _with_reference(f"Ismstr {strains[line.prop]}")
-    return found
+            reasons[part] = _with_reference(f"Ismstr {strains[line.prop]}")
+    return reasons
 
 
 def _strains(starter: Starter) -> Mapping[int, int]:

@@ -37,7 +37,7 @@ class ContactTimes(NamedTuple):
     speed: float | None = None
 
 
-def contact_times(momenta: Momenta) -> ContactTimes | None:
+def find_contact_times(momenta: Momenta) -> ContactTimes | None:
     """Find when a force other than gravity acts on the chosen parts and what flies with them.
 
     Returns
@@ -49,7 +49,7 @@ def contact_times(momenta: Momenta) -> ContactTimes | None:
     if not flights:
         return None
     longest = max(flights, key=lambda flight: flight.end - flight.start)
-    members = _members(momenta, longest.parts)
+    members = _find_members(momenta, longest.parts)
     time, momentum = momenta.time, momenta.of(members)
     flight = window(time, longest.start, longest.end)
     first, last = flight.start + _EDGE, flight.stop - 1 - _EDGE
@@ -66,7 +66,7 @@ def contact_times(momenta: Momenta) -> ContactTimes | None:
     return ContactTimes(spans, float(np.diff(time).max()), speed)
 
 
-def _members(momenta: Momenta, parts: object) -> tuple[int, ...]:
+def _find_members(momenta: Momenta, parts: object) -> tuple[int, ...]:
     """Give the places of the parts that fly; those of the chosen ones where the momentum is that of the model."""
     flying = {part.id for part in parts} if isinstance(parts, tuple) else set()
     places = tuple(place for place, part in enumerate(momenta.parts or ()) if part.id in flying)

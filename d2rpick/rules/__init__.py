@@ -272,9 +272,9 @@ def _read(path: str, content: bytes | None, judge: Judge | None, restarts: Seque
         return RunCase(run.deck, judge, run=run)
     deck = read_deck(path, source)
     if restarts:
-        from d2rpick.deck.restarts import joined  # not above: start-up
+        from d2rpick.deck.restarts import join_restarts  # not above: start-up
 
-        deck = joined(deck, restarts)
+        deck = join_restarts(deck, restarts)
     return Case(deck, judge)
 
 

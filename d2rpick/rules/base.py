@@ -131,10 +131,10 @@ class Case:
         """Switches by force, with what they do in the history; none without one."""
         if self.judge is None or not any(header.code.value in _BY_FORCE for _, header in self.headers):
             return ()
-        from d2rpick.rules.by_force import forced_switches  # not above: start-up
+        from d2rpick.rules.by_force import follow_forced_switches  # not above: start-up
 
         end = min(self.judge.end, self.end or self.judge.end)
-        return tuple(forced_switches(self.deck, find_windows(self.sets, self.parts).events, self.judge, end))
+        return tuple(follow_forced_switches(self.deck, find_windows(self.sets, self.parts).events, self.judge, end))
 
     @cached_property
     def constraints(self) -> Sequence[Constraint]:
@@ -184,9 +184,9 @@ class Case:
     @cached_property
     def unswitchable(self) -> Mapping[int, Unswitchable]:
         """Parts that must not be switched."""
-        from d2rpick.deck.unswitchable import unswitchable_of_ls_dyna  # not above: start-up
+        from d2rpick.deck.unswitchable import find_unswitchable_in_ls_dyna  # not above: start-up
 
-        return unswitchable_of_ls_dyna(self.deck, self.parts)
+        return find_unswitchable_in_ls_dyna(self.deck, self.parts)
 
     @cached_property
     def supporting(self) -> tuple[tuple[Card, Value[float]], ...]:
@@ -233,14 +233,14 @@ class RunCase(Case):
     @cached_property
     def forced(self) -> tuple[Forced, ...]:
         """Bodies that a sensor of a force switches, with what it does in the history."""
-        from d2rpick.deck.radioss_run import course_of  # not above: start-up
+        from d2rpick.deck.radioss_run import find_course  # not above: start-up
         from d2rpick.deck.radioss_sensors import waits_for_force
         from d2rpick.rules.by_force import Forced
 
         starter, found = self.run.starter, []
         for body in starter.bodies if starter and self.judge else ():
             parts = self.found.parts.get(body.node.value, set())
-            contacts = course_of(self.run, parts, self.judge.contacts if self.judge else None).contacts
+            contacts = find_course(self.run, parts, self.judge.contacts if self.judge else None).contacts
             own = tuple(one for one in self.windows.windows if one.opened.by.card is body.card)
             if starter and contacts is not None and own and waits_for_force(starter, body.sensor):
                 found.append(Forced(body.card, (body.card,), own, contacts, "Tdelay of the sensor"))
@@ -260,13 +260,15 @@ class RunCase(Case):
     @property
     def untimed(self) -> tuple[tuple[Field, str], ...]:
         """Bodies that a sensor switches whose time is not known."""
-        from d2rpick.deck.radioss_run import course_of  # not above: start-up
+        from d2rpick.deck.radioss_run import find_course  # not above: start-up
         from d2rpick.deck.radioss_sensors import active_spans
 
         starter, legs = self.run.starter, [leg for leg in self.run.legs[:-1] if leg.sensor]
         sensed = [body for body in starter.bodies if body.sensor] if starter else []
         contacts = self.judge.contacts if self.judge else None
-        courses = [(body, course_of(self.run, self.found.parts.get(body.node.value, ()), contacts)) for body in sensed]
+        courses = [
+            (body, find_course(self.run, self.found.parts.get(body.node.value, ()), contacts)) for body in sensed
+        ]
         spans = [(body, active_spans(starter, body.sensor, course)) for body, course in courses if starter]
         told = [(body.node.field, f"{body.name} is switched by {why}") for body, why in spans if isinstance(why, str)]
         return *told, *((leg.run.here, f"leg {leg.number} ends when sensor {leg.sensor} is active") for leg in legs)
@@ -279,9 +281,9 @@ class RunCase(Case):
     @cached_property
     def unswitchable(self) -> Mapping[int, Unswitchable]:
         """Parts that must not be switched."""
-        from d2rpick.deck.unswitchable import unswitchable_of_radioss  # not above: start-up
+        from d2rpick.deck.unswitchable import find_unswitchable_in_radioss  # not above: start-up
 
-        return unswitchable_of_radioss(self.run.starter) if self.run.starter else {}
+        return find_unswitchable_in_radioss(self.run.starter) if self.run.starter else {}
 
     @cached_property
     def flaws(self) -> tuple[Flaw, ...]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.deck.force_switching import ForceSwitch, force_windows
+from d2rpick.deck.force_switching import ForceSwitch, follow_pair
 from d2rpick.deck.ls_dyna_parts import read_entities
 from d2rpick.deck.switching import Event, SwitchSet, Window
 
@@ -60,34 +60,34 @@ class Forced(NamedTuple):
         return [(tr, td) for tr, td in closed if td - tr >= _SHORT * longest]
 
 
-def forced_switches(deck: Deck, events: Sequence[Event], judge: HistoryJudge, end: float) -> Iterator[Forced]:
+def follow_forced_switches(deck: Deck, events: Sequence[Event], judge: HistoryJudge, end: float) -> Iterator[Forced]:
     """Follow the sets of a deck of LS-DYNA that switch by force; none where the history does not show contacts."""
-    if not _one_force(deck):
+    if not _has_one_force(deck):
         return
     by_card = {event.by: [one for one in events if one.by is event.by] for event in events}
-    waiting = {card: made for card in by_card if (made := _waiting(card)) is not None}
+    waiting = {card: made for card in by_card if (made := _read_waiting(card)) is not None}
     for there, rigid in waiting.items():
         if not rigid.to_rigid:
             continue
-        back = _pair(there, by_card, waiting)
-        found: list[Window] = []
+        back = _find_pair(there, by_card, waiting)
+        windows: list[Window] = []
         contacts: Spans = ()
         for event in by_card[there]:
             pushed = None if event.unit.part is None else judge.pushed([event.unit.part])
             if pushed is not None:
-                contacts = _as_seen(pushed, back)
-                found += _windows(event, back, by_card, waiting, contacts, end)
-        if found:
+                contacts = _shift_contacts(pushed, back)
+                windows += _follow_windows(event, back, by_card, waiting, contacts, end)
+        if windows:
             cards = (there.card, back.card) if back else (there.card,)
-            yield Forced(there.card, cards, tuple(found), contacts, "TIME3")
+            yield Forced(there.card, cards, tuple(windows), contacts, "TIME3")
 
 
-def _one_force(deck: Deck) -> bool:
+def _has_one_force(deck: Deck) -> bool:
     """Whether a deck has one contact or rigid wall at most; cards alone have none."""
     return len(read_entities(deck, "CONTACT").found) + len(read_entities(deck, "RIGIDWALL").found) <= 1
 
 
-def _waiting(card: SwitchSet) -> ForceSwitch | None:
+def _read_waiting(card: SwitchSet) -> ForceSwitch | None:
     """Give what a set waits for; None for one that does not wait for a force, or says it in a way that is not read."""
     header, factor = card.header, card.card.transform.time
     if header is None or header.code.value not in _CODES or not card.switched:
@@ -105,14 +105,14 @@ def _waiting(card: SwitchSet) -> ForceSwitch | None:
     )
 
 
-def _as_seen(pushed: ContactTimes, back: SwitchSet | None) -> Spans:
+def _shift_contacts(pushed: ContactTimes, back: SwitchSet | None) -> Spans:
     """Give the contacts as the set sees them that makes parts deformable: earlier by the time to fly its OFFSET."""
     offset = back.header.offset.value if back and back.header and not back.header.offset.problem else 0.0
     lead = offset / pushed.speed if pushed.speed and offset > 0 else 0.0
     return tuple((start - lead, end) for start, end in pushed.spans)
 
 
-def _pair(
+def _find_pair(
     there: SwitchSet, by_card: dict[SwitchSet, list[Event]], waiting: dict[SwitchSet, ForceSwitch]
 ) -> SwitchSet | None:
     """Give the set that makes the parts of another deformable again: its pair, or one that names the same parts."""
@@ -123,7 +123,7 @@ def _pair(
     return None
 
 
-def _windows(
+def _follow_windows(
     event: Event,
     back: SwitchSet | None,
     by_card: dict[SwitchSet, list[Event]],
@@ -133,11 +133,11 @@ def _windows(
 ) -> Iterator[Window]:
     """Give the windows of a unit that an event makes rigid."""
     rigid = waiting[event.by]
-    closing = _event_of(event.unit, by_card[back]) if back else None
+    closing = _find_event(event.unit, by_card[back]) if back else None
     other = waiting[back] if back and closing else None
-    for tr, td in force_windows(rigid, other, contacts, end):
+    for tr, td in follow_pair(rigid, other, contacts, end):
         yield Window(event.unit, tr, td, event, closing if td is not None else None)
 
 
-def _event_of(unit: Unit, events: Sequence[Event]) -> Event | None:
+def _find_event(unit: Unit, events: Sequence[Event]) -> Event | None:
     return next((one for one in events if one.unit == unit), None)

@@ -16,7 +16,7 @@ from d2rpick.choice.question import Reference, Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, end_of_flight, end_of_load
 from d2rpick.deck import read_inventory
-from d2rpick.flight.contact_times import ContactTimes, contact_times
+from d2rpick.flight.contact_times import ContactTimes, find_contact_times
 from d2rpick.histories.digits import above, first_as_read, in_the_record
 from d2rpick.histories.surroundings import UNKNOWN
 
@@ -145,7 +145,7 @@ class HistoryJudge:
         """As `contacts`, with how well the times are known."""
         chosen = [part for part in self.run.parts if part.id in parts]
         momenta = next((one for one in self.run.momenta(chosen, None) if one.parts), None) if chosen else None
-        return contact_times(momenta) if momenta else None
+        return find_contact_times(momenta) if momenta else None
 
     @property
     def _known(self) -> tuple[int, ...]:

@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Final, Literal
 
 from d2rpick.base.errors import listing
-from d2rpick.deck.force_switching import delay_without_chatter
+from d2rpick.deck.force_switching import find_delay_without_chatter
 from d2rpick.deck.ls_dyna_parts import Entities, read_entities
 from d2rpick.deck.switching import BY_SENSOR, BY_TIME, Header, SwitchSet, Unit
 from d2rpick.rules.base import BOTH, ERROR, WARNING, Case, Objection
@@ -296,7 +296,7 @@ def _chatters(case: Case) -> Iterator[Objection]:
     for one in case.forced:
         short = len(one.times) - len(one.lasting)
         if short:
-            wait = delay_without_chatter(one.lasting, one.contacts)
+            wait = find_delay_without_chatter(one.lasting, one.contacts)
             cure = f"; {wait:.3g} or more as {one.wait} leaves {len(one.lasting)}" if wait else ""
             found = f"{one.switches} switches by the history, in {len(one.times)} windows"
             yield one.place.here, f"{found}, {short} of which are below a tenth of the longest{cure}"

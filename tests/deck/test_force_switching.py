@@ -5,50 +5,50 @@ from itertools import pairwise
 import pytest
 from hypothesis import given, strategies as st
 
-from d2rpick.deck.force_switching import ForceSwitch, delay_without_chatter, force_windows
+from d2rpick.deck.force_switching import ForceSwitch, find_delay_without_chatter, follow_pair
 
 TO_RIGID, BACK = ForceSwitch(True, False), ForceSwitch(False, True)
 BOUNCES = [(0.0, 0.01), (0.02, 0.021), (0.0215, 0.03), (0.06, 0.07)]
 
 
 def test_a_pair_switches_with_every_force() -> None:
-    assert force_windows(TO_RIGID, BACK, BOUNCES, 0.1) == [(0.01, 0.02), (0.021, 0.0215), (0.03, 0.06), (0.07, None)]
+    assert follow_pair(TO_RIGID, BACK, BOUNCES, 0.1) == [(0.01, 0.02), (0.021, 0.0215), (0.03, 0.06), (0.07, None)]
 
 
 def test_a_delay_after_the_way_back_keeps_chatter_out() -> None:
     waits = BACK._replace(delay=0.002)
-    assert force_windows(TO_RIGID, waits, BOUNCES, 0.1) == [(0.01, 0.02), (0.03, 0.06), (0.07, None)]
+    assert follow_pair(TO_RIGID, waits, BOUNCES, 0.1) == [(0.01, 0.02), (0.03, 0.06), (0.07, None)]
 
 
 def test_a_delay_after_becoming_rigid_misses_a_contact() -> None:
     late = TO_RIGID._replace(delay=0.0105)  # the second contact is over when it may switch back
-    assert force_windows(late, BACK, [(0.0, 0.01), (0.02, 0.0203), (0.05, 0.06)], 0.1) == [(0.01, 0.05), (0.06, None)]
+    assert follow_pair(late, BACK, [(0.0, 0.01), (0.02, 0.0203), (0.05, 0.06)], 0.1) == [(0.01, 0.05), (0.06, None)]
 
 
 def test_sets_act_between_their_times() -> None:
     later = TO_RIGID._replace(earliest=0.04)
-    assert force_windows(later, BACK, BOUNCES, 0.1) == [(0.04, 0.06), (0.07, None)]
+    assert follow_pair(later, BACK, BOUNCES, 0.1) == [(0.04, 0.06), (0.07, None)]
     ends = TO_RIGID._replace(latest=0.025)
-    assert force_windows(ends, BACK, BOUNCES, 0.1) == [(0.01, 0.02), (0.021, 0.0215)]
-    assert force_windows(TO_RIGID._replace(earliest=0.2), BACK, BOUNCES, 0.1) == []
+    assert follow_pair(ends, BACK, BOUNCES, 0.1) == [(0.01, 0.02), (0.021, 0.0215)]
+    assert follow_pair(TO_RIGID._replace(earliest=0.2), BACK, BOUNCES, 0.1) == []
 
 
 def test_sets_without_a_pair_switch_once() -> None:
     alone = TO_RIGID._replace(paired=False), BACK._replace(paired=False)
-    assert force_windows(*alone, BOUNCES, 0.1) == [(0.01, 0.02)]
-    assert force_windows(alone[0], None, BOUNCES, 0.1) == [(0.01, None)]
+    assert follow_pair(*alone, BOUNCES, 0.1) == [(0.01, 0.02)]
+    assert follow_pair(alone[0], None, BOUNCES, 0.1) == [(0.01, None)]
 
 
 def test_swapped_codes_are_rigid_in_the_contacts() -> None:
     swapped = TO_RIGID._replace(with_force=True), BACK._replace(with_force=False)
-    assert force_windows(*swapped, BOUNCES, 0.1) == [*BOUNCES]
+    assert follow_pair(*swapped, BOUNCES, 0.1) == [*BOUNCES]
 
 
 @given(st.lists(st.integers(1, 1000), min_size=2, max_size=12, unique=True).filter(lambda cuts: len(cuts) % 2 == 0))
 def test_windows_follow_each_other_and_no_force_acts_in_them(cuts: list[int]) -> None:
     times = sorted(cuts)
     contacts = [(float(a), float(b)) for a, b in zip(times[::2], times[1::2], strict=True)]
-    windows = force_windows(TO_RIGID, BACK, contacts, 2000.0)
+    windows = follow_pair(TO_RIGID, BACK, contacts, 2000.0)
     assert windows[-1][1] is None
     assert all(before[1] is not None and before[1] < after[0] for before, after in pairwise(windows))
     for tr, td in windows:
@@ -57,9 +57,9 @@ def test_windows_follow_each_other_and_no_force_acts_in_them(cuts: list[int]) ->
 
 def test_the_delay_that_keeps_chatter_out_does_so() -> None:
     wanted = [(0.01, 0.02), (0.03, 0.06), (0.07, 0.1)]
-    wait = delay_without_chatter(wanted, BOUNCES)
+    wait = find_delay_without_chatter(wanted, BOUNCES)
     assert wait is not None
-    found = force_windows(TO_RIGID, BACK._replace(delay=wait), BOUNCES, 0.1)
+    found = follow_pair(TO_RIGID, BACK._replace(delay=wait), BOUNCES, 0.1)
     assert [tr for tr, _ in found] == pytest.approx([tr for tr, _ in wanted])
     assert [td for _, td in found] == [0.02, 0.06, None]
-    assert delay_without_chatter([(0.0, 0.02)], []) is None
+    assert find_delay_without_chatter([(0.0, 0.02)], []) is None

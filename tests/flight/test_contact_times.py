@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given as over, settings, strategies as st
 
-from d2rpick.flight.contact_times import contact_times
+from d2rpick.flight.contact_times import find_contact_times
 from d2rpick.histories.history import EXACT, Momenta
 from d2rpick.histories.names import Part
 from d2rpick.histories.surroundings import Surroundings
@@ -32,7 +32,7 @@ def bouncing(contacts: list[tuple[float, float]], end: float, interval: float, g
 def test_every_contact_is_seen_within_an_interval(shift: float, length: float) -> None:
     interval = 1e-3
     contacts = [(0.1 + shift * interval, 0.1 + (shift + length) * interval), (0.3037, 0.3115)]
-    found = contact_times(bouncing(contacts, 0.6, interval))
+    found = find_contact_times(bouncing(contacts, 0.6, interval))
     assert found is not None
     assert len(found.spans) == 2
     for span, contact in zip(found.spans, contacts, strict=True):
@@ -42,13 +42,13 @@ def test_every_contact_is_seen_within_an_interval(shift: float, length: float) -
 
 
 def test_without_gravity_a_push_is_seen_too() -> None:
-    found = contact_times(bouncing([(0.1, 0.11)], 0.5, 1e-3, gravity=0.0))
+    found = find_contact_times(bouncing([(0.1, 0.11)], 0.5, 1e-3, gravity=0.0))
     assert found is not None
     assert np.array(found.spans) == pytest.approx(np.array([[0.1, 0.11]]), abs=1.1e-3)
 
 
 def test_the_speed_is_that_at_the_end_of_the_longest_flight() -> None:
-    found = contact_times(bouncing([(0.1, 0.11)], 0.5, 1e-3, gravity=0.0))
+    found = find_contact_times(bouncing([(0.1, 0.11)], 0.5, 1e-3, gravity=0.0))
     assert found is not None
     assert found.speed == pytest.approx(np.hypot(1.5, 40.0 * 0.05 - 0.5))
 
@@ -56,4 +56,4 @@ def test_the_speed_is_that_at_the_end_of_the_longest_flight() -> None:
 def test_of_what_never_flies_nothing_is_known() -> None:
     momenta = bouncing([], 0.5, 1e-3)
     shaken = momenta.values + 5 * np.sin(momenta.time * 300)[:, np.newaxis, np.newaxis]
-    assert contact_times(replace(momenta, values=shaken)) is None
+    assert find_contact_times(replace(momenta, values=shaken)) is None

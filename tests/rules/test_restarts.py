@@ -6,7 +6,7 @@ import pytest
 
 import d2rpick as d2
 from d2rpick.deck.reader import read_deck
-from d2rpick.deck.restarts import is_restart, joined
+from d2rpick.deck.restarts import is_restart, join_restarts
 from d2rpick.rules import check_deck
 from tests.command import answer, put, run
 
@@ -120,7 +120,7 @@ def test_of_two_runs_nobody_knows_whose_restart_it_is(legs: list[str], tmp_path:
 
 def test_the_run_ends_with_its_last_restart(legs: list[str]) -> None:
     main, *restarts = legs
-    deck = joined(read_deck(main), restarts)
+    deck = join_restarts(read_deck(main), restarts)
     assert [one.at for one in deck.restarts.values()] == [0.02, 0.09]
     assert deck.files == legs
 
