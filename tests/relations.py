@@ -58,15 +58,15 @@ class Relation(NamedTuple):
     """``change`` writes a run twice into a folder.
 
     Times of the second answer are ``scale`` times those of the first, later by ``shift`` spans of the record.  If it is
-    ``exact``, everything must be the same to rounding.  If it ``may_refuse``, the second history may be too coarse to
-    choose from.
+    ``exact``, everything must be the same to rounding.  If it ``may_lose`` what the first history shows, the second one
+    may be too coarse to choose from, or to choose on the same basis.
     """
 
     change: Callable[[MadeRun, Path, Random], tuple[Asked, Asked]]
     exact: bool = True
     scale: float = 1.0
     shift: float = 0.0
-    may_refuse: bool = False
+    may_lose: bool = False
 
 
 class Chosen(NamedTuple):
@@ -304,7 +304,7 @@ RELATIONS: Final[Mapping[str, Relation]] = {
     "doubled last state": Relation(doubled_last_state),
     "cut after the landing": Relation(cut_after_the_landing),
     "order of legs": Relation(legs_in_another_order),
-    "every second state": Relation(every_second_state, exact=False, may_refuse=True),
+    "every second state": Relation(every_second_state, exact=False, may_lose=True),
     "other names": Relation(other_names),
     "other signs": Relation(other_signs),
 }
@@ -326,7 +326,7 @@ def choose(question: Asked) -> Chosen:
 
 def difference(relation: Relation, run: MadeRun, first: Chosen, second: Chosen) -> str:
     """Say how the second answer is not the first one as the relation moves it; nothing if it is."""
-    if second.tr is None and relation.may_refuse:
+    if relation.may_lose and (second.tr is None or second.basis != first.basis):
         return ""
     if (first.tr is None) != (second.tr is None):
         return f"tr {first.tr} became {second.tr}"

@@ -352,10 +352,14 @@ def _loose(name: str, misfit: float, structure: float, local_structure: float) -
 
 
 def samples_per_period(time: Samples, mode: Mode | Modes) -> float:
-    """Samples per period of the energy of the fastest mode, two in one of the vibration [-]."""
+    """Return the number of samples per energy period of the fastest mode, in four digits.
+
+    The energy has two periods per vibration period.  A record is often written with a round number of states per
+    period: rounding of its times, as in single precision, must not decide whether they are enough.
+    """
     # the interval that a moment of the record lies in, on average: gaps count by their length
     interval = float(np.sum(np.diff(time) ** 2)) / float(time[-1] - time[0])
-    return float(np.pi / mode.fastest / interval)
+    return float(f"{np.pi / mode.fastest / interval:.4g}")
 
 
 def _implausible(

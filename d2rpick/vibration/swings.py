@@ -30,6 +30,8 @@ _OFF_FLOOR: Final = 0.02
 # Of the minima: where more are off the floor, those on it are so by chance.
 _MOST_OFF: Final = 0.1
 _FEWEST: Final = 5  # minima that show a floor
+# Of two swings' time: a shorter one beside a longer one differ by so much where a beat makes them.
+_UNEVEN: Final = 0.03
 # A spring that stiffens swings at another rate once the amplitude is another: over two periods after td its residual
 # came out up to 1.5 times that of a linear one.  About a preload that keeps it off zero it is twice as large.
 _OF_ANY_SPRING: Final = 2.0
@@ -141,6 +143,8 @@ def count_swings(time: Samples, energy: Samples) -> Swings | None:
     off = np.abs(_off_line(bottom, floor)) > _OFF_FLOOR * swing
     if np.count_nonzero(off) > _MOST_OFF * off.size:
         return None
+    if _is_beat(bottom, floor, moment[~low], value[~low]):
+        return None
     elastic = np.maximum(energy - _along(time, bottom, floor), 0.0)
     whole = upper_envelope(time, elastic)
     if whole is None:
@@ -149,6 +153,27 @@ def count_swings(time: Samples, energy: Samples) -> Swings | None:
     deformation = np.where(turned, -np.sqrt(elastic), np.sqrt(elastic))
     unclear = np.sort(np.concatenate([bottom[off], time[[1, open_end]]]))  # next to the ends a minimum is not seen
     return Swings(time, deformation, unclear, whole, bottom, floor)
+
+
+def _is_beat(bottom: Samples, floor: Samples, top: Samples, peak: Samples) -> bool:
+    """Return whether the swings alternate as only the beat of two modes makes them, with rates of 2 to 3 or 2 to 7.
+
+    The minima of a beat can all lie on one level.  The deformation of a single mode stays longer on the side of its
+    preload, and goes farther there; in a beat the longer swing is the lower one.
+
+    Parameters
+    ----------
+    bottom, floor : array of shape (k,)
+        The minima [time], and the energy there.
+    top, peak : array of shape (m,)
+        The maxima between them [time], and the energy there.
+    """
+    middle = (bottom[1:] + bottom[:-1]) / 2
+    lasting, height = np.diff(bottom), np.interp(middle, top, peak) - np.interp(middle, bottom, floor)
+    longer, higher = np.diff(lasting), np.diff(height)
+    uneven = np.abs(longer) > _UNEVEN * (lasting[1:] + lasting[:-1])
+    opposed = uneven & (longer * higher < 0)
+    return bool(2 * np.count_nonzero(opposed) > opposed.size)
 
 
 def _turns(energy: Samples) -> tuple[NDArray[np.intp], int]:

@@ -113,11 +113,39 @@ SEARCHES = (
 # No flight is seen: each td looks at windows of its own, down to short ones.
 UNSEEN = (*SEARCHES[1:2], ("explore", ("explore", "--td", "0.9", "--steps", "200"), 15.0))
 STARTS = (
-    *((("info", f"sample_data/rollover_box{kind}"), 1.5) for kind in (".h5", ".binout", ".matsum", "T01")),
+    *((("info", f"sample_data/rollover_box{kind}"), 1.5) for kind in (".binout", ".matsum", "T01")),
+    (("info", "sample_data/rollover_box.h5"), 1.6),  # h5py alone takes 1.33
     (("plan", "sample_data/energy.csv"), 2.0),
     (("explore", "sample_data/energy.csv", "--td", "0.064"), 2.5),
 )
+# Ceilings of what somebody waits for at the screen, in processor seconds [s].
+WAITS = (
+    *(
+        Row(f"wait for {what}, three modes, {kind}, 1e5 [s]", measure, most)
+        for kind in ("clean", "noise 1 %")
+        for what, measure, most in (
+            ("info", choosing("wait_for_info", kind, 100_000), 1.0),
+            ("suggest", choosing("wait", kind, 100_000, "suggest"), 2.5),
+            ("plan", choosing("wait", kind, 100_000, "plan"), 2.5),
+            ("explore", choosing("wait", kind, 100_000, "explore"), 4.0),
+        )
+    ),
+    Row("wait for explore of 500 parts x 2000 [s]", choosing("wait_for_parts", 500), most=4.0),
+    *(
+        Row(
+            f"wait for explore --td, a vibration on heat, {states:.0e} [s]",
+            choosing("wait", "a vibration on heat", states, "explore", "--td", "0.9"),
+            most,
+        )
+        for states, most in ((10_000, 2.0), (100_000, 6.0))
+    ),
+    Row("wait for info, a vibration on heat, 1e5 [s]", choosing("wait_for_info", "a vibration on heat", 100_000), 1.0),
+    Row("wait for plan, random walk, 1e4 [s]", choosing("wait", "random walk", 10_000, "plan"), most=2.0),
+    Row("explore of three impacts, 1e5 states: peak memory [MB]", choosing("explore_memory"), most=150.0),
+    Row("study of 1000 csv of 1501 states, CPU a run [ms]", choosing("study_of_small_runs"), most=10.0),
+)
 ROWS = (
+    *WAITS,
     Row("suggest / import numpy, click: processes", lambda: process_ratio("numpy, click", *SUGGEST)),
     Row("  both with one thread", lambda: process_ratio("numpy, click", *SUGGEST, env=ONE_THREAD), most=1.4),
     *(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -39,6 +40,10 @@ _TD, _AFTER, _WINDOWS = 0.9, 0.1, {"narrow": (0.85, 0.9), "wide": (0.3, 0.9)}
 _folder = TemporaryDirectory()
 
 PANDAS = "import sys, pandas; pandas.read_csv(sys.argv[1])"
+PEAK = (
+    "import resource, subprocess, sys; subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL);"
+    "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024)"
+)
 FIGURE = (
     "import io, matplotlib; from matplotlib.figure import Figure; figure = Figure(); "
     "figure.subplots().plot(range(1500)); figure.savefig(io.BytesIO(), format='svg')"
@@ -122,6 +127,38 @@ def search_to_td(trouble: str, states: int, *command: str) -> float:
     return _ratio(("-m", "d2rpick", *command, *rest), ("-m", "d2rpick", "suggest", "--td", str(_TD), *rest), rounds=1)
 
 
+def wait(trouble: str, states: int, *command: str) -> float:
+    """Processor time of a command on a record of some `_trouble` [s]."""
+    return _cost(*command, "--exit-zero", "-q", str(_trouble(trouble, states)))
+
+
+def wait_for_info(trouble: str, states: int) -> float:
+    """Processor time of `info` of that record [s]."""
+    return _cost("info", "-q", str(_trouble(trouble, states)))
+
+
+def wait_for_parts(parts: int) -> float:
+    """Processor time of `explore` of so many parts and 2000 states [s]."""
+    names = ("--part", f"2001-{2000 + parts}", "--exit-zero", "-q", str(_matsum(parts)))
+    return _cost("explore", *names)
+
+
+def explore_memory() -> float:
+    """Peak memory of `explore` of three impacts, 1e5 states [MB]."""
+    file = str(_trouble("several flights", 100_000))
+    return float(output("-c", PEAK, sys.executable, "-m", "d2rpick", "explore", "--exit-zero", "-q", file))
+
+
+def study_of_small_runs() -> float:
+    """Processor time of `study` of 1000 csv of 1501 states in one process, for each run [ms]."""
+    folder = Path(_folder.name) / "small runs"
+    if not folder.exists():
+        folder.mkdir()
+        write_runs(folder, _RUNS, 1501)
+    names = sorted(map(str, folder.iterdir()))
+    return _cost(*_study(names, "1")) / _RUNS * 1e3
+
+
 def parts_to_matsum(parts: int) -> float:
     """`suggest --part` of so many parts and 2000 states over reading that matsum: processes."""
     file = str(_matsum(parts))
@@ -171,6 +208,13 @@ def _noisy(states: int) -> Path:
 def _trouble(name: str, states: int) -> Path:
     """A record of a kind that is hard to choose in: many modes, noise, impacts, energies that rise or are negative."""
     rng = np.random.default_rng(14)
+    if name == "random walk":
+        steps = rng.standard_normal(states)
+        return _written(f"{name}{states}.csv", np.linspace(0.0, 1.0, states), 100.0 + np.cumsum(steps))
+    if name == "a vibration on heat":
+        time = np.linspace(0.02, 1.2, states)
+        energy = 10 * time + 0.8 * (np.exp(-1.5 * time) * np.cos(60 * time)) ** 2
+        return _written(f"{name}{states}.csv", time, energy)
     many = zip(rng.uniform(8, 40, 200), rng.uniform(0.3, 1, 200), rng.uniform(0, np.pi, 200), strict=True)
     rise = {"a rise": 3.0, "a rise and a vibration": 3.0}.get(name, 0.0)
     level = {"noise alone": 4.0, "below zero": -4.0}.get(name, 0.0)
@@ -248,6 +292,11 @@ def _runs() -> list[str]:
     folder = Path(_folder.name) / "runs"
     folder.mkdir()
     return write_runs(folder, _RUNS, _RUN_STATES, noise=1e-3)
+
+
+def _cost(*command: str) -> float:
+    """Processor time of a command, the less of two [s]."""
+    return min(processor_seconds(lambda: output("-m", "d2rpick", *command)) for _ in range(2))
 
 
 def _ratio(one: Sequence[str], other: Sequence[str], rounds: int = _ROUNDS) -> float:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
+from hypothesis import example, given, strategies as st
 from scipy.integrate import solve_ivp
 
 from d2rpick.choice.answers import suggest
@@ -49,6 +49,10 @@ def test_every_minimum_on_the_floor_is_a_passage_through_zero(by: float, alpha: 
     np.testing.assert_allclose(counted**2, energy, atol=0.03 * energy.max())
 
 
+@example(1.5, 2.375, 1.0)  # every minimum of these beats lies on one level
+@example(3.503, 2.404, 0.199)
+@example(3.498, 2.347, 0.125)
+@example(3.509, 2.151, 0.036)
 @given(st.floats(1.3, 4.0), st.floats(0.0, 3.0), st.floats(0.003, 1.0))
 def test_what_another_mode_may_cost_is_told_or_nothing_is_counted(rate: float, phase: float, share: float) -> None:
     """The residual with both modes known is not above the highest that counting tells."""
@@ -61,6 +65,12 @@ def test_what_another_mode_may_cost_is_told_or_nothing_is_counted(rate: float, p
     tr = tr[tr > found.comparable_since(td)]
     hidden = np.abs(np.sin(rate * tr + phase) - np.sin(rate * td + phase)) * np.sqrt(share / (1 + share))
     assert (hidden <= 3 * np.sqrt(found.unseen(tr, td)) + 0.2).all()
+
+
+@pytest.mark.parametrize("preload", [0.1, 0.3, -0.3])
+def test_a_preload_that_makes_swings_uneven_is_no_beat(preload: float) -> None:
+    found = sure(count_swings(TIME, (np.exp(-0.02 * TIME) * np.sin(TIME) + preload) ** 2))
+    assert np.ptp(np.diff(found.bottoms)) > 0.3
 
 
 def test_noise_and_too_few_swings_are_not_counted() -> None:
