@@ -120,7 +120,7 @@ def test_the_table_names_what_it_rests_on_and_marks_the_recommended_row() -> Non
     assert lines[:8] == [
         "best of a bad td  tr = 0.0128853, td = 0.064, residual 0.957",
         "saves             rigid for 34% of the record, 0.0511147",
-        "keeps             8% to 10% of the mean energy after td; the vibration is off by 95.7%",
+        "keeps             8% of the mean energy after td; the vibration is off by 95.7%",
         "quality           poor: the vibration after td is off by 96%; tr is known to ±1e-07 and may be off",
         "                  by 5e-05",
         "motion            good",

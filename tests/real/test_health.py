@@ -22,8 +22,7 @@ TIME = np.linspace(0.0, 1.0, 201)
         ("Masters-Project__Steel_Explicit-glstat.head16000", {"hourglass_share": None, "sliding_share": 0.0}, set()),
         ("lasso-python__sph_models-R12_2_1-binout", {"energy_ratio_min": 0.950303}, set()),
         ("OpenRadioss__miniqa-AMS-boxbeam-reference-BOXBEAMT01", {"part_hourglass_share": 0.0574625}, set()),
-        # of its names only two are sure
-        ("OpenRadioss__miniqa-AMS-boxbeam-reference-BOXBEAMT01.csv", {"hourglass_share": None}, set()),
+        ("OpenRadioss__miniqa-AMS-boxbeam-reference-BOXBEAMT01.csv", {"hourglass_share": 0.0574625}, set()),
         ("OpenRadioss__miniqa-onefile_rad-reference-CRA2AV4T01", {}, {"hourglass", "part-hourglass"}),
     ],
 )

@@ -23,7 +23,7 @@ def test_each_mode_has_a_line_at_twice_its_rate_and_decay(seed: int, count: int)
         nearest = int(np.argmin(np.abs(lines.poles - (-2 * damping + 2j * rate))))
         assert lines.poles[nearest].imag == pytest.approx(2 * rate, rel=1e-3)
         assert abs(lines.weights[nearest]) == pytest.approx(amplitude**2 / 2, rel=0.02)
-    assert found.missed < 0.01
+    assert found.missed < 0.05
 
 
 def test_the_mean_over_a_block_of_a_wave_is_the_wave_with_a_gain() -> None:
