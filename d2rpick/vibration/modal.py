@@ -120,6 +120,14 @@ class Doubts(NamedTuple):
         return next((reason for holds, reason in reasons if holds), None)
 
 
+class ModeAtTd(NamedTuple):
+    """A mode of the structure: damped rate and damping [1/time], and vibration energy at td [energy]."""
+
+    omega: float
+    alpha: float
+    vibration_energy_td: float
+
+
 class _Course(NamedTuple):
     """Elastic energies at times so near to one another that it is a straight line between them [time], [energy]."""
 
@@ -195,6 +203,12 @@ class ModalVibration:
         count = f"{rates.size} mode{'s' * (rates.size != 1)}"
         span = f"omega {rates[0]:.4g}" if rates.size == 1 else f"omega {rates[0]:.4g} to {rates[-1]:.4g}"
         return f"modal, {count} identified from the lines of the {self.source}, {span}"
+
+    def modes_at(self, td: float) -> list[ModeAtTd]:
+        """Give the modes with their energy at ``td``, the slowest first."""
+        poles, energies = self.reading.modes.poles, self.reading.energies_of_modes(td)
+        rows = zip(poles.imag / 2, -poles.real, energies, strict=True)
+        return sorted(ModeAtTd(*map(float, row)) for row in rows)
 
     def comparable_since(self, td: float) -> float:
         """Earliest time whose deformation can be compared with that at ``td`` [time]."""
