@@ -366,7 +366,7 @@ def _oscillator(
 
 def _described_by_modes(history: History, td: float, settings: Settings, seen: Seen, fits: Fits) -> Span | None:
     """Find a window whose modes go on by themselves, if nothing but the energy can tell a flight."""
-    if seen.flight or seen.refusal or settings.after is not None or not settings.replay:
+    if seen.flight or seen.refusal or not settings.replay:
         return None
     from d2rpick.vibration.modal_span import find_described  # not above: most records need none
 

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 # Why no tr can be trusted where the vibration is known but cannot be made out at td.
 SUNK: Final = "the level at td is below the noise of the record"
-_LEFT_OVER = "the oscillator leaves more over than the swings of the energy do, which were counted"
+_LEFT_OVER = "the oscillator leaves more over than what is known otherwise"
 # A release without any vibration has this residual: a switch that leaves more keeps nothing [-].
 NOTHING_KEPT: Final = 1.0
 # Of the time up to td: a tr in this last part of it saves little, and is like td only because it is near.
@@ -346,7 +346,9 @@ def _best(whole: Vibration, evidence: Evidence) -> Vibration:
         return whole
     if not isinstance(modes, OscillatorEnergy):
         return _with_signs(whole, basis, model)
-    if model.unseen(modes.span.start, td) < modes.fit.hidden_share:
+    # what neighbouring states share is a further mode, of which modes tell more; in white noise one can only hide
+    is_further_mode = basis == "modal" and modes.fit.structure > 0
+    if is_further_mode or model.unseen(modes.span.start, td) < modes.fit.hidden_share:
         return _with_signs(Vibration("energy", SampledEnergy(modes.history, td), unknown=_LEFT_OVER), basis, model)
     return whole
 

@@ -80,6 +80,19 @@ def test_rates_damping_and_energies_of_the_modes_are_found(count: int, seed: int
         assert nearest.vibration_energy_td == pytest.approx(float(mode.vibration_energy(td)), rel=0.01)
 
 
+@pytest.mark.parametrize("states", [300, 1200, 60_000])
+def test_the_modes_are_known_up_to_both_ends_of_their_window(states: int) -> None:
+    """Fine records are brought to means over blocks, whose middles do not reach the ends."""
+    time = np.linspace(0, 6, states)
+    found = sure(identify_modal(time, energy_of(TWO, time)))
+    assert found.known_at(6.0)
+    assert found.comparable_since(6.0) == 0.0
+    assert not found.known_at(6.01)
+    tr, td = np.array([0.0, 1.7]), np.array([6.0, 6.0])
+    true, told = replayed_residual(TWO, tr, td), residuals_of(found, tr, td)
+    assert told == pytest.approx(true, abs=2e-3)
+
+
 def test_elastic_and_kinetic_energy_are_those_of_the_modes() -> None:
     found = sure(identify_modal(TIME, energy_of(TWO, TIME)))
     inside = TIME[50:-50:7]
@@ -141,9 +154,33 @@ def test_several_modes_are_chosen_by_and_replayed() -> None:
     rates = [mode.omega for mode in sure(situation.vibration.modal).modes_at(situation.td)]
     assert rates == pytest.approx([mode.omega for mode in TWO], rel=1e-5)
     assert {c.kind for c in answer.candidates} == {"match"}
-    expected = replayed_residual(TWO, np.array([c.tr for c in answer.candidates]), situation.td)
+    tr = np.array([c.tr for c in answer.candidates])
+    expected = replayed_residual(TWO, tr, situation.td)
     assert [c.residual for c in answer.candidates] == pytest.approx(expected.tolist(), abs=0.03)
     assert all(c.rigid_time > 0 for c in answer.candidates)
+
+
+@pytest.mark.parametrize("share", [0.003, 0.01])
+def test_modes_decide_where_an_oscillator_leaves_a_further_mode_over(share: float) -> None:
+    """The oscillator alone stated a residual of zero at any peak of the energy, while the other mode stood opposed."""
+    main, root = Mode(2 * np.pi, 0.2, 0.3, 0.9, 0.0), float(np.sqrt(share))
+    modes = [main, Mode(2 * np.pi * 2.3, 0.2, 0.5 * root, 0.8 * root, 0.0)]
+    history = table(TIME, energy_of(modes, TIME))
+    situation = examine(history, 5.3, Settings(after=0.0))
+    assert sure(situation.evidence.fit).describes_record
+    assert situation.basis == "modal"
+    answer = suggest(history, 5.3, Settings(after=0.0))
+    for candidate in answer.candidates:
+        true = float(replayed_residual(modes, np.array([candidate.tr]), 5.3)[0])
+        assert sure(candidate.residual_low) - 0.01 <= true <= sure(candidate.residual_high) + 0.01
+
+
+def test_given_the_end_of_the_load_modes_tell_the_end_of_the_flight() -> None:
+    """After it the energy jumps, as in a landing: modes of the flight alone describe it."""
+    energy = energy_of(TWO, TIME) + 5.0 * np.maximum(TIME - 5.0, 0.0)
+    situation = examine(table(TIME, energy), 4.0, Settings(after=0.2))
+    assert situation.basis == "modal"
+    assert sure(situation.flight.end) == pytest.approx(5.0, abs=0.05)
 
 
 @pytest.mark.slow
