@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from hypothesis import strategies as st
 
 from d2rpick.histories.history import Balance, Given, History, Momenta, Record, Samples, rows_of
-from d2rpick.vibration.modes import Mode, Modes
+from d2rpick.histories.samples import find_crossings
+from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.oscillator import from_mode, lacking_energy
 from tests import paper
 
@@ -59,14 +61,28 @@ def noisy(values: Samples, share: float, seed: int) -> Samples:
     return values + share * float(np.max(values)) * noise
 
 
-def replayed_residual(vibration: Mode | Modes, tr: Samples, td: Samples | float) -> Samples:
+def energy_of(modes: Sequence[Mode], time: Samples) -> Samples:
+    """Internal energy that modes make together, each on its own, of the shape of ``time``."""
+    return np.asarray(sum(mode.energy(time) for mode in modes))
+
+
+def level_crossings(modes: Sequence[Mode], td: float, start: float) -> Samples:
+    """Times in (start, td) where the energy of these modes passes its level at ``td``, shape (n,)."""
+    per_period = 2000  # of the fastest mode: a straight line between such times is exact to 1e-7 of a period
+    fastest = max(mode.omega for mode in modes)
+    time = np.linspace(start, td, int((td - start) * fastest / (2 * np.pi) * per_period) + 2)
+    crossings = find_crossings(time, energy_of(modes, time), float(energy_of(modes, np.array([td]))[0]))[0]
+    return np.asarray(crossings[crossings < td])
+
+
+def replayed_residual(modes: Mode | Sequence[Mode], tr: Samples, td: Samples | float) -> Samples:
     """Replay each tr of shape (n,) up to ``td`` and give the residual there, of all modes together [-].
 
     ``td`` is one for all, or one for each.  Energy norm of what the switched run lacks at td, over that of the
     reference vibration.
     """
     lack, whole = np.zeros(tr.shape), np.zeros(tr.shape)
-    for mode in vibration.modes:
+    for mode in [modes] if isinstance(modes, Mode) else modes:
         oscillator, at_td = from_mode(mode, td)
         at_tr = oscillator.free(at_td, tr - td)  # the closed form runs backwards as well
         lack += lacking_energy(oscillator, at_td, oscillator.rigid(at_tr, td - tr))

@@ -21,9 +21,9 @@ from d2rpick.flight.flight import Flight, Seen, seen_flight
 from d2rpick.flight.internal_energy import largest, quiet_time, round_off
 from d2rpick.histories.digits import sum_as_read
 from d2rpick.vibration import find_models
-from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD, Identification, identify, identify_several, judge_given
+from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD, Identification, identify, judge_given
 from d2rpick.vibration.model import Evidence, Vibration, describing, doubtful, energy_at, model_at
-from d2rpick.vibration.span import Fits, Span, described_span, resolved, span_of
+from d2rpick.vibration.span import Fits, Span, described_span, hidden_share, span_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -137,7 +137,7 @@ class Situation:
 
     @property
     def basis(self) -> str:
-        """What a choice rests on: "parts", "oscillator" (one or several of them), "modal", "swings" or "energy"."""
+        """What a choice rests on: "parts", "oscillator", "modal", "swings" or "energy"."""
         return self.vibration.basis
 
     @property
@@ -330,7 +330,8 @@ def _oscillator(
     if settings.fit_window:
         history.check(*settings.fit_window, argument="fit_window")
         fit = identify(*history.between(*settings.fit_window))
-        return _resolved(history, fit, fits), span_of(history, td, fit, bounds) if fit.describes_record else None
+        span = span_of(history, td, fit, bounds) if fit.describes_record else None
+        return _with_hidden_share(history, fit, fits), span
     if settings.oscillator:
         given = fits.remembered("given", partial(judge_given, settings.oscillator))
         span, fit = described_span(history, td, bounds, given, whole=whole, memory=fits)
@@ -342,13 +343,7 @@ def _oscillator(
     one = fits.remembered("one", partial(identify, memory=fits))
     fitter = partial(one, quick=True) if quick else one
     span, fit = described_span(history, td, bounds, fitter, whole=whole, memory=fits)
-    if span is None:
-        fitter = partial(
-            fits.remembered("several", partial(identify_several, memory=fits)), quick=True
-        )  # nobody asks why it is refused
-        span, several = described_span(history, td, bounds, fitter, whole=whole, memory=fits)
-        fit = several if span else fit
-    fit = _resolved(history, fit, fits)
+    fit = _with_hidden_share(history, fit, fits)
     if span and span.end - span.start >= _MOST_OF_RECORD * (bounds.end - bounds.start):
         known.append((fit, span))
     return fit, span
@@ -356,7 +351,7 @@ def _oscillator(
 
 def _described_by_modes(history: History, td: float, settings: Settings, seen: Seen, fits: Fits) -> Described | None:
     """Find a window whose modes go on by themselves, if nothing but the energy can tell a flight."""
-    if seen.flight or seen.refusal or settings.after is not None or not settings.replay:
+    if seen.flight or seen.refusal or not settings.replay:
         return None
     from d2rpick.vibration.modal_span import find_described  # not above: most records need none
 
@@ -366,12 +361,13 @@ def _described_by_modes(history: History, td: float, settings: Settings, seen: S
     return Described(*found.span, found.vibration.vibration_energy) if found else None
 
 
-def _resolved(history: History, fit: Identification, fits: Fits) -> Identification:
-    """Look for a small second mode in what an accepted oscillator leaves over."""
-    if not fit.describes_record:
+def _with_hidden_share(history: History, fit: Identification, fits: Fits) -> Identification:
+    """Add to an accepted fit what a further mode may hold in what the oscillator leaves over."""
+    if not fit.describes_record or fit.mode is None:
         return fit
-    window = history.between(fit.start, fit.end)
-    return fits.once(("resolved", fit.start, fit.end, fit.rms), lambda: resolved(*window, fit))
+    window, mode = history.between(fit.start, fit.end), fit.mode
+    hidden = fits.once(("hidden", fit.start, fit.end, fit.rms), lambda: hidden_share(*window, mode))
+    return fit._replace(hidden_share=max(fit.hidden_share, hidden))
 
 
 def _settled(history: History, fit: Identification | None, span: Span | None) -> Described | None:

@@ -110,30 +110,24 @@ FLIGHT: Final = row(
 
 
 def _oscillator(situation: Situation) -> dict[str, Any] | None:
-    """Give the one oscillator that was fitted, or None; where several describe the record, that one does not."""
+    """Give the oscillator that was fitted, or None if none was looked for."""
     fit = situation.evidence.fit
     if fit is None:
         return None
-    several = fit.mode is not None and len(fit.mode.modes) > 1
     numbers = ("omega", "alpha", "energy_plastic", "preload")
     return {
-        **{name: getattr(fit.mode, name) if fit.mode and not several else None for name in numbers},
+        **{name: getattr(fit.mode, name) if fit.mode else None for name in numbers},
         "misfit": fit.misfit,
         "source": "given" if situation.settings.oscillator else "identified",
-        "describes_record": fit.describes_record and not several,
-        "reason": "several modes describe the record" if several else fit.reason,
+        "describes_record": fit.describes_record,
+        "reason": fit.reason,
     }
 
 
 def _modes(situation: Situation) -> list[dict[str, float]] | None:
-    """Give the modes whose sum describes the record, or None where one or none does."""
-    modes = situation.vibration.whole.mode.modes if situation.vibration.whole.mode else ()
-    if len(modes) < 2:
-        return None
-    return [
-        {"omega": one.omega, "alpha": one.alpha, "vibration_energy_td": float(one.vibration_energy(situation.td))}
-        for one in modes
-    ]
+    """Give the modes that the choice rests on, or None if it does not rest on the lines of the energy."""
+    modal = situation.vibration.modal
+    return [mode._asdict() for mode in modal.modes_at(situation.td)] if modal else None
 
 
 OSCILLATOR: Final = row(
@@ -156,7 +150,7 @@ MECHANICS: Final = row(
     Field("flight", FLIGHT, "window of free flight"),
     Field("oscillator", maybe(OSCILLATOR), get=_oscillator),
     Field("modes", maybe(many(row(*(Field(key, "number") for key in ("omega", "alpha", "vibration_energy_td"))))),
-          "two or three whose energies add up to the record; null where one oscillator or none describes it", _modes),
+          "those that basis modal was identified from, by their rates; null on any other basis", _modes),
     Field("unsigned_parts", maybe(many(row(Field("name", "text"), Field("reason", "text")))),
           "parts whose deformation has no sign; null where energies of single parts are not known",
           lambda now: now.evidence.parts and now.evidence.parts.unsigned),

@@ -66,16 +66,13 @@ def _basis(situation: Situation) -> str:
     if not (mode and fit):
         kinetic = "; kinetic energy from the modes of each part" if vibration.signed else ""
         return f"{told}{kinetic}" if told else _level_alone(situation)
-    rates = ", ".join(f"{one.omega:.6g}" for one in mode.modes)
-    facts = [f"omega {rates}", f"alpha {mode.alpha:.4g}"]
+    facts = [f"omega {mode.omega:.6g}", f"alpha {mode.alpha:.4g}"]
     offsets = {"energy_plastic": mode.energy_plastic, "preload": mode.preload}
     facts += [f"{name} {value:.4g}" for name, value in offsets.items() if value]
     facts.append("misfit below 1e-9" if fit.misfit is None or fit.misfit < 1e-9 else f"misfit {fit.misfit:.1e}")
     source = "given" if situation.settings.oscillator else "identified"
-    count = len(mode.modes)
-    oscillator = f"oscillator, {source}" if count == 1 else f"oscillator of {count} modes, {source}"
     front = f"{told}; " if told else ""
-    return f"{front}{oscillator}: {', '.join(facts)}; tr and energies are refined on it"
+    return f"{front}oscillator, {source}: {', '.join(facts)}; tr and energies are refined on it"
 
 
 def _level_alone(situation: Situation) -> str:

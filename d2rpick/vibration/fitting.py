@@ -1,25 +1,23 @@
-"""Fit the energy of one to three vibration modes to samples by least squares, without being given a first guess.
+"""Fit the energy of one vibration mode to samples by least squares, without being given a first guess.
 
 Everything here is scaled: s in [0, 1] over the record, energies in units of the record's range.  A parameter
 vector is (omega, alpha, cosine, sine, energy_plastic, preload) of
 
-    E(s) = energy_plastic + q**2,  q = preload + exp(-alpha s/2) (cosine cos(omega s) + sine sin(omega s)),
+    E(s) = energy_plastic + q**2,  q = preload + exp(-alpha s/2) (cosine cos(omega s) + sine sin(omega s)).
 
-or that of `Modes.of`: alpha and, for each mode, omega, cosine and sine.  What a fit leaves over may be white noise;
-structure that neighbouring samples share must be small.
+What a fit leaves over may be white noise; structure that neighbouring samples share must be small.
 """
 
 from __future__ import annotations
 
 from functools import partial
-from itertools import combinations
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.samples import integral, median
-from d2rpick.vibration.modes import BLOCK, energy_and_jacobian, sum_and_jacobian
+from d2rpick.histories.samples import integral
+from d2rpick.vibration.modes import BLOCK, energy_and_jacobian
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -282,49 +280,6 @@ def covariance(normal: Samples, rest: Samples) -> Samples:
     scale = norm * norm[:, None]
     variance = float(rest @ rest) / (rest.size - norm.size)
     return np.asarray(variance * np.linalg.pinv(normal / scale, hermitian=True) / scale)
-
-
-# Least difference of two rates over the record to start from [rad]: below a quarter of a beat two modes act as one.
-_LEAST_APART: Final = np.pi / 4
-# Of the variance: rates that leave more of it unexplained are none of the record's, and refining them is no use.
-_HOPELESS: Final = 0.5
-
-
-def fit_several(pencil: Pencil, s: Samples, e: Samples, count: int, worst: float = np.inf) -> Samples | None:
-    """Return the least-squares parameters of ``count`` modes; None where E, of this ``pencil``, shows fewer rates.
-
-    Each mode makes exp(-alpha s) times a constant and a vibration at twice its rate, so the constants add up and
-    3 count exponentials leave room for what is none.  For known rates E is linear in the rest, which ranks the
-    rates and gives the parameters.  None also where a few of the samples refuse the fit, as for one mode.
-    """
-    few = _few(s, e)
-    best = refine(_starts_of_several(pencil, count, *few), sum_and_jacobian, *few, worst)
-    return fit_all(best, sum_and_jacobian, s, e, worst, slice(1, None, 3))
-
-
-def _starts_of_several(pencil: Pencil, count: int, s: Samples, e: Samples) -> list[Samples]:
-    """Return the best parameter vectors to start from, for a few of the samples."""
-    poles = pencil.rates((3 * count,))
-    hopeless = _HOPELESS * float(np.sum((e - np.mean(e)) ** 2))
-    omega, alpha = poles.imag / 2, np.maximum(-poles.real, -1.0)  # growth is refused anyway
-    found = []
-    for chosen in combinations(range(poles.size), count):
-        members = list(chosen)
-        if np.diff(np.sort(omega[members])).min() >= _LEAST_APART:
-            found.append(linear_fit(omega[members], float(median(alpha[members])), s, e))
-    return [start for misfit, start in sorted(found, key=lambda one: one[0])[:STARTS] if misfit < hopeless]
-
-
-def linear_fit(omega: Samples, alpha: float, s: Samples, e: Samples) -> tuple[float, Samples]:
-    """Fit the amplitudes for known rates; return the sum of squares and the parameters."""
-    angle = 2 * omega[:, np.newaxis] * s
-    basis = np.exp(-alpha * s) * np.concatenate([np.ones((1, s.size)), np.cos(angle), np.sin(angle)])
-    linear = np.linalg.lstsq(basis.T, e, rcond=None)[0]
-    misfit = float(np.sum((e - linear @ basis) ** 2))
-    cosine, sine = np.split(linear[1:], 2)
-    phasor = np.sqrt(2 * (cosine + 1j * sine))  # (cosine + i sine)**2 / 2 of each mode
-    table = np.stack([omega, phasor.real, phasor.imag], axis=1)
-    return misfit, np.array([alpha, *table.ravel()])
 
 
 MAX_STRUCTURE: Final = 0.02  # of std(E): thirty times what one real solver leaves with one mode

@@ -11,7 +11,7 @@ from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.history import Memory
 from d2rpick.vibration import fitting
 from d2rpick.vibration.fitting import MAX_MISFIT
-from d2rpick.vibration.modes import Mode, Modes, energy_and_jacobian, sum_and_jacobian
+from d2rpick.vibration.modes import Mode, energy_and_jacobian
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -24,7 +24,6 @@ HOPELESS: Final = 0.5**2  # of the variance, unexplained on 400 samples: six sta
 MAX_LOCAL_STRUCTURE: Final = 0.1  # of the fit's energy at that time: a second mode that outlives the first
 MIN_SAMPLES: Final = 24  # four for each parameter of the richest model
 MIN_SAMPLES_PER_PERIOD: Final = 10  # of the energy, pi / omega: below, an aliased fast mode passes for a slow one
-MIN_SAMPLES_BESIDE: Final = 4  # of a mode beside one that is certain: below, cells would hide most of it
 MAX_GROWTH: Final = 0.3  # -alpha x record length: a free vibration only decays, noise hides no more than this
 MIN_PLASTIC: Final = -0.05  # of the energy range: plastic work is positive but for the scatter of its fit
 MAX_OF_SPRING: Final = 0.1  # misfit that a spring which stiffens leaves to a vibration through zero
@@ -37,21 +36,12 @@ _FLOOR: Final = 1e-4  # of the highest vibration energy
 _MODELS: Final = ((fitting.VIBRATION, 1.25), (fitting.WITH_PLASTIC, 1.5), (fitting.WITH_PRELOAD, 2.0))
 
 
-# Modes of one sum: with more of them almost any record could be described.  Two slowest periods tell their energies
-# apart, as they do a preload from a vibration.
-_SEVERAL: Final = (2, 3)
-_PERIODS_OF_SEVERAL: Final = 2.0
-# Least difference of two rates over the record [rad], half a beat of q: two modes nearer than that and out of step
-# make up any decay.
-_APART: Final = np.pi / 2
-
-
 class Identification(NamedTuple):
     """The mode that was fitted to an energy history, and whether it describes it.
 
     Parameters
     ----------
-    mode : Mode, Modes or None
+    mode : Mode or None
         Least-squares fit, also when it was refused; None when nothing could be fitted.
     describes_record : bool
         True when the fit was accepted.
@@ -77,7 +67,7 @@ class Identification(NamedTuple):
         Whether it would be one free vibration, if it followed them.
     """
 
-    mode: Mode | Modes | None
+    mode: Mode | None
     describes_record: bool
     reason: str | None
     misfit: float | None
@@ -149,46 +139,8 @@ def identify(time: Samples, energy: Samples, *, quick: bool = False, memory: Mem
     if quick and few(fitting.WITH_PRELOAD) is None:  # others leave more than the richest model
         return _out_of_reach(time)
     fits = ((fitting.fit(few(size), record.s, record.e, size, worst), size, periods) for size, periods in _MODELS)
-    attempts = ((_one(found, size, record), most) for found, size, most in fits if found is not None)
+    attempts = ((_attempt(found, size, record), most) for found, size, most in fits if found is not None)
     return _first_to_follow(attempts, record)
-
-
-def identify_several(
-    time: Samples, energy: Samples, *, quick: bool = False, memory: Memory | None = None
-) -> Identification:
-    """Fit two vibrations of one damping to E(t), else three, and judge the fit.
-
-    Parameters and result as for ``identify``; for records that one vibration does not describe.
-
-    Notes
-    -----
-    With damping proportional to mass the energies of modes add up (see `Modes`).  That holds for the energy of all
-    parts together, not for a part's own, in which the modes mix; such a record is refused like any other that leaves
-    a systematic rest.
-
-    Examples
-    --------
-    >>> t = np.linspace(0.0, 6.0, 401)
-    >>> found = identify_several(t, np.sin(5.0 * t) ** 2 + 0.5 * np.cos(8.0 * t) ** 2)
-    >>> found.describes_record, [f"{mode.omega:.6f}" for mode in found.mode.modes]
-    (True, ['5.000000', '8.000000'])
-    """
-    if lacking := _lacking(time, energy):
-        return lacking
-    record = _Record.scaled(time, energy)
-    pencil, worst = record.pencil(memory), HOPELESS if quick else np.inf
-    fits = (fitting.fit_several(pencil, record.s, record.e, count, worst) for count in _SEVERAL)
-    return _first_to_follow(((_sum(found, record), _PERIODS_OF_SEVERAL) for found in fits if found is not None), record)
-
-
-def identify_beside(time: Samples, energy: Samples, mode: Mode, rates: Samples) -> Identification:
-    """Fit a second mode beside ``mode``, from each of ``rates`` [1/time], and judge the best fit of both."""
-    record = _Record.scaled(time, energy)
-    s, e, span = record.s, record.e, record.end - record.start
-    starts = (fitting.linear_fit(span * np.array([mode.omega, rate]), span * mode.alpha, s, e)[1] for rate in rates)
-    ends = [fitting.minimise(start, sum_and_jacobian, s, e) for start in starts]
-    best = _sum(min(ends, key=lambda end: end[1])[0], record)
-    return _judged(best, _PERIODS_OF_SEVERAL, record, MIN_SAMPLES_BESIDE)
 
 
 def _first_to_follow(attempts: Iterable[tuple[_Attempt, float]], record: _Record) -> Identification:
@@ -213,7 +165,7 @@ def _through_zero(found: Identification, simple: list[Identification]) -> Identi
     residuals are twice as large, which counts like a hidden mode.
     """
     mode, near = found.mode, [one for one in simple if one.misfit is not None and one.misfit < MAX_OF_SPRING]
-    if not near or not isinstance(mode, Mode) or mode.preload**2 <= float(mode.vibration_energy(found.start)):
+    if not near or mode is None or mode.preload**2 <= float(mode.vibration_energy(found.start)):
         return found
     best = min(near, key=lambda one: one.rms)
     return best._replace(describes_record=True, follows=True, reason=None, hidden_share=_OF_A_PRELOAD)
@@ -238,7 +190,7 @@ def judge_given(mode: Mode, time: Samples, energy: Samples, *, quick: bool = Fal
     cosine = mode.deformation(start) - mode.preload
     sine = (mode.velocity(start) + mode.alpha / 2 * cosine) / mode.omega
     parameters = np.array([mode.omega, mode.alpha, cosine, sine, mode.energy_plastic, mode.preload])
-    held = _judged(_one(parameters / record.units, fitting.WITH_PRELOAD, record), 0.0, record)
+    held = _judged(_attempt(parameters / record.units, fitting.WITH_PRELOAD, record), 0.0, record)
     reason = None if held.follows else held.reason
     return held._replace(mode=mode, describes_record=held.follows, reason=reason, covariance=np.zeros((6, 6)))
 
@@ -281,37 +233,24 @@ def _lacking(time: Samples, energy: Samples) -> Identification | None:
 class _Attempt(NamedTuple):
     """A fit: scaled and in units of the record, with scaled energies (n,) and J J^T (p, p) of their derivatives."""
 
-    name: str
-    scaled: Mode | Modes
-    mode: Mode | Modes
+    scaled: Mode
+    mode: Mode
     energy: Samples
     normal: Samples
     units: Samples
 
 
-def _one(parameters: Samples, size: int, record: _Record) -> _Attempt:
-    """Fit of one mode with its first ``size`` parameters free."""
+def _attempt(parameters: Samples, size: int, record: _Record) -> _Attempt:
+    """Give the fit of one mode with its first ``size`` parameters free."""
     fitted, normal = fitting.evaluated(parameters, partial(energy_and_jacobian, size=size), record.s)
     scaled, mode = _mode(parameters, 0.0), _mode(parameters * record.units, record.start)
-    return _Attempt("one oscillator", scaled, mode, fitted, normal, record.units[:size])
+    return _Attempt(scaled, mode, fitted, normal, record.units[:size])
 
 
-def _sum(parameters: Samples, record: _Record) -> _Attempt:
-    """Fit of several modes."""
-    fitted, normal = fitting.evaluated(parameters, sum_and_jacobian, record.s)
-    rate, root = record.units[1], record.units[2]
-    count = parameters.size // 3
-    units = np.array([rate, *(rate, root, root) * count])
-    scaled, modes = Modes.of(parameters, 0.0), Modes.of(parameters * units, record.start)
-    return _Attempt(f"a sum of {count} modes", scaled, modes, fitted, normal, units)
-
-
-def _judged(
-    attempt: _Attempt, least_periods: float, record: _Record, density: float = MIN_SAMPLES_PER_PERIOD
-) -> Identification:
-    """Return a fit with its verdict; ``density`` is the least number of samples per period."""
+def _judged(attempt: _Attempt, least_periods: float, record: _Record) -> Identification:
+    """Return a fit with its verdict."""
     s, e = record.s, record.e
-    found_density = samples_per_period(s, attempt.scaled)  # first: it takes as much memory as all that follows
+    density = samples_per_period(s, attempt.scaled)  # first: it takes as much memory as all that follows
     rest = e - attempt.energy
     rms, spread, structure = float(np.sqrt(np.mean(rest**2))), float(np.std(e)), fitting.structure_of(rest)
     local = attempt.scaled.vibration_energy(s)
@@ -319,8 +258,8 @@ def _judged(
     # where noise exceeds the vibration, a rest says nothing about a further mode
     np.maximum(local, max(rms, _FLOOR * np.max(local)), out=local)
     local_structure = fitting.structure_of(np.divide(rest, local, out=local))
-    loose = _loose(attempt.name, rms / spread, structure / spread, local_structure)
-    wrong = _implausible(attempt.scaled, found_density, density, least_periods, record.end - record.start)
+    loose = _loose(rms / spread, structure / spread, local_structure)
+    wrong = _implausible(attempt.scaled, density, least_periods, record.end - record.start)
     reason = loose or wrong
     return Identification(
         mode=attempt.mode,
@@ -338,20 +277,20 @@ def _judged(
     )
 
 
-def _loose(name: str, misfit: float, structure: float, local_structure: float) -> str | None:
+def _loose(misfit: float, structure: float, local_structure: float) -> str | None:
     """Say how the fit fails to follow the samples."""
     if misfit > MAX_MISFIT:
-        return f"{name} misses the energy by {misfit:.0%} of its standard deviation, more than {MAX_MISFIT:.0%}"
+        return f"one oscillator misses the energy by {misfit:.0%} of its standard deviation, more than {MAX_MISFIT:.0%}"
     if structure > fitting.MAX_STRUCTURE:
-        found = f"{name} deviates systematically by {structure:.2g} of the standard deviation of the energy"
+        found = f"one oscillator deviates systematically by {structure:.2g} of the standard deviation of the energy"
         return f"{found}, more than {fitting.MAX_STRUCTURE}"
     if local_structure > MAX_LOCAL_STRUCTURE:
-        found = f"{name} deviates systematically by {local_structure:.2g} of the vibration energy at the time"
+        found = f"one oscillator deviates systematically by {local_structure:.2g} of the vibration energy at the time"
         return f"{found}, more than {MAX_LOCAL_STRUCTURE}"
     return None
 
 
-def samples_per_period(time: Samples, mode: Mode | Modes) -> float:
+def samples_per_period(time: Samples, mode: Mode) -> float:
     """Return the number of samples per energy period of the fastest mode, in four digits.
 
     The energy has two periods per vibration period.  A record is often written with a round number of states per
@@ -359,29 +298,25 @@ def samples_per_period(time: Samples, mode: Mode | Modes) -> float:
     """
     # the interval that a moment of the record lies in, on average: gaps count by their length
     interval = float(np.sum(np.diff(time) ** 2)) / float(time[-1] - time[0])
-    return float(f"{np.pi / mode.fastest / interval:.4g}")
+    return float(f"{np.pi / mode.omega / interval:.4g}")
 
 
-def _implausible(
-    mode: Mode | Modes, density: float, least_density: float, least_periods: float, span: float
-) -> str | None:
+def _implausible(mode: Mode, density: float, least_periods: float, span: float) -> str | None:
     """Say why a scaled fit that follows the samples is still no evidence of one free vibration."""
     periods = mode.omega / (2 * np.pi)
     if periods < least_periods:
         found = f"the record shows {periods:.3g} vibration periods"
         return f"{found}, fewer than the {least_periods} needed to tell a vibration from a drift"
-    if mode.apart < _APART:
-        return "two of the modes have almost the same rate: the record is too short to separate them"
     if mode.alpha < -MAX_GROWTH:
         found = f"the vibration grows, alpha times the record's length is {mode.alpha:.2g}, below {-MAX_GROWTH}"
         return f"{found}: something drives it"
     if mode.energy_plastic < MIN_PLASTIC:
         share = mode.energy_plastic
         return f"the plastic energy would be {share:.2g} of the energy's range, below {MIN_PLASTIC}"
-    if density < least_density:
+    if density < MIN_SAMPLES_PER_PERIOD:
         # a tenth finer than the limit, so that rounding to two digits stays on its safe side
-        finer = np.pi * span / mode.fastest / (1.1 * least_density)
-        found = f"the energy has {density:.2f} samples per period, fewer than {least_density}"
+        finer = np.pi * span / mode.omega / (1.1 * MIN_SAMPLES_PER_PERIOD)
+        found = f"the energy has {density:.2f} samples per period, fewer than {MIN_SAMPLES_PER_PERIOD}"
         return f"{found}, and this mode may be aliased: write the output at intervals of {finer:.2g} or less"
     return None
 

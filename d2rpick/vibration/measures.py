@@ -258,8 +258,10 @@ def vertices(time: Samples, values: Samples, at: NDArray[np.intp]) -> tuple[Samp
     fall, rise = (values[at] - values[at - 1]) / before, (values[at + 1] - values[at]) / after
     bend = (rise - fall) / (before + after)
     slope = (fall * after + rise * before) / (before + after)
-    step = np.divide(-slope, 2 * bend, out=np.zeros(at.shape), where=bend != 0)
-    return time[at] + step, values[at] + step * slope / 2
+    # beside a value without bound a sample is its own vertex, as where nothing bends
+    bent = np.isfinite(bend) & (bend != 0)
+    step = np.divide(-slope, 2 * bend, out=np.zeros(at.shape), where=bent)
+    return time[at] + step, values[at] + np.multiply(step, slope / 2, out=np.zeros(at.shape), where=bent)
 
 
 class Profile(NamedTuple):

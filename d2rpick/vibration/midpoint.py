@@ -81,12 +81,22 @@ class Reading:
 
     def vibration_energy(self, t: Samples | float) -> Samples:
         """U = V + T, the elastic and kinetic energy of the vibration, of the shape of ``t`` [energy]."""
+        return np.maximum(self.level(t) + self._within_period.at(t), self.tiny)
+
+    @cached_property
+    def _within_period(self) -> Exponentials:
+        """How the vibration energy of each mode changes within a period, since damping takes none at standstills."""
         poles = self.modes.poles
         damping = -poles.real / np.abs(poles)
         # z (z cos 2 theta + sqrt(1 - z^2) sin 2 theta), as the real part of a weight on each line
         turned = damping * (damping - 1j * np.sqrt(1 - damping**2))
-        within_period = self.modes._replace(weights=2 * self.modes.weights * turned)
-        return np.maximum(self.level(t) + within_period.at(t), self.tiny)
+        return self.modes._replace(weights=2 * self.modes.weights * turned)
+
+    def energies_of_modes(self, t: float) -> Samples:
+        """Vibration energy of each mode at a time, shape (k,), not negative [energy]."""
+        decayed = self._peak_energies * np.abs(self.modes.waves(t))
+        within_period = self._within_period
+        return np.maximum(decayed + (within_period.waves(t) * within_period.weights).real, 0.0)
 
     def coherence(self, tr: Samples | float, td: Samples | float) -> Samples:
         """C, how far the modes are in step after td - tr, for pairs of times whose shapes go together [energy]."""

@@ -120,6 +120,14 @@ class Doubts(NamedTuple):
         return next((reason for holds, reason in reasons if holds), None)
 
 
+class ModeAtTd(NamedTuple):
+    """A mode of the structure: damped rate and damping [1/time], and vibration energy at td [energy]."""
+
+    omega: float
+    alpha: float
+    vibration_energy_td: float
+
+
 class _Course(NamedTuple):
     """Elastic energies at times so near to one another that it is a straight line between them [time], [energy]."""
 
@@ -195,6 +203,12 @@ class ModalVibration:
         count = f"{rates.size} mode{'s' * (rates.size != 1)}"
         span = f"omega {rates[0]:.4g}" if rates.size == 1 else f"omega {rates[0]:.4g} to {rates[-1]:.4g}"
         return f"modal, {count} identified from the lines of the {self.source}, {span}"
+
+    def modes_at(self, td: float) -> list[ModeAtTd]:
+        """Give the modes with their energy at ``td``, the slowest first."""
+        poles, energies = self.reading.modes.poles, self.reading.energies_of_modes(td)
+        rows = zip(poles.imag / 2, -poles.real, energies, strict=True)
+        return sorted(ModeAtTd(*map(float, row)) for row in rows)
 
     def comparable_since(self, td: float) -> float:
         """Earliest time whose deformation can be compared with that at ``td`` [time]."""
@@ -338,7 +352,10 @@ def identify_modal(time: Samples, energy: Samples, *, kinetic: bool = False) -> 
         return None
     if not prediction.spectrum.lines.poles.size:
         return None
-    return _read(grid, prediction.turned(), kinetic=True) if kinetic else _read(grid, prediction)
+    window = float(time[0]), float(time[-1])
+    if kinetic:
+        return _read(grid, prediction.turned(), window, kinetic=True)
+    return _read(grid, prediction, window)
 
 
 def confirm(internal: ModalVibration | None, kinetic: ModalVibration | None) -> ModalVibration | None:
@@ -350,8 +367,11 @@ def confirm(internal: ModalVibration | None, kinetic: ModalVibration | None) -> 
     return replace(internal, second=kinetic.reading)
 
 
-def _read(grid: Grid, prediction: Prediction, *, kinetic: bool = False) -> ModalVibration:
-    """Read the lines in the way that fits, and in others; of a ``kinetic`` energy the mean says nothing."""
+def _read(grid: Grid, prediction: Prediction, window: tuple[float, float], *, kinetic: bool = False) -> ModalVibration:
+    """Read the lines in the way that fits, and in others; of a ``kinetic`` energy the mean says nothing.
+
+    ``window`` is from the first state to the last, which means over the blocks of the grid do not reach [time].
+    """
     spectrum, tiny = prediction.spectrum, _TINY * prediction.swing
     noise, rest = spectrum.error, spectrum.rest
     scatter = noise * np.sqrt(2 / grid.time.size)
@@ -393,7 +413,7 @@ def _read(grid: Grid, prediction: Prediction, *, kinetic: bool = False) -> Modal
         doubts = doubts._replace(negative=0.0, drift=0.0, unstretched=0.0)
     slack = 0.02 + 2 * is_mode.size * scatter / mean
     return ModalVibration(
-        _close_times(reading, grid),
+        _close_times(reading, window, grid.time.size),
         reading,
         others,
         of_first_part,
@@ -412,12 +432,13 @@ def _without(lines: Exponentials, stretches: tuple[Stretch, ...]) -> Mask:
     return kept
 
 
-def _close_times(reading: Reading, grid: Grid) -> Samples:
-    """Times over the grid, close enough for a parabola through three of them to find a minimum [time]."""
+def _close_times(reading: Reading, window: tuple[float, float], fewest: int) -> Samples:
+    """Times over a window, close enough for a parabola through three of them to find a minimum [time]."""
     rates, sizes = reading.modes.poles.imag, np.abs(reading.modes.weights)
     notable = rates[sizes > _NOTABLE * sizes.max(initial=0.0)]
-    periods = grid.span * float(notable.max(initial=0.0)) / (2 * np.pi)
-    return np.linspace(grid.time[0], grid.time[-1], int(max(grid.time.size, _TIMES_PER_PERIOD * periods)) + 1)
+    start, end = window
+    periods = (end - start) * float(notable.max(initial=0.0)) / (2 * np.pi)
+    return np.linspace(start, end, int(max(fewest, _TIMES_PER_PERIOD * periods)) + 1)
 
 
 def _beyond_bounds(reading: Reading, grid: Grid) -> float:

@@ -20,10 +20,9 @@ from d2rpick.base.tuples import NamedTuple
 from d2rpick.vibration import MODELS, measures
 from d2rpick.vibration.fitting import MAX_MISFIT
 from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD, Identification, samples_per_period
-from d2rpick.vibration.measures import Profile
 from d2rpick.vibration.modes import Mode
-from d2rpick.vibration.moments import ModalEnergy, Moments, SampledEnergy, moments_of_mode
-from d2rpick.vibration.span import residual_bound
+from d2rpick.vibration.moments import Moments, OscillatorEnergy, SampledEnergy, moments_of_mode
+from d2rpick.vibration.span import SMALLEST, residual_bound
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -32,18 +31,14 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import History, Samples
     from d2rpick.vibration import SignedModel
-    from d2rpick.vibration.measures import Band, Columns, Deformation
+    from d2rpick.vibration.measures import Band, Columns, Deformation, Profile
     from d2rpick.vibration.modal import ModalVibration
     from d2rpick.vibration.part_signs import PartMatch, SignedParts
     from d2rpick.vibration.span import Span
 
 # Why no tr can be trusted where the vibration is known but cannot be made out at td.
 SUNK: Final = "the level at td is below the noise of the record"
-# Of the vibration energy: more of it in a further mode moves a residual by a quarter and more.
-_HIDDEN = 0.02
-_LEFT_OVER = "the oscillator leaves more over than the swings of the energy do, which were counted"
-# Of the fastest mode: what a parabola through three of them misses of a minimum is of the order of 1e-4 of a period.
-_POINTS_PER_PERIOD = 64
+_LEFT_OVER = "the oscillator leaves more over than what is known otherwise"
 # A release without any vibration has this residual: a switch that leaves more keeps nothing [-].
 NOTHING_KEPT: Final = 1.0
 # Of the time up to td: a tr in this last part of it saves little, and is like td only because it is near.
@@ -111,6 +106,11 @@ class Vibration:
         return self.parts if self.basis == "parts" else None
 
     @property
+    def modal(self) -> ModalVibration | None:
+        """The modes of the structure that are relied on; None where they are not."""
+        return cast("ModalVibration", self.compared.deformation) if self.basis == "modal" and self.compared else None
+
+    @property
     def reasons(self) -> str | None:
         """Say why no deformation with its sign is known, of single parts too; None where one is."""
         if self.compared or not self.parts:
@@ -163,7 +163,7 @@ class Vibration:
 
         Those before ``since`` [time] may be left out.
         """
-        if self.compared and isinstance(self.whole, ModalEnergy):
+        if self.compared and isinstance(self.whole, OscillatorEnergy):
             turns = self.whole.standstills()
             turns = turns[self.comparable(turns)]
             turns = turns[measures.lock_in_error(self.compared.deformation, turns, self.td) <= tolerance]
@@ -253,7 +253,7 @@ def moments_of(vibrations: Sequence[Vibration], tolerance: float, since: Sequenc
     for places in _alike(vibrations):
         first, times = vibrations[places[0]], [since[i] for i in places]
         if len(places) > 1:
-            seen = [one.whole for one in map(vibrations.__getitem__, places) if isinstance(one.whole, ModalEnergy)]
+            seen = [one.whole for one in map(vibrations.__getitem__, places) if isinstance(one.whole, OscillatorEnergy)]
             found |= zip(places, moments_of_mode(seen, tolerance, times), strict=True)
         else:
             found[places[0]] = first.moments(tolerance, *times)
@@ -283,7 +283,7 @@ def _alike(vibrations: Sequence[Vibration]) -> Iterable[list[int]]:
     groups: dict[object, list[int]] = {}
     for place, one in enumerate(vibrations):
         whole, single = one.whole, one.compared is not None and isinstance(one.compared.deformation, Mode)
-        key = (id(whole.fit), whole.span) if single and isinstance(whole, ModalEnergy) else place
+        key = (id(whole.fit), whole.span) if single and isinstance(whole, OscillatorEnergy) else place
         groups.setdefault(key, []).append(place)
     return groups.values()
 
@@ -344,9 +344,11 @@ def _best(whole: Vibration, evidence: Evidence) -> Vibration:
         return _with_signs(whole, basis, model) if whole.compared or model.known_at(td) else _sunk(whole)
     if whole.doubts or not doubtful(whole) or not model.known_at(td):
         return whole
-    if not isinstance(modes, ModalEnergy):
+    if not isinstance(modes, OscillatorEnergy):
         return _with_signs(whole, basis, model)
-    if model.unseen(modes.span.start, td) < modes.fit.hidden_share:
+    # what neighbouring states share is a further mode, of which modes tell more; in white noise one can only hide
+    is_further_mode = basis == "modal" and modes.fit.structure > 0
+    if is_further_mode or model.unseen(modes.span.start, td) < modes.fit.hidden_share:
         return _with_signs(Vibration("energy", SampledEnergy(modes.history, td), unknown=_LEFT_OVER), basis, model)
     return whole
 
@@ -373,7 +375,7 @@ def _sunk(whole: Vibration) -> Vibration:
 
 def doubtful(whole: Vibration) -> bool:
     """Whether no oscillator is known, or one that leaves so much over that its sign may be wrong."""
-    return not isinstance(whole.whole, ModalEnergy) or whole.whole.fit.hidden_share > _HIDDEN
+    return not isinstance(whole.whole, OscillatorEnergy) or whole.whole.fit.hidden_share > SMALLEST
 
 
 def energy_at(history: History, td: float, evidence: Evidence) -> Vibration:
@@ -386,29 +388,18 @@ def energy_at(history: History, td: float, evidence: Evidence) -> Vibration:
     if fit.reason:
         what = "the given oscillator does not describe" if evidence.given else "no single oscillator describes"
         return samples(unknown=f"{what} the record: {fit.reason}", doubts=(*prescribed, *_aliased(history, fit)))
-    if not isinstance(whole, ModalEnergy) or not whole.described(td):
+    if not isinstance(whole, OscillatorEnergy) or not whole.described(td):
         return samples(unknown="the oscillator does not describe the record at td", doubts=prescribed)
     if whole.sunk:
         return samples(unknown=whole.sunk, doubts=(SUNK, *prescribed))
-    times = _times_before(whole)
-    profile = None if times is None else partial(Profile.of, whole.mode, times)
-    compared = Compared(whole.mode, *whole.span, profile, partial(measures.band_up_to, partial(residual_bound, fit)))
+    compared = Compared(whole.mode, *whole.span, None, partial(measures.band_up_to, partial(residual_bound, fit)))
     return Vibration("oscillator", whole, compared, undescribed="not described by the oscillator")
 
 
-def _times_before(whole: ModalEnergy) -> Samples | None:
-    """Times in the span before td at which several modes are looked at."""
-    mode, start, td = whole.mode, whole.span.start, whole.td
-    if isinstance(mode, Mode) or td <= start:
-        return None
-    step = 2 * np.pi / mode.fastest / _POINTS_PER_PERIOD
-    return np.linspace(start, td, max(3, int(np.ceil((td - start) / step)) + 1))
-
-
 def describing(history: History, td: float, evidence: Evidence) -> SampledEnergy:
-    """Give the energy as it is known whatever it is worth at ``td``: of modes where they describe a window."""
+    """Give the energy as it is known whatever it is worth at ``td``: of an oscillator where it describes a window."""
     fit, span = evidence.fit, evidence.span
-    return ModalEnergy(history, td, fit, span) if fit and fit.mode and span else SampledEnergy(history, td)
+    return OscillatorEnergy(history, td, fit, span) if fit and fit.mode and span else SampledEnergy(history, td)
 
 
 def _aliased(history: History, fit: Identification) -> tuple[str, ...]:

@@ -1,11 +1,9 @@
-"""Closed forms of an internal energy that one vibration mode, or several, each on its own, store and give back."""
+"""Closed forms of an internal energy that one vibration mode stores and gives back."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
-from math import floor
-from typing import TYPE_CHECKING, ClassVar, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -77,17 +75,6 @@ class Mode(SignedAmplitudes):
     origin: float
     energy_plastic: float = 0.0
     preload: float = 0.0
-    apart: ClassVar = float("inf")  # least difference of the rates of two modes: there is no other [1/time]
-
-    @property
-    def modes(self) -> tuple[Mode, ...]:
-        """The modes behind the energy: this one."""
-        return (self,)
-
-    @property
-    def fastest(self) -> float:
-        """Rate of the fastest mode, the only one [1/time]."""
-        return self.omega
 
     @property
     def omega_0(self) -> float:
@@ -103,7 +90,7 @@ class Mode(SignedAmplitudes):
         return self._swing(t, *self._velocity_parts)
 
     def amplitudes(self, t: Samples | float) -> Samples:
-        """Signed deformations of all modes, of the shape of ``t`` with an axis of length one before it."""
+        """Signed deformation of the mode, of the shape of ``t`` with an axis of length one before it [sqrt(energy)]."""
         return self.deformation(t)[np.newaxis]
 
     def energy(self, t: Samples | float) -> Samples:
@@ -248,148 +235,3 @@ def energy_and_jacobian(parameters: Samples, s: Samples, size: int) -> tuple[Sam
     jacobian[4:5] = 1.0
     jacobian[5:] = twice
     return plastic + q * q, jacobian
-
-
-# Points per period of the fastest mode on which sign changes are looked for: an extremum of the energy lasts a quarter
-# of that period at least, but for shallow ones that are no use as switch times.
-_POINTS_PER_PERIOD: Final = 32
-_POINTS: Final = 2048  # at a time
-_OFF_THE_GRID: Final = 1e-4  # of them: modes that begin together stand still together, on points
-_ROUNDING: Final = 1e-6  # of a radian: where an end of a window is itself an extremum, one is found this near to it
-
-
-@dataclass(frozen=True, repr=False)
-class Modes(SignedAmplitudes):
-    r"""Two or more under-damped vibrations with one damping, and the internal energy they make together.
-
-    .. math:: E(t) = \sum_i q_i(t)^2, \quad q_i = e^{-\alpha s/2} (a_i \cos\omega_i s + b_i \sin\omega_i s)
-
-    With damping proportional to mass, alpha is the same for all modes, and their energies add up without cross
-    terms because their shapes are orthogonal in the stiffness.  Of each q_i the sign as a whole is not observable.
-
-    Notes
-    -----
-    Eqs. (1) and (4) of "Analysis of switched-rigid floating oscillator" (Shock and Vibration), written for each mode
-    of a chain of more than two masses.
-
-    Examples
-    --------
-    >>> two = Modes((Mode(np.pi, 0.0, 1.0, 0.0, 0.0), Mode(2 * np.pi, 0.0, 1.0, 0.0, 0.0)))
-    >>> float(two.energy(1.0)), float(two.vibration_energy(0.3))
-    (2.0, 2.0)
-    >>> [round(t, 6) for t in two.peaks(0.1, 1.9)]
-    [0.5, 1.0, 1.5]
-    """
-
-    modes: tuple[Mode, ...]
-    energy_plastic: ClassVar = 0.0  # no energy stays behind,
-    preload: ClassVar = 0.0  # and the modes vibrate about rest
-
-    @classmethod
-    def of(cls, parameters: Samples, origin: float) -> Modes:
-        """Modes from their alpha and, for each, omega, cosine and sine, in one row; by ascending rate."""
-        table = parameters[1:].reshape(-1, 3).tolist()
-        return cls(tuple(Mode(row[0], float(parameters[0]), row[1], row[2], origin) for row in sorted(table)))
-
-    @property
-    def omega(self) -> float:
-        """Rate of the slowest mode [1/time]."""
-        return min(mode.omega for mode in self.modes)
-
-    @property
-    def fastest(self) -> float:
-        """Rate of the fastest mode [1/time]."""
-        return max(mode.omega for mode in self.modes)
-
-    @property
-    def apart(self) -> float:
-        """Least difference of the rates of two modes [1/time]."""
-        return float(np.diff(sorted(mode.omega for mode in self.modes)).min())
-
-    @property
-    def alpha(self) -> float:
-        """Damping, proportional to mass [1/time]."""
-        return self.modes[0].alpha
-
-    def amplitudes(self, t: Samples | float) -> Samples:
-        """Signed deformations of all modes, of the shape of ``t`` with an axis for the modes before it."""
-        return np.stack([mode.deformation(t) for mode in self.modes])
-
-    def energy(self, t: Samples | float) -> Samples:
-        """E(t) [energy]."""
-        return np.asarray(sum(mode.energy(t) for mode in self.modes))
-
-    def kinetic_energy(self, t: Samples | float) -> Samples:
-        """Kinetic energy of the vibrations [energy]."""
-        return np.asarray(sum(mode.kinetic_energy(t) for mode in self.modes))
-
-    def vibration_energy(self, t: Samples | float) -> Samples:
-        """Energy of the vibrations, V = E + T [energy]."""
-        return np.asarray(sum(mode.vibration_energy(t) for mode in self.modes))
-
-    def energy_slopes(self, t: Samples | float) -> tuple[Samples, Samples]:
-        """E' [energy/time] and E'' [energy/time^2]."""
-        slopes = [mode.energy_slopes(t) for mode in self.modes]
-        return np.asarray(sum(first for first, _ in slopes)), np.asarray(sum(second for _, second in slopes))
-
-    def energy_gradient(self, t: Samples, size: int) -> Samples:
-        """Derivatives of E(t) by alpha and, for each mode, omega, cosine and sine, shape (size, n)."""
-        rows = [value for mode in self.modes for value in (mode.omega, mode.cosine, mode.sine)]
-        return sum_and_jacobian(np.array([self.alpha, *rows]), t - self.modes[0].origin)[1][:size]
-
-    def extrema(self, start: float, end: float) -> tuple[float, ...]:
-        """Find the times in (start, end), ascending, where the energy turns [time]."""
-        first, last = (floor((t - self.modes[0].origin) / _block_length(self) - _OFF_THE_GRID) for t in (start, end))
-        times = np.concatenate([np.zeros(0), *(_turns(self, block) for block in range(first, last + 1))])
-        return tuple(times[np.minimum(times - start, end - times) > _ROUNDING / self.fastest].tolist())
-
-    def peaks(self, start: float, end: float) -> tuple[float, ...]:
-        """Find the times in (start, end), ascending, of the local maxima of the energy [time]."""
-        times = np.array(self.extrema(start, end))
-        return tuple(times[self.energy_slopes(times)[1] < 0].tolist()) if times.size else ()
-
-    def level_crossings(self, td: float, start: float) -> tuple[float, ...]:
-        """Find the times in (start, td), ascending, where the energy passes its level at ``td`` [time]."""
-        level = self.energy(td)
-        edges = np.array([start, *self.extrema(start, td), td])  # in between the energy is monotone
-        return _roots(lambda t: self.energy(t) - level, lambda t: self.energy_slopes(t)[0], edges, but=td)
-
-
-def _block_length(modes: Modes) -> float:
-    return _POINTS * 2 * np.pi / modes.fastest / _POINTS_PER_PERIOD
-
-
-@lru_cache(maxsize=256)
-@np.errstate(over="ignore", invalid="ignore")  # long before its record a damped vibration was beyond all numbers
-def _turns(modes: Modes, block: int) -> tuple[float, ...]:
-    """Find the times where the energy turns in a block of so many points: every td asks for the same."""
-    grid = block + _OFF_THE_GRID + np.linspace(0.0, 1.0, _POINTS + 1)
-    edges = modes.modes[0].origin + grid * _block_length(modes)
-    return _roots(lambda t: modes.energy_slopes(t)[0], lambda t: modes.energy_slopes(t)[1], edges)
-
-
-def sum_and_jacobian(parameters: Samples, s: Samples) -> tuple[Samples, Samples]:
-    """Return E(s), shape (n,), and its derivatives by the parameters of `Modes.of` with its origin at 0, (p, n)."""
-    omega, cosine, sine = parameters[1:].reshape(-1, 3).T[..., np.newaxis]
-    angle, decay = omega * s, np.exp(-float(parameters[0]) / 2 * s)
-    cos, sin = decay * np.cos(angle), decay * np.sin(angle)
-    q = cosine * cos + sine * sin
-    twice = q + q
-    by_rate = twice * s
-    jacobian = np.empty((parameters.size, s.size))
-    np.sum(by_rate * q * -0.5, axis=0, out=jacobian[0])
-    jacobian[1::3] = by_rate * (sine * cos - cosine * sin)
-    jacobian[2::3] = twice * cos
-    jacobian[3::3] = twice * sin
-    return np.sum(q * q, axis=0), jacobian
-
-
-def _roots(
-    function: Callable[[Samples], Samples], slope: Callable[[Samples], Samples], edges: Samples, but: float = np.inf
-) -> tuple[float, ...]:
-    """Find where ``function`` changes its sign between neighbouring ``edges``; not at ``but`` itself."""
-    values = np.where(edges == but, 0.0, function(edges))
-    cells = np.flatnonzero(values[:-1] * values[1:] < 0)
-    side = np.sign(values[cells])
-    found = narrow(lambda t: side * function(t), edges[cells], edges[cells + 1], slope=lambda t: side * slope(t))
-    return tuple(found.at.tolist())

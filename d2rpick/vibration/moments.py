@@ -15,7 +15,6 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.histories.samples import find_crossings, find_turns
 from d2rpick.vibration import measures
-from d2rpick.vibration.modes import Mode
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import History, Precision, Samples
     from d2rpick.vibration.identify import Identification
-    from d2rpick.vibration.modes import Modes
+    from d2rpick.vibration.modes import Mode
     from d2rpick.vibration.span import Span
 
     Passages = tuple[Samples, NDArray[np.bool_]]
@@ -40,7 +39,7 @@ _ZERO = 1e-9
 class SampledEnergy:
     """The samples of a record seen from ``td``, linear between them."""
 
-    mode: Mode | Modes | None = None
+    mode: Mode | None = None
 
     def __init__(self, history: History, td: float) -> None:
         self.history, self.td = history, td
@@ -92,10 +91,10 @@ class SampledEnergy:
         return sampled_reach(self.history, times, self.td, self.energy(self.td))
 
 
-class ModalEnergy(SampledEnergy):
+class OscillatorEnergy(SampledEnergy):
     """The ``mode`` of a ``fit``, or several, that describes a record within ``span``, seen from a ``td`` in it."""
 
-    mode: Mode | Modes
+    mode: Mode
 
     def __init__(self, history: History, td: float, fit: Identification, span: Span) -> None:
         super().__init__(history, td)
@@ -132,7 +131,7 @@ class ModalEnergy(SampledEnergy):
     @property
     def before(self) -> float:
         """Just before the span: its first sample counts like any other [time]."""
-        return self.span.start - _ZERO / self.mode.fastest
+        return self.span.start - _ZERO / self.mode.omega
 
     def crossings(self, since: float) -> Passages:
         """Times of the crossings: of the samples before the span, exact ones within it, and which of them rise."""
@@ -149,7 +148,7 @@ class ModalEnergy(SampledEnergy):
 
     def standstills(self) -> Samples:
         """Times within the span, up to td itself, where the energy turns [time]."""
-        after = self.td - _ZERO / self.mode.fastest  # td may be an extremum itself
+        after = self.td - _ZERO / self.mode.omega  # td may be an extremum itself
         times = np.maximum(self.mode.extrema(self.before, after), self.span.start)
         return times[self.within(times)]
 
@@ -230,13 +229,12 @@ class Moments:
         return float(self.tr[place]), _KINDS[self.kind[place]], rising > 0 if rising else None
 
 
-def moments_of_mode(seen: Sequence[ModalEnergy], tolerance: float, since: Sequence[float]) -> list[Moments]:
+def moments_of_mode(seen: Sequence[OscillatorEnergy], tolerance: float, since: Sequence[float]) -> list[Moments]:
     """Give the moments of one mode in one window, ascending in time, for each td that it is ``seen`` from.
 
     Standstills count within the ``tolerance``; crossings before each of ``since`` [time] may be left out.
     """
     mode, td = seen[0].mode, np.array([one.td for one in seen])
-    assert isinstance(mode, Mode)
     place, times = mode.all_level_crossings(td, seen[0].before)
     times = np.maximum(times, seen[0].span.start)
     early = [one.crossings_before(first) for one, first in zip(seen, since, strict=True)]
@@ -300,7 +298,7 @@ def sampled_reach(history: History, times: Samples, td: float, level: float) -> 
     return np.minimum(reach(slope, bend, error), 2 * interval)
 
 
-def fitted_reach(history: History, fit: Identification, mode: Mode | Modes, times: Samples, td: float) -> Samples:
+def fitted_reach(history: History, fit: Identification, mode: Mode, times: Samples, td: float) -> Samples:
     """Distance to the true crossing where tr and the level come from the fitted oscillator.
 
     The energy error is that of the fitted curve at tr and at td: its standard deviation from the scatter of the
@@ -313,10 +311,10 @@ def fitted_reach(history: History, fit: Identification, mode: Mode | Modes, time
     distance = reach(np.abs(slope), np.abs(bend), error)
     # the fit, not the output interval, bounds how far a crossing can be off: it stays within a quarter of a period
     quanta = _half_quanta(history.time_precision, times) + history.time_precision.quantum(td) / 2
-    return np.minimum(distance, np.pi / 2 / mode.fastest) + _BETWEEN_SAMPLES * history.step + quanta
+    return np.minimum(distance, np.pi / 2 / mode.omega) + _BETWEEN_SAMPLES * history.step + quanta
 
 
-def _local_rest(fit: Identification, mode: Mode | Modes, at: Samples) -> Samples:
+def _local_rest(fit: Identification, mode: Mode, at: Samples) -> Samples:
     """Systematic rest of a fit near each time: its rms, and more where the vibration is above its own rms [energy]."""
     return np.asarray(fit.structure * np.maximum(1.0, mode.vibration_energy(at) / fit.vibration))
 

@@ -1,4 +1,4 @@
-"""The deformation of each part with its sign: what waves confirm, else modes of its own."""
+"""The deformation of each part with its sign: what waves confirm, else a mode of its own."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from d2rpick.base.caching import cached_property
-from d2rpick.histories.history import Memory
 from d2rpick.vibration import measures
 from d2rpick.vibration.amplitudes import SignedAmplitudes
-from d2rpick.vibration.identify import Identification, identify, identify_several
+from d2rpick.vibration.identify import Identification, identify
 from d2rpick.vibration.measures import Profile
-from d2rpick.vibration.span import SMALLEST, resolved
+from d2rpick.vibration.span import SMALLEST, hidden_share
 from d2rpick.vibration.swings import SOLVER_FLOOR
 from d2rpick.vibration.waves import PartMotion, all_zeros, followed
 
@@ -25,24 +24,19 @@ if TYPE_CHECKING:
 
     Places = NDArray[np.intp]
 
-# Modes of a part's own can imitate what crosses between modes in its energy: they must leave so much less.
+# A mode of a part's own can imitate what crosses between modes in its energy: it must leave so much less.
 _CLEARLY = 0.5
 
 
-def by_own_modes(time: Samples, energy: Samples, followed: PartMotion | None) -> PartMotion | None:
-    """Take the energy for a sum of those of modes that do not mix in the part, as those of two planes do not.
-
-    Else, or where they leave hardly less, ``followed`` is given.
-    """
-    memory = Memory()
-    fits = (fitter(time, energy, quick=True, memory=memory) for fitter in (identify, identify_several))
-    fit = next(filter(_purely_vibrates, fits), None)
-    if fit is None:
+def by_own_mode(time: Samples, energy: Samples, followed: PartMotion | None) -> PartMotion | None:
+    """Give a part the motion of one mode if that describes its energy and leaves clearly less than ``followed``."""
+    fit = identify(time, energy, quick=True)
+    if fit.mode is None or not _purely_vibrates(fit):
         return followed
-    fit = resolved(time, energy, fit)
-    if fit.mode is None or (followed and fit.hidden_share > _CLEARLY * followed.hidden):
+    hidden = max(fit.hidden_share, hidden_share(time, energy, fit.mode))
+    if followed and hidden > _CLEARLY * followed.hidden:
         return followed
-    return PartMotion(fit.mode, np.zeros(0), fit.hidden_share)
+    return PartMotion(fit.mode, np.zeros(0), hidden)
 
 
 def _purely_vibrates(fit: Identification) -> bool:
@@ -114,7 +108,7 @@ class SignedParts(SignedAmplitudes):
         for i, known in self._by_zeros(self._order, roots):
             motion = known if isinstance(known, PartMotion) else None
             if motion is None or motion.hidden > SMALLEST:
-                motion = by_own_modes(time, roots[i] ** 2, motion)
+                motion = by_own_mode(time, roots[i] ** 2, motion)
             self._main[i] = motion or known
             lost += 0.0 if motion else held[i]
             if lost > MOST_UNSIGNED * held.sum():
@@ -137,7 +131,7 @@ class SignedParts(SignedAmplitudes):
 
     @cached_property
     def _all(self) -> list[PartMotion | str]:
-        """All parts: where too much has no sign, no modes of their own are looked for in those that hold less."""
+        """All parts: where too much has no sign, no mode of their own is looked for in those that hold less."""
         found = {**self._main, **dict(self._by_zeros(self._order[len(self._main) :], self._roots()))}
         return [found[i] for i in sorted(found)]
 

@@ -12,15 +12,8 @@ from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.history import History, Memory, Samples
 from d2rpick.histories.samples import integral
 from d2rpick.vibration.fitting import cell_means
-from d2rpick.vibration.identify import (
-    MIN_SAMPLES_BESIDE,
-    MIN_SAMPLES_PER_PERIOD,
-    Identification,
-    identify,
-    identify_beside,
-    samples_per_period,
-)
-from d2rpick.vibration.modes import BLOCK, Mode, Modes
+from d2rpick.vibration.identify import Identification, identify
+from d2rpick.vibration.modes import BLOCK, Mode
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -35,7 +28,7 @@ if TYPE_CHECKING:
     Reach = Callable[[float, Identification], "Span | None"]  # how far the record around a time stays with a fit
 
     class Damped(Protocol):
-        """What is fitted to an energy: modes, or waves whose deformations add up."""
+        """What is fitted to an energy: a mode, or waves whose deformations add up."""
 
         @property
         def alpha(self) -> float:
@@ -98,7 +91,7 @@ def described_span(
     bounds : Span
         Where to look [time].
     fitter : callable
-        Gives the oscillator for some samples: `identify`, `identify_several` or one that is given.
+        Gives the oscillator for some samples: `identify`, or one that is given.
     whole : bool
         Try nothing shorter than the bounds and their part up to td: it is known that no load acts there.
     memory : Memory
@@ -138,7 +131,7 @@ def span_of(history: History, anchor: float, fit: Identification, bounds: Span) 
     """
     assert fit.mode is not None
     time, energy = history.between(*bounds)
-    period = 2 * np.pi / fit.mode.fastest
+    period = 2 * np.pi / fit.mode.omega
     typical = float(np.partition(np.diff(time), (time.size - 1) // 2)[(time.size - 1) // 2])
     width = max(3, round(period / _MEANS_PER_PERIOD / typical))
     room = max(_ERRORS_OFF * fit.rms / np.sqrt(width), _STRUCTURES_OFF * fit.structure)
@@ -154,7 +147,7 @@ def span_of(history: History, anchor: float, fit: Identification, bounds: Span) 
 
 @np.errstate(over="ignore", invalid="ignore")  # far off, a damped fit grows beyond all numbers
 def _first_off(
-    time: Samples, energy: Samples, mode: Mode | Modes, room: float, first: int, behind: int, ahead: int
+    time: Samples, energy: Samples, mode: Mode, room: float, first: int, behind: int, ahead: int
 ) -> int | None:
     """Place of the first mean, from the ``first`` on, that is off by more than ``room`` [energy] and the share allowed.
 
@@ -263,98 +256,36 @@ class Fits(Memory):
         return fit
 
 
-# Of n lines of white noise the strongest exceeds the mean power by ln n on average, and by this much more with a
-# probability of 0.7 %.
-_BEYOND_CHANCE: Final = 5.0
 # Share of the vibration energy: a smaller mode changes a residual by 0.06 at most, and real solvers leave as much.
 SMALLEST: Final = 1e-3
-_LEFT_OVER: Final = 0.5  # of a second mode's line, at least: of a nearby rate one mode takes up the other half
 _MOST_LINES: Final = 8192  # bounds the work; enough for 800 periods of the energy
 _FINER: Final = 4  # points per line of a spectrum, so that its top is met
-_STARTS: Final = 3  # strongest lines that a second mode is begun from
+_CELLS_PER_PERIOD: Final = 4  # of the fastest line: below, the means over cells would hide most of it
 
 
-class _Spectrum(NamedTuple):
-    """Lines of a rest that decay like the vibration: ``rate`` [rad over the record].
+def hidden_share(time: Samples, energy: Samples, model: Damped) -> float:
+    """Return the share of the vibration energy that a further mode may have in what a model leaves over [-].
 
-    ``amplitude`` is that at the start, over the vibration energy there [-]; ``chance`` is the power of each over the
-    mean power of white noise with the same scatter.
-    """
-
-    rate: Samples
-    amplitude: Samples
-    chance: Samples
-
-
-def resolved(time: Samples, energy: Samples, fit: Identification) -> Identification:
-    """Split one mode into two where what it leaves over is not white and a second mode explains it.
+    That is the energy of a mode that makes the strongest line of the rest and decays like the vibration, at most 1.
 
     Parameters
     ----------
     time, energy : array of shape (n,)
-        The window of the fit [time], [energy].
-    fit : Identification
-        Accepted; returned as it is but for its ``hidden_share`` where no second mode can be told.
+        The window that was fitted [time], [energy].
+    model : Damped
+        The fit.
     """
-    assert fit.mode is not None
-    least, spectrum = fit.hidden_share, _spectrum(time, energy, fit.mode)
-    large = _share(spectrum) > SMALLEST * _LEFT_OVER
-    if isinstance(fit.mode, Mode) and large and float(np.max(spectrum.chance)) > _certain(time.size):
-        two = identify_beside(time, energy, fit.mode, _strongest(spectrum) / 2 / (fit.end - fit.start))
-        if two.describes_record and _explains(two, fit, time.size):
-            assert two.mode is not None
-            fit, spectrum = two, _spectrum(time, energy, two.mode)
-    assert fit.mode is not None
-    hidden = max(least, _share(spectrum))
-    if len(fit.mode.modes) > 1 and samples_per_period(time, fit.mode) < MIN_SAMPLES_PER_PERIOD:
-        fastest = fit.mode.modes[-1].vibration_energy(time[0])  # its rate may be an alias
-        hidden += float(fastest / fit.mode.vibration_energy(time[0]))
-    return fit._replace(hidden_share=min(hidden, 1.0))
-
-
-def hidden_share(time: Samples, energy: Samples, model: Damped) -> float:
-    """Share of the vibration energy that a further mode may have in what a model leaves over, at most 1 [-]."""
-    return min(_share(_spectrum(time, energy, model)), 1.0)
-
-
-def _share(spectrum: _Spectrum) -> float:
-    """Share of the vibration energy in a mode that makes the strongest line: E swings by half of it about as much."""
-    return 2 * float(np.max(spectrum.amplitude))
-
-
-def _certain(n: int) -> float:
-    """Power of a line over the mean of ``n`` that chance does not give."""
-    return float(np.log(n)) + _BEYOND_CHANCE
-
-
-def _explains(two: Identification, one: Identification, n: int) -> bool:
-    """Whether a second mode is large enough to matter and explains more than a line of white noise would."""
-    assert two.mode is not None
-    energies = [float(mode.vibration_energy(two.start)) for mode in two.mode.modes]
-    gain = n * (one.rms**2 - two.rms**2)  # a line of power x takes 2 x from the sum of squares
-    return min(energies) > SMALLEST * sum(energies) and gain > 2 * _certain(n) * two.rms**2
-
-
-def _spectrum(time: Samples, energy: Samples, mode: Damped) -> _Spectrum:
-    """Lines of what ``mode`` leaves over, from one period in the record to the fastest that the samples show."""
     span = float(time[-1] - time[0])
     count = min(time.size - 1, _MOST_LINES)
     s = (time - time[0]) / span
-    rest = cell_means(s, integral(s, energy - mode.energy(time)), count)
-    decay = np.exp(-mode.alpha * span * (np.arange(count) + 0.5) / count)
-    power, whole = float(np.sum(decay**2)), float(mode.vibration_energy(time[0]))
-    lines = np.abs(np.fft.rfft(rest * decay, _FINER * count))
-    shown = slice(_FINER, max(_FINER + 1, _FINER * count // MIN_SAMPLES_BESIDE))
-    mean = float(np.mean(rest**2)) * power or 1.0
-    rate = 2 * np.pi / _FINER * np.arange(lines.size, dtype=np.float64)
-    return _Spectrum(np.array(rate[shown]), 2 / power / whole * lines[shown], lines[shown] ** 2 / mean)
-
-
-def _strongest(spectrum: _Spectrum) -> Samples:
-    """Rates of the strongest lines, each the top of a hill."""
-    height = np.pad(spectrum.amplitude, 1, constant_values=-1.0)
-    tops = np.flatnonzero((height[1:-1] >= height[:-2]) & (height[1:-1] > height[2:]))
-    return np.asarray(spectrum.rate[tops[np.argsort(-spectrum.amplitude[tops])[:_STARTS]]])
+    rest = cell_means(s, integral(s, energy - model.energy(time)), count)
+    decay = np.exp(-model.alpha * span * (np.arange(count) + 0.5) / count)
+    # from one period in the record to the fastest line that the cells show
+    shown = slice(_FINER, max(_FINER + 1, _FINER * count // _CELLS_PER_PERIOD))
+    strongest = float(np.abs(np.fft.rfft(rest * decay, _FINER * count))[shown].max())
+    amplitude = 2 * strongest / float(np.sum(decay**2))
+    # the energy of a mode swings by half of its vibration energy about a mean
+    return min(2 * amplitude / float(model.vibration_energy(time[0])), 1.0)
 
 
 def residual_bound(fit: Identification, residual: Samples, tr: Samples, td: Samples | float) -> Samples:

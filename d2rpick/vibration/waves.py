@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import Samples
-    from d2rpick.vibration.modes import Mode, Modes
+    from d2rpick.vibration.modes import Mode
 
     Complex = NDArray[np.complex128]
     Places = NDArray[np.intp]
@@ -242,7 +242,7 @@ class PartMotion(NamedTuple):
     That is the share of the vibration energy that a further mode may have unseen [-].
     """
 
-    model: Waves | Mode | Modes
+    model: Waves | Mode
     unclear: Samples
     hidden: float
 

@@ -15,9 +15,9 @@ from d2rpick.choice.answers import suggest
 from d2rpick.choice.question import Settings
 from d2rpick.histories.history import History
 from d2rpick.vibration.identify import identify
-from d2rpick.vibration.modes import Modes
+from d2rpick.vibration.modes import Mode
 from tests.benchmarks.timing import ratio
-from tests.records import ENERGY, MODE, TIME, printed, replayed_residual, vibration
+from tests.records import ENERGY, MODE, TIME, energy_of, level_crossings, printed, replayed_residual, vibration
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -83,7 +83,7 @@ def within(found: list[Stated]) -> tuple[float, float, float]:
 
 def _stated(rng: np.random.Generator, least: float) -> Stated | None:
     truth, time, noise = _random_modes(rng, least * 10 ** rng.uniform())
-    energy = truth.energy(time)
+    energy = energy_of(truth, time)
     energy = energy + noise * energy.max() * rng.standard_normal(time.size)
     td = float(time[-1] * rng.uniform(0.5, 0.9))
     answer = suggest(History(time, energy, source=("made",), format="csv", channel="E"), td, Settings(after=0.0))
@@ -93,22 +93,23 @@ def _stated(rng: np.random.Generator, least: float) -> Stated | None:
     assert best.residual_high is not None
     assert best.tr_low is not None
     assert best.tr_high is not None
-    crossings = np.array(truth.level_crossings(td, -0.2))
+    crossings = level_crossings(truth, td, -0.2)
     seen = best.kind == "crossing" and bool(np.any(np.abs(crossings - best.tr) < _NEAR))
     held = bool(np.any((best.tr_low <= crossings) & (crossings <= best.tr_high))) if seen else None
     true = float(replayed_residual(truth, np.array([best.tr]), td)[0])
     return Stated(best.residual, best.residual_high, true, held)
 
 
-def _random_modes(rng: np.random.Generator, share: float) -> tuple[Modes, Samples, float]:
+def _random_modes(rng: np.random.Generator, share: float) -> tuple[list[Mode], Samples, float]:
     """Modes of one damping, the first with period 1, the other with that share of the energy; times, and noise."""
     alpha, periods = rng.uniform(0, 0.5), rng.uniform(3, 12)
     rates = 2 * np.pi * np.array([1.0, rng.choice([rng.uniform(1.3, 4), rng.uniform(0.35, 0.75)])])
     roots, phases = np.sqrt([1 - share, share]), rng.uniform(0, 2 * np.pi, 2)
-    table = np.stack([rates, roots * np.cos(phases), roots * np.sin(phases)], axis=1)[: 2 if share else 1]
+    table = np.stack([rates, roots * np.cos(phases), roots * np.sin(phases)], axis=1)[: 2 if share else 1].tolist()
     time = np.arange(0, periods, 1 / np.exp(rng.uniform(np.log(15), np.log(200))))
     noise = rng.choice([0.0, np.exp(rng.uniform(np.log(1e-4), np.log(0.03)))])
-    return Modes.of(np.array([alpha, *table.ravel()]), 0.0), time, float(noise)
+    modes = [Mode(rate, alpha, cosine, sine, 0.0) for rate, cosine, sine in table]
+    return modes, time, float(noise)
 
 
 if __name__ == "__main__":

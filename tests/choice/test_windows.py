@@ -25,14 +25,14 @@ from d2rpick.flight.flight import Flight
 from d2rpick.flight.margin import SHARE, grazes, landing_moves, landing_spread, margin_before_contact
 from d2rpick.histories.history import EXACT, Balance, Given, History, Momenta, Samples
 from d2rpick.histories.opening import Selection
-from d2rpick.vibration.modes import Mode, Modes
+from d2rpick.vibration.modes import Mode
 from tests import chain
 from tests.command import ROLLOVER
 from tests.computed import results
 from tests.energies import of, sure
 from tests.paper import OMEGA_2
 from tests.reading import read_history, solved
-from tests.records import ENERGY, MODE, TIME, noisy
+from tests.records import ENERGY, MODE, TIME, energy_of, noisy
 
 positive = st.floats(0.1, 10.0)
 
@@ -252,10 +252,10 @@ def test_windows_of_a_record_with_noise_and_of_a_real_one_hold_what_verifies(tol
 @pytest.mark.slow
 @pytest.mark.parametrize("td", [chain.TD_PEAK, chain.TD_LATE])
 def test_windows_of_several_parts_and_modes_hold_what_verifies(td: float) -> None:
-    two = Modes((Mode(100.0, 4.0, 2.0, 3.0, 0.0), Mode(261.0, 4.0, -1.5, 1.0, 0.0)))
+    two = (Mode(100.0, 4.0, 2.0, 3.0, 0.0), Mode(261.0, 4.0, -1.5, 1.0, 0.0))
     time = np.linspace(0.0, 0.3, 3001)
-    modes = suggest(of(two.energy(time), time), td, Settings(tolerance=0.4))
-    assert isinstance(modes.situation.vibration.whole.mode, Modes)
+    modes = suggest(of(energy_of(two, time), time), td, Settings(tolerance=0.4))
+    assert modes.situation.basis == "modal"
     check(modes, 1)
     parts = suggest(chain.history(), td, Settings())
     assert parts.situation.basis == "parts"

@@ -14,7 +14,7 @@ from d2rpick.vibration.fitting import (
     structure_of,
     surely_structured,
 )
-from d2rpick.vibration.identify import HOPELESS, identify, identify_several
+from d2rpick.vibration.identify import HOPELESS, identify
 from d2rpick.vibration.modes import energy_and_jacobian
 
 S = np.linspace(0.0, 1.0, 20_000)
@@ -41,11 +41,10 @@ def test_a_part_of_the_samples_refuses_only_what_all_of_them_refuse(scatter: flo
     two = one + 0.7 * np.exp(-S) * np.cos(33 * S) ** 2
     many = two + 0.6 * np.exp(-S) * np.sin(57 * S) ** 2 + 0.5 * np.exp(-S) * np.sin(91 * S) ** 2
     for energy in (one, two, many):
-        for fitter in (identify, identify_several):
-            quick, full = fitter(S, energy, quick=True), fitter(S, energy)
-            assert quick.describes_record == full.describes_record
-            if full.describes_record:
-                assert (quick.mode, quick.rms) == (full.mode, full.rms)
+        quick, full = identify(S, energy, quick=True), identify(S, energy)
+        assert quick.describes_record == full.describes_record
+        if full.describes_record:
+            assert (quick.mode, quick.rms) == (full.mode, full.rms)
 
 
 @pytest.mark.parametrize("scatter", [0.0, 0.1, 0.3])

@@ -11,14 +11,14 @@ from d2rpick.choice.question import Settings
 from d2rpick.histories.history import Precision
 from d2rpick.histories.samples import find_crossings
 from d2rpick.vibration import measures
-from d2rpick.vibration.identify import identify, identify_several
+from d2rpick.vibration.identify import identify
 from d2rpick.vibration.measures import Profile
 from d2rpick.vibration.model import Evidence, energy_at
-from d2rpick.vibration.modes import Mode, Modes
+from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.moments import Moments, curvature, fitted_reach, reach, sampled_reach
 from d2rpick.vibration.span import Span
 from tests.energies import sure
-from tests.records import printed, table
+from tests.records import energy_of, level_crossings, printed, table
 
 MODE = Mode(omega=2 * np.pi, alpha=0.2, cosine=0.0, sine=1.0, origin=0.0)
 TD = 5.1
@@ -62,12 +62,11 @@ def test_an_error_that_grows_at_once_leaves_the_way_to_the_next_time() -> None:
     assert tolerance(steep, 0.5, 0.2) == pytest.approx(0.5)
 
 
-def test_a_td_at_which_two_modes_set_in_has_nothing_before_it_to_compare() -> None:
-    modes = Modes((Mode(8.0, 0.05, 1.0, 0.4, 0.0), Mode(19.0, 0.05, 0.3, 0.6, 0.0)))
+def test_a_td_at_which_a_mode_sets_in_has_nothing_before_it_to_compare() -> None:
+    mode = Mode(8.0, 0.05, 1.0, 0.4, 0.0)
     time = np.linspace(0.0, 6.0, 1201)
-    history = table(time, np.asarray(modes.energy(time)))
-    fit = identify_several(time, history.energy)
-    vibration = energy_at(history, 2.0, Evidence(fit, Span(2.0, 6.0)))
+    history = table(time, np.asarray(mode.energy(time)))
+    vibration = energy_at(history, 2.0, Evidence(identify(time, history.energy), Span(2.0, 6.0)))
     crossings = vibration.moments(0.2)
     assert vibration.basis == "oscillator"
     assert crossings.are("crossing").all()
@@ -159,11 +158,11 @@ def test_intervals_hold_the_true_crossing_where_a_fit_misses_a_small_mode(sample
     for _ in range(runs):
         main = random_mode(rng)
         other = Mode(2 * np.pi * rng.uniform(1.6, 2.7), main.alpha, 0.04 * rng.normal(), 0.04 * rng.normal(), 0.0)
-        both = Modes((main, other))
+        both = (main, other)
         time = np.arange(0, 6, 1 / samples_per_period)
-        history = table(time, both.energy(time))
+        history = table(time, energy_of(both, time))
         found = suggest(history, 4.3, Settings(after=0.0))
-        true = np.array(both.level_crossings(4.3, 0.0))
+        true = level_crossings(both, 4.3, 0.0)
         sharp = [c for c in found.candidates if c.kind == "crossing" and (c.timing_tolerance or 0) < 0.02]
         for one in sharp:
             low, high = sure(one.tr_low), sure(one.tr_high)
