@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Part
     from d2rpick.vibration.measures import Columns
 
+# States per period of the energy below which modes beyond those that were found may matter.
+_FEW_STATES = 4
 # Beyond this kinetic share more than half of the vibration is lost at td whatever tr is.
 POOR_KINETIC_SHARE = 0.5
 # An E_plastic above this share of the vibration is worth a word: energy alone cannot tell it from a preload.
@@ -66,6 +68,10 @@ def _of_energy(situation: Situation) -> Iterator[Caution]:
 
 def _of_parts(situation: Situation) -> Iterator[Caution]:
     vibration = situation.vibration
+    states = situation.evidence.states_per_period
+    if vibration.basis == "modal" and states is not None and states < _FEW_STATES:
+        found = f"the fastest strong vibration of the energy has {states:.2g} states per period"
+        yield Caution("coarse-record", f"{found}, and a still faster one is not seen; let the run write more states")
     if vibration.estimated:
         yield Caution("kinetic-share-estimated", f"the kinetic share is what {vibration.estimated}")
     for part in vibration.signed.unsigned if vibration.signed else ():

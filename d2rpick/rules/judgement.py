@@ -230,7 +230,7 @@ def _of_flight(verdict: Verdict) -> Iterator[Fault]:
 
 def _of_error(verdict: Verdict) -> Iterator[Fault]:
     candidate, situation = verdict.candidate, verdict.situation
-    tolerance = situation.settings.tolerance
+    tolerance = situation.most_error
     if situation.at_rest:
         return  # nothing vibrates: any level is that of td but for round-off
     if candidate.sign_match is False:

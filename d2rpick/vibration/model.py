@@ -319,6 +319,12 @@ class Evidence(NamedTuple):
         return modal.doubts.refusal if modal and not modal.signed else None
 
     @property
+    def states_per_period(self) -> float | None:
+        """States per period of the fastest strong line of the energy [-]; None if no lines were looked for."""
+        modal = cast("ModalVibration | None", self.models.get("modal"))
+        return modal.doubts.coarse if modal else None
+
+    @property
     def has_model(self) -> bool:
         """Whether at some td more than the samples of the energy may be relied on."""
         fit = self.fit
