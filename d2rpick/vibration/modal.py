@@ -362,9 +362,21 @@ def confirm(internal: ModalVibration | None, kinetic: ModalVibration | None) -> 
     """Give what the internal energy says, its band widened to what the kinetic energy says; else that alone."""
     if kinetic is None or not kinetic.signed:
         return internal
-    if internal is None or not internal.signed:
+    if internal is None:
         return kinetic
-    return replace(internal, second=kinetic.reading)
+    if internal.signed:
+        return replace(internal, second=kinetic.reading)
+    return kinetic if _may_decide(internal, kinetic) else internal
+
+
+def _may_decide(internal: ModalVibration, kinetic: ModalVibration) -> bool:
+    """Whether the kinetic energy may decide where the internal one is refused: a damper's work or plastic flow is why.
+
+    The internal energy then holds at least the elastic half of what vibrates, and allows what it says halfway.
+    """
+    held = float(np.mean(internal.reading.spectrum.mean.at(internal.time)))
+    needed = float(np.mean(kinetic.reading.level_of_modes(internal.time))) / 2
+    return held > (1 - _MOST_NEGATIVE) * needed and internal.doubts.beyond < _MOST_BEYOND
 
 
 def _read(grid: Grid, prediction: Prediction, window: tuple[float, float], *, kinetic: bool = False) -> ModalVibration:

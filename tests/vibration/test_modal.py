@@ -66,9 +66,16 @@ def test_the_kinetic_energy_says_the_same(seed: int, count: int) -> None:
 def test_the_kinetic_energy_decides_where_the_internal_one_is_refused() -> None:
     structure = LinearStructure.draw(4, 3)
     kinetic = sure(identify_modal(TIME, structure.kinetic_energy(TIME), kinetic=True))
-    drifting = identify_modal(TIME, np.cumsum(np.random.default_rng(1).standard_normal(TIME.size)))
-    assert confirm(drifting, kinetic) is kinetic
+    flowing = 40.0 + 0.5 * np.cumsum(np.random.default_rng(1).standard_normal(TIME.size)) / 5
+    drifting = sure(identify_modal(TIME, structure.elastic_energy(TIME) + flowing))
+    assert not drifting.signed
     assert confirm(drifting, None) is drifting
+    calm = replace(drifting, doubts=drifting.doubts._replace(beyond=0.0))
+    assert confirm(calm, kinetic) is kinetic
+    assert confirm(replace(calm, doubts=calm.doubts._replace(beyond=0.5)), kinetic) is not kinetic
+    lacking = sure(identify_modal(TIME, 0.2 * structure.elastic_energy(TIME)))
+    lacking = replace(lacking, doubts=calm.doubts)
+    assert confirm(lacking, kinetic) is lacking  # it holds less than what vibrates
     assert "kinetic energy" in kinetic.told
 
 
