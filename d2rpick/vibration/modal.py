@@ -520,6 +520,8 @@ def _locked_to(first: int, size: Samples, rate: Samples, phase: Samples, span: f
         if abs(_wrapped(phase[line] - times * phase[first], np.pi)) > _SAME_PHASE_OF_HARMONICS:
             break
         if times > 2:
+            if size[line] > size[first]:  # no harmonic is stronger than what it belongs to: these are modes
+                return 0.0
             total += float(size[line] / size[first])
     return total
 

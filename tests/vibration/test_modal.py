@@ -100,6 +100,14 @@ def rubbed() -> Samples:
     return np.square(positions)
 
 
+@pytest.mark.parametrize(("third", "is_harmonic"), [(0.2, True), (30.0, False)])
+def test_a_locked_line_is_a_harmonic_only_below_what_it_belongs_to(third: float, is_harmonic: bool) -> None:
+    """Modes at twice and three times the rate of a weak one may begin in step with it."""
+    energy = np.cos(8 * TIME) ** 2 + 0.3 * np.cos(16 * TIME) ** 2 + third * np.cos(24 * TIME) ** 2
+    found = sure(identify_modal(TIME, energy))
+    assert (found.doubts.refusal is not None) == is_harmonic
+
+
 @pytest.mark.parametrize(
     ("energy", "reason"),
     [
