@@ -16,6 +16,7 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.vibration.lines import FIRST_PART, even_grid, predict
+from d2rpick.vibration.locked_lines import NOTABLE, Stretch, find_stretches, measure_harmonics
 from d2rpick.vibration.measures import Profile
 from d2rpick.vibration.midpoint import Reading
 from d2rpick.vibration.swings import SOLVER_FLOOR
@@ -39,14 +40,6 @@ _TINY: Final = 1e-12
 # Pairs of times in which the overlap of the deformations is held against its bounds, in each direction.
 _CHECKED: Final = 90
 
-# A line counts beside the strongest one from this share of it on, and from so many times its own scatter.
-_NOTABLE, _NOTABLE_PARTNER, _ABOVE_SCATTER = 3e-3, 3e-4, 4.0
-# Two rates are one if they differ by less than this share of a turn over the record.
-_SAME_RATE: Final = 0.1
-# Two phases are one if they differ by less [rad]: of the line of a stretch, and of the harmonics of a spring.
-_SAME_PHASE, _SAME_PHASE_OF_HARMONICS = 0.15, 0.25
-# The strongest lines that harmonics are looked for of, and how many harmonics.
-_STRONGEST, _HARMONICS = 3, (2, 3, 4, 5)
 # A stretch that leaves the static energy within this share of the mean may be another mode at half of the rate.
 _AMBIGUOUS: Final = 0.08
 
@@ -389,7 +382,7 @@ def _read(grid: Grid, prediction: Prediction, window: tuple[float, float], *, ki
     scatter = noise * np.sqrt(2 / grid.time.size)
     shared = float(np.sum(rest[1:] * rest[:-1]) / max(float(np.sum(rest**2)), 1e-300))
     systematic = float(np.clip(shared, 0.0, 1.0))
-    stretches = stretches_of(spectrum.lines, grid.span, scatter)
+    stretches = find_stretches(spectrum.lines, grid.span, scatter)
     is_mode = _without(spectrum.lines, stretches)
 
     plain = Reading(spectrum, np.ones(is_mode.shape, dtype=bool), True, grid.time, systematic * rest, tiny)
@@ -406,7 +399,7 @@ def _read(grid: Grid, prediction: Prediction, window: tuple[float, float], *, ki
     others = (plain,) if ambiguous else () if stretches or kinetic else (with_static if no_static else plain,)
 
     first = prediction.of_first_part
-    first_stretches = stretches_of(first.lines, FIRST_PART * grid.span, scatter) if stretches else ()
+    first_stretches = find_stretches(first.lines, FIRST_PART * grid.span, scatter) if stretches else ()
     of_first_part = replace(
         reading, spectrum=first, is_mode=_without(first.lines, first_stretches), rest=np.zeros(grid.time.size)
     )
@@ -417,7 +410,7 @@ def _read(grid: Grid, prediction: Prediction, window: tuple[float, float], *, ki
         negative=max(-share, 0.0),
         drift=float(np.std(static)) / mean,
         beyond=_beyond_bounds(reading, grid),
-        harmonic=harmonics_of(spectrum.lines, grid.span, scatter),
+        harmonic=measure_harmonics(spectrum.lines, grid.span, scatter),
         unstretched=max(held - share, 0.0) / (1 + max(share, 0.0)),
         coarse=grid.strong,
     )
@@ -447,7 +440,7 @@ def _without(lines: Exponentials, stretches: tuple[Stretch, ...]) -> Mask:
 def _close_times(reading: Reading, window: tuple[float, float], fewest: int) -> Samples:
     """Times over a window, close enough for a parabola through three of them to find a minimum [time]."""
     rates, sizes = reading.modes.poles.imag, np.abs(reading.modes.weights)
-    notable = rates[sizes > _NOTABLE * sizes.max(initial=0.0)]
+    notable = rates[sizes > NOTABLE * sizes.max(initial=0.0)]
     start, end = window
     periods = (end - start) * float(notable.max(initial=0.0)) / (2 * np.pi)
     return np.linspace(start, end, int(max(fewest, _TIMES_PER_PERIOD * periods)) + 1)
@@ -460,77 +453,3 @@ def _beyond_bounds(reading: Reading, grid: Grid) -> float:
     tr, td = pairs.T
     beyond = np.maximum(np.abs(reading.free_overlap(tr, td)) - reading.bound(tr, td), 0.0)
     return float(np.sqrt(np.mean((beyond / reading.level((tr + td) / 2)) ** 2)))
-
-
-class Stretch(NamedTuple):
-    """A ``line`` of the stretch of a mode whose own line is ``of_mode``; ``energy`` of that stretch [energy]."""
-
-    line: int
-    of_mode: int
-    energy: float
-
-
-def stretches_of(lines: Exponentials, span: float, scatter: float) -> tuple[Stretch, ...]:
-    """Find the lines of modes that vibrate about a stretch, as in a body that spins.
-
-    A mode q about q0 has the energy q0^2 + 2 q0 q + q^2: a further line at half the rate and phase of its own.  In free
-    flight without spin the energy is stationary at rest, whatever residual stress there is, and has no such line.
-    """
-    size, rate = np.abs(lines.weights), lines.poles.imag
-    phase = _phases_in_middle(lines, span)
-    strongest = float(size.max(initial=0.0))
-    order = np.argsort(-size).tolist()
-    found: list[Stretch] = []
-    for line in order:
-        if size[line] < max(_NOTABLE * strongest, _ABOVE_SCATTER * scatter):
-            continue
-        for own in order:
-            if own == line or size[own] < max(_NOTABLE_PARTNER * strongest, _ABOVE_SCATTER * scatter):
-                continue
-            if abs(rate[own] - 2 * rate[line]) * span > 2 * np.pi * _SAME_RATE:
-                continue
-            unsure = 3 * min(scatter / size[own] + 2 * scatter / size[line], 0.1)
-            if abs(_wrapped(phase[own] - 2 * phase[line], 2 * np.pi)) < _SAME_PHASE + unsure:
-                found.append(Stretch(line, own, float(size[line] ** 2 / (8 * size[own]))))
-                break
-    return tuple(found)
-
-
-def harmonics_of(lines: Exponentials, span: float, scatter: float) -> float:
-    """How large the lines at three and more times a first one are whose phases are locked to it, over it [-].
-
-    A spring that is not linear has them; the modes of a linear structure are not locked to one another.
-    """
-    size, rate = np.abs(lines.weights), lines.poles.imag
-    phase = _phases_in_middle(lines, span)
-    if size.size < 3:
-        return 0.0
-    return max(_locked_to(int(first), size, rate, phase, span, scatter) for first in np.argsort(-size)[:_STRONGEST])
-
-
-def _locked_to(first: int, size: Samples, rate: Samples, phase: Samples, span: float, scatter: float) -> float:
-    """Size of the harmonics of a line beyond its second, over it [-]; the row ends at the first that is not locked."""
-    total = 0.0
-    for times in _HARMONICS:
-        line = int(np.argmin(np.abs(rate - times * rate[first])))
-        apart = abs(rate[line] - times * rate[first]) * span > 2 * np.pi * _SAME_RATE
-        if line == first or apart or size[line] < _ABOVE_SCATTER * scatter:
-            break
-        # a spring that stiffens and one that softens have them with opposite signs
-        if abs(_wrapped(phase[line] - times * phase[first], np.pi)) > _SAME_PHASE_OF_HARMONICS:
-            break
-        if times > 2:
-            if size[line] > size[first]:  # no harmonic is stronger than what it belongs to: these are modes
-                return 0.0
-            total += float(size[line] / size[first])
-    return total
-
-
-def _phases_in_middle(lines: Exponentials, span: float) -> Samples:
-    """Phase of each line in the middle of the window, where it is known best [rad]."""
-    return np.asarray(np.angle(lines.weights) + lines.poles.imag * span / 2)
-
-
-def _wrapped(angle: float, turn: float) -> float:
-    """Give an angle within half a turn of zero [rad]."""
-    return (angle + turn / 2) % turn - turn / 2
