@@ -1,3 +1,3 @@
 """What all other folders stand on: errors, the state of files, worker processes, and the version, written down once."""
 
-__version__ = "0.16.6"
+__version__ = "0.17.0"
