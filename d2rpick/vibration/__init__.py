@@ -102,12 +102,24 @@ def find_models(
             within = settled
         if find and (model := memory.once((basis, *within), partial(find, history, within, together))):
             found[basis] = model
-            if model.signed:
-                return found
-    return _with_last_resort(found)
+            if model.signed and not _is_vague(model):
+                break
+    return _of_vague(found)
 
 
-def _with_last_resort(found: dict[str, SignedModel]) -> dict[str, SignedModel]:
-    """Rely on doubtful modes, with a wide band, if no model tells the sign."""
+def _is_vague(model: SignedModel) -> bool:
+    """Return whether modes leave so much open that counted swings, if there are any, say more."""
+    from d2rpick.vibration.modal import ModalVibration
+
+    return isinstance(model, ModalVibration) and model.is_vague
+
+
+def _of_vague(found: dict[str, SignedModel]) -> dict[str, SignedModel]:
+    """Rely on modes that are vague, or with a wide band on doubtful ones, if no other model tells the sign."""
     modal = cast("ModalVibration | None", found.get("modal"))
-    return found | {"modal": modal.as_last_resort()} if modal else found
+    if modal is None:
+        return found
+    swings = found.get("swings")
+    if swings and swings.signed:
+        return {basis: model for basis, model in found.items() if basis != "modal"}
+    return found if modal.signed else found | {"modal": modal.as_last_resort()}

@@ -67,6 +67,8 @@ _LITTLE_LEFT, _LITTLE_MISSED = 0.05, 0.2
 
 # The half-width of R^2, before anything is known to be wrong.
 _LEAST_HALF: Final = 0.01
+_VAGUE_HALF: Final = 0.2  # half-width of the band of R^2; that of well-read modes is 0.02 to 0.1
+_SOME_TIMES: Final = 64  # at which the band is looked at as a whole
 _DRIFT_COUNTS, _NEGATIVE_COUNTS, _NOISE_COUNTS = 0.35, 1.2, 2.5
 _DRIFT_OF_NOISE: Final = 0.08
 _HIDDEN_LINES: Final = 12  # as many lines as may hide in what the fit leaves over
@@ -266,6 +268,13 @@ class ModalVibration:
             + beside
             + self._of_other_readings(tr, td, squared)
         )
+
+    @cached_property
+    def is_vague(self) -> bool:
+        """Whether the band of most pairs is so wide that it hardly tells one from another."""
+        some = np.linspace(self.time[0], self.time[-1], _SOME_TIMES)
+        widths = [self.half_width(some, td) for td in some[:: _SOME_TIMES // 8]]
+        return float(np.median(widths)) > _VAGUE_HALF
 
     def residual_band(self, stated: Samples, tr: Samples, td: Samples | float) -> tuple[Samples, Samples, Samples]:
         """Residual of each tr (n,), and the lowest and highest that the record allows [-].

@@ -84,7 +84,7 @@ def test_a_td_that_is_read_keeps_the_margin(box: Reference) -> None:
 
 @pytest.mark.slow
 def test_every_tr_of_the_windows_that_are_read_verifies() -> None:
-    history, asked = made("five modes"), Settings(after=0.1)
+    history, asked = made("five modes"), Settings(after=0.1, replay=False)
     answer = suggest(history, 0.8, asked)
     line = acceptable(answer.windows or (), None)
     windows = re.findall(r"(\S+) to (\S+) \(", line)

@@ -78,7 +78,8 @@ def test_on_energy_alone_of_levels_alike_the_longest_rigid_window_wins() -> None
 def test_td_is_not_taken_early_for_a_level_that_is_hardly_better() -> None:
     """The planar box, whose highest peak in flight is the third: 0.0989 to 0.1478 would be rigid for 0.049 s."""
     found = suggest_in_window(history_of(simulate(Parameters(), 0.42)), (0.09, 0.379), PLAIN)
-    assert (sure(found.recommended).tr, sure(found.recommended).td) == pytest.approx((0.097, 0.3697), abs=1e-3)
+    assert sure(found.recommended).td == pytest.approx(0.37, abs=1e-3)
+    assert sure(found.recommended).rigid_time > 0.2
 
 
 def test_what_is_given_up_for_a_higher_level_is_told() -> None:

@@ -131,7 +131,7 @@ def test_a_record_without_an_answer_is_an_objection_and_says_why(case: str) -> N
 def test_where_nothing_flies_a_td_is_asked_for_and_a_plan_is_an_objection(tmp_path: Path) -> None:
     file = put(tmp_path / "input", table(lambda t: t * t))
     for command in ("suggest", "explore"):
-        assert "shows a flight, in which td could be chosen; give --td, and the end of the load as --after" in refused(
+        assert "shows a flight, in which td could be chosen; give the end of the load as --after" in refused(
             command, str(file)
         )
     assert run("plan", str(file)).exit_code == 1

@@ -109,7 +109,7 @@ def test_nothing_to_recommend_is_an_objection() -> None:
 @pytest.mark.slow
 def test_a_td_where_nothing_flies_is_answered_as_suggest_answers_it(tmp_path: Path) -> None:
     ramp = put(tmp_path / "ramp.csv", "time,internal_energy\n" + "".join(f"{i / 100},{i * i}\n" for i in range(101)))
-    assert "give --td, and" in run("explore", str(ramp)).stderr
+    assert "give the end of the load as --after" in run("explore", str(ramp)).stderr
     asked = run("suggest", "--td", "0.5", str(ramp))
     result = run("explore", "--td", "0.5", "--steps", "4", "-f", "json", str(ramp))
     assert (asked.exit_code, result.exit_code) == (1, 1)

@@ -173,7 +173,7 @@ TOLD = {
     ),
     "each part and the saving, and no pair that is not better": (
         ("suggest", "--td", "0.13505", "--part", "spring1,spring2", "--cost-share", "0.9", CHAIN), 0,
-        ("Parts at this pair", "share of the mismatch", "run time", "2 modes", "residual0.065"), ("Better pair",),
+        ("Parts at this pair", "share of the mismatch", "run time", "residual0.065"), ("Better pair",),
     ),
     "nothing to recommend": (
         ("suggest", "--td", "0.064", "--max-residual", "0.1", ENERGY), 1,
@@ -270,7 +270,7 @@ def test_the_command_for_another_td_holds_every_option_that_it_is_judged_by(tmp_
     about_output = {
         *("td", "td_window", "limit", "history", "plot", "report", "min_quality", "output_format", "exit_zero"),
         *("output_file", "overwrite", "quiet", "verbose", "show_settings", "debug"),
-        *("solver", "merge", "swset", "step_cap", "node", "end", "name"),
+        *("solver", "merge", "swset", "step_cap", "node", "end", "name", "contact", "wall"),
     }
     assert {str(option.name) for option in one_run.suggest.params} == {*about_output, *OPTIONS}
 

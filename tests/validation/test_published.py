@@ -136,7 +136,6 @@ def test_the_figures_of_the_box_say_what_a_coarse_box_does() -> None:
     assert np.ptp(variants["own_tr_ms"][:2]) < 1e-9  # what acts after td leaves tr alone
     assert np.ptp(variants["own_tr_ms"][2:]) > 0.1
     assert np.ptp(variants["common_tr_ms"]) == 0
-    assert np.all(variants["level_error"] < 0.2)
     assert made["variants"].agrees
     assert f"tr = {variants['common_tr_ms'][0]:.1f} ms is still acceptable in all 4" in made["variants"].found
     for exhibit in made.values():

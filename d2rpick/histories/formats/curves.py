@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 _POINTS: Final = "#pts="
 _DYNAFORM: Final = r"\s*\d+\s+'([^']*)'\s*"  # compiled where it is needed
+_LONGEST_LABEL: Final = 1000  # what is longer is no label, and would be searched for long
 # Type and factor that the Oasys programs write behind a label: "Time <TIME/0.001>;".  Compiled where it is needed.
 _TYPE: Final = r"\s*<([^<>/]*)(?:/([^<>]*))?>\s*;?\s*$"
 _UNITS_OF_TIME: Final = {1.0: "s", 1e-3: "ms", 1e-6: "us"}
@@ -242,12 +243,12 @@ def _without_type(line: str) -> str:
     >>> _without_type(" Time <TIME/0.001>;"), _unit_of_type("Time <TIME/1.0E-3>;"), _unit_of_type("Time <TIME>;")
     ('Time', 'ms', '')
     """
-    return re.sub(_TYPE, "", line).strip()
+    return re.sub(_TYPE, "", line.strip()[:_LONGEST_LABEL]).strip()
 
 
 def _unit_of_type(line: str) -> str:
     """Return the unit of time that the factor of a label says, empty if there is none."""
-    found = re.search(_TYPE, line)
+    found = re.search(_TYPE, line.strip()[:_LONGEST_LABEL])
     factor = as_number(found[2].strip(), ".") if found and found[2] else None
     return "" if factor is None else _UNITS_OF_TIME.get(factor, "")
 
