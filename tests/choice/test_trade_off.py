@@ -32,8 +32,8 @@ def check(found: TradeOff, history: History, asked: Settings, offers: list[Offer
         assert (one.basis, one.energy_td, one.kinetic_share) == (
             alone.situation.basis, alone.situation.energy_td, alone.situation.kinetic_share,
         )  # fmt: skip
-        windows = [np.ravel([(it.start, it.end) for it in answer.windows or ()]) for answer in (one.answer, alone)]
-        np.testing.assert_allclose(*windows, rtol=1e-6)
+        shown, asked_for = ([(it.start, it.end) for it in answer.windows or ()] for answer in (one.answer, alone))
+        np.testing.assert_allclose(shown, asked_for, rtol=1e-6)
         assert (one.answer.expected is None) == (alone.expected is None)
         assert one.quality == alone.quality
         assert one.answer.why_none == "; ".join(it.message for it in alone.cautions if it.code == "no-candidate")
