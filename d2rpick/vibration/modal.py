@@ -274,7 +274,7 @@ class ModalVibration:
         """Whether the band of most pairs is so wide that it hardly tells one from another."""
         some = np.linspace(self.time[0], self.time[-1], _SOME_TIMES)
         widths = [self.half_width(some, td) for td in some[:: _SOME_TIMES // 8]]
-        return float(np.median(widths)) > _VAGUE_HALF
+        return bool(np.mean(np.array(widths) > _VAGUE_HALF) > 0.5)
 
     def residual_band(self, stated: Samples, tr: Samples, td: Samples | float) -> tuple[Samples, Samples, Samples]:
         """Residual of each tr (n,), and the lowest and highest that the record allows [-].

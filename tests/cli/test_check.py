@@ -498,7 +498,7 @@ def test_the_history_is_named_relative_to_the_working_folder(tmp_path: Path) -> 
 
 def test_an_energy_of_several_parts_is_not_called_that_of_one(tmp_path: Path) -> None:
     deck = tmp_path / "main.k"
-    run("card", "--tr", "0.12", "--td", "0.37", "--part", "1,2", "-o", str(deck))
+    run("card", "--tr", "0.15", "--td", "0.37", "--part", "1,2", "-o", str(deck))
     lines = run("check", str(deck), "--history", BOX, "--tolerance", "0.001").stdout.splitlines()
     (found,) = [line for line in lines if "D2R201" in line]
     assert "the energy of the 2 parts that are switched together is" in found
