@@ -35,7 +35,7 @@ def check(found: TradeOff, history: History, asked: Settings, offers: list[Offer
         shown, asked_for = ([(it.start, it.end) for it in answer.windows or ()] for answer in (one.answer, alone))
         np.testing.assert_allclose(shown, asked_for, rtol=1e-6)
         assert (one.answer.expected is None) == (alone.expected is None)
-        assert one.quality == alone.quality
+        assert (one.quality and one.quality.grade) == (alone.quality and alone.quality.grade)
         assert one.answer.why_none == "; ".join(it.message for it in alone.cautions if it.code == "no-candidate")
     assert all(low.td < high.td for low, high in pairwise(found.offers))
     unbeaten(found)
@@ -121,7 +121,7 @@ def test_equal_pairs_do_not_beat_each_other_by_rounding() -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=2, deadline=None)
+@settings(max_examples=2, deadline=None, derandomize=True)
 @given(histories(), st.floats(0.3, 0.7), st.sampled_from([None, 0.1]))
 def test_every_td_of_any_record_is_answered_as_suggest_answers_it(
     history: History, td: float, after: float | None
