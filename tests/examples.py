@@ -70,7 +70,7 @@ def printed(command: str) -> str:
 
 def rounded(text: str) -> str:
     """Text with its numbers cut to what every machine gives: those at full precision, and errors next to nothing."""
-    text = _FULL_PRECISION.sub(lambda number: f"{float(number[0]):.9g}", text)
+    text = _FULL_PRECISION.sub(lambda number: f"{float(number[0]):.11g}", text)
     return _NEXT_TO_NOTHING.sub(lambda number: f"{float(number[0]):.3g}", text)
 
 
