@@ -7,7 +7,12 @@ from d2rpick.api.costs import (
     calibrate as calibrate,
     parts as parts,
 )
-from d2rpick.api.plans import Exploration as Exploration, Plan as Plan, explore as explore, plan as plan
+from d2rpick.api.plans import (
+    Exploration as Exploration,
+    Plan as Plan,
+    explore as explore,
+    plan as plan,
+)
 from d2rpick.api.running import FirstRun as FirstRun, first as first, follow as follow
 from d2rpick.api.runs import Run as Run, from_frame as from_frame, read as read
 from d2rpick.api.studies import Study as Study, study as study

@@ -21,11 +21,15 @@ def main() -> None:
     def interrupt(number: int, _: object) -> None:
         """Raise KeyboardInterrupt, and remember the signal, since the code of a library may swallow the error."""
         interrupts.append(number)
-        sys.unraisablehook = lambda _: None  # what is swallowed in the end of an object would print a traceback
+        sys.unraisablehook = lambda _: (
+            None
+        )  # what is swallowed in the end of an object would print a traceback
         raise KeyboardInterrupt
 
     try:
-        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a job in the background ignores it
+        if (
+            signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        ):  # a job in the background ignores it
             signal.signal(signal.SIGINT, interrupt)
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         gc.set_threshold(100_000)
@@ -37,7 +41,9 @@ def main() -> None:
         interrupts.append(signal.SIGINT)
     finally:
         if signal.getsignal(signal.SIGINT) is interrupt:
-            signal.signal(signal.SIGINT, signal.SIG_DFL)  # the next one ends the program at once
+            signal.signal(
+                signal.SIGINT, signal.SIG_DFL
+            )  # the next one ends the program at once
         gc.freeze()  # the system takes back what is left
         if interrupts:
             sys.excepthook = lambda *_: None
@@ -58,7 +64,9 @@ def _fill_closed_streams() -> None:
                 import io
 
                 file = io.FileIO(stream, "w", closefd=False)
-                writer = io.TextIOWrapper(file, errors="backslashreplace", write_through=True)
+                writer = io.TextIOWrapper(
+                    file, errors="backslashreplace", write_through=True
+                )
                 setattr(sys, ("stdout", "stderr")[stream - 1], writer)
 
 

@@ -33,11 +33,21 @@ class _Watch:
     def __call__(self, event: str, args: tuple[Any, ...]) -> None:
         if event not in _EVENTS or self.free:  # most events are none of these
             return
-        names = args[:1] if event != "subprocess.Popen" else [args[1]] if isinstance(args[1], str) else args[1]
+        names = (
+            args[:1]
+            if event != "subprocess.Popen"
+            else [args[1]]
+            if isinstance(args[1], str)
+            else args[1]
+        )
         for name in names:
-            if isinstance(name, str | bytes | os.PathLike) and is_beside(os.path.abspath(os.fsdecode(name))):  # noqa: PTH100
+            if isinstance(name, str | bytes | os.PathLike) and is_beside(
+                os.path.abspath(os.fsdecode(name))  # noqa: PTH100
+            ):
                 self.opened.append(os.fsdecode(name))
-                raise AssertionError(f"{self.opened[-1]!r} lies beside the clone; tests/data holds what tests read")
+                raise AssertionError(
+                    f"{self.opened[-1]!r} lies beside the clone; tests/data holds what tests read"
+                )
 
 
 WATCH = _Watch()
@@ -50,10 +60,20 @@ def is_beside(name: str, root: Path = ROOT) -> bool:
     path, parent = Path(os.path.normpath(name)), root.parent  # links stay
     if path.is_relative_to(REAL):
         return True
-    if not path.is_relative_to(parent) or path.is_relative_to(root) or parent in (path, parent.parent):
+    if (
+        not path.is_relative_to(parent)
+        or path.is_relative_to(root)
+        or parent in (path, parent.parent)
+    ):
         return False
-    ours = (one for one in map(Path, _OURS) if one == parent or not parent.is_relative_to(one))
-    return path.relative_to(parent).parts[0][0] != "." and not any(path.is_relative_to(one) for one in ours)
+    ours = (
+        one
+        for one in map(Path, _OURS)
+        if one == parent or not parent.is_relative_to(one)
+    )
+    return path.relative_to(parent).parts[0][0] != "." and not any(
+        path.is_relative_to(one) for one in ours
+    )
 
 
 @pytest.hookimpl(wrapper=True)
@@ -86,9 +106,13 @@ def pytest_runtest_teardown() -> Generator[None, Any, Any]:
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(
+    config: pytest.Config, items: list[pytest.Item]
+) -> None:
     """Mark the tests of files of others, and leave them out where the files are absent."""
-    others = [item for item in items if item.path.is_relative_to(ROOT / "tests" / "real")]
+    others = [
+        item for item in items if item.path.is_relative_to(ROOT / "tests" / "real")
+    ]
     for item in others:
         item.add_marker("real")
     if not REAL.is_dir():
@@ -108,7 +132,9 @@ def pytest_testnodedown(node: Any) -> None:
     node.config.stash[LEFT_OUT] = getattr(node, "workeroutput", {}).get("left_out", 0)
 
 
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+def pytest_terminal_summary(
+    terminalreporter: pytest.TerminalReporter, config: pytest.Config
+) -> None:
     """Say in one line what was left out."""
     if left_out := config.stash.get(LEFT_OUT, 0):
         terminalreporter.write_line(

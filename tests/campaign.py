@@ -37,7 +37,9 @@ from tests.reading import run_of, states_of
 from tests.relations import RELATIONS, check_relation
 
 _CHUNK: Final = 200  # inputs of one task
-_FEW: Final = 20  # histories of one task of a relation, each of which is chosen from twice
+_FEW: Final = (
+    20  # histories of one task of a relation, each of which is chosen from twice
+)
 _SHOWN: Final = 5  # faults of a format that are printed
 _KINDS: Final = ("flip", "cut", "drop", "double", "swap", "insert", "blank")
 _LIKELY: Final = b"\n 0123456789.,;E+-*eND\"'\x00\x1b\xff"
@@ -51,7 +53,12 @@ _CSV: Final = b"time,internal_energy,kinetic_energy\n" + b"".join(
 def faults(random: Random) -> list[Fault]:
     """One to three faults anywhere."""
     return [
-        (random.choice(_KINDS), random.random(), random.random(), random.choice([random.randrange(256), *_LIKELY]))
+        (
+            random.choice(_KINDS),
+            random.random(),
+            random.random(),
+            random.choice([random.randrange(256), *_LIKELY]),
+        )
         for _ in range(random.randint(1, 3))
     ]
 
@@ -101,11 +108,25 @@ def hdf5(random: Random) -> bool:
 
 def d3plot(random: Random) -> bool:
     """Damage a d3plot of one file or two; the numbers bear no mark of their own, but there are not more states."""
-    contents = [_d3plot().together(_D3PLOT_STATES[:3]), _d3plot().file(_D3PLOT_STATES[3:])]
+    contents = [
+        _d3plot().together(_D3PLOT_STATES[:3]),
+        _d3plot().file(_D3PLOT_STATES[3:]),
+    ]
     place = random.randrange(2)
     contents[place] = damage(contents[place], faults(random), [])
-    sources = [Source(name, data) for name, data in zip(("d3plot", "d3plot01"), contents, strict=True) if data]
-    return bool(_read(lambda: [leg.part_channel("internal_energy", ()) for leg in open_legs(sources, Selection())]))
+    sources = [
+        Source(name, data)
+        for name, data in zip(("d3plot", "d3plot01"), contents, strict=True)
+        if data
+    ]
+    return bool(
+        _read(
+            lambda: [
+                leg.part_channel("internal_energy", ())
+                for leg in open_legs(sources, Selection())
+            ]
+        )
+    )
 
 
 def deck(random: Random) -> bool:
@@ -119,7 +140,10 @@ def deck(random: Random) -> bool:
 def companions(random: Random) -> bool:
     """Damage one or both of a glstat and the matsum of the same run."""
     with TemporaryDirectory() as folder:
-        contents = {"glstat": test_faults_text.GLSTAT, "matsum": test_faults_text.MATSUM[4]}
+        contents = {
+            "glstat": test_faults_text.GLSTAT,
+            "matsum": test_faults_text.MATSUM[4],
+        }
         for name in random.choice((("glstat",), ("matsum",), ("glstat", "matsum"))):
             contents[name] = damage(contents[name], faults(random), [])
         for name, content in contents.items():
@@ -176,20 +200,36 @@ def main() -> int:
     forms = [*(RELATIONS if options.relations else FORMATS)]
     each = -(-options.inputs // len(forms))
     size = _FEW if options.relations else _CHUNK
-    tasks = [(form, range(at, min(at + size, each))) for at in range(0, each, size) for form in forms]
+    tasks = [
+        (form, range(at, min(at + size, each)))
+        for at in range(0, each, size)
+        for form in forms
+    ]
     found: dict[str, Counter[str]] = {form: Counter() for form in forms}
     with on_cores(cores(), "tests.faults") as farm:
         for answer in farm.answers(partial(chunk, options.seed), tasks):
             form, numbers = tasks[answer.number]
-            found[form] += Counter({f"{numbers}: {answer.error}": 1}) if answer.error else answer.result[1]
+            found[form] += (
+                Counter({f"{numbers}: {answer.error}": 1})
+                if answer.error
+                else answer.result[1]
+            )
     heads = (
-        ("relation", "histories", "chosen", "none") if options.relations else ("format", "inputs", "read", "refused")
+        ("relation", "histories", "chosen", "none")
+        if options.relations
+        else ("format", "inputs", "read", "refused")
     )
     print(f"{heads[0]:<22} {heads[1]:>9} {heads[2]:>9} {heads[3]:>9} {'faults':>9}")
     for form, counts in found.items():
         wrong = [what for what in counts if what not in ("read", "refused")]
-        print(f"{form:<22} {each:>9} {counts['read']:>9} {counts['refused']:>9} {len(wrong):>9}")
-        print(*(f"  {what}" for what in wrong[:_SHOWN]), sep="\n", end="\n" if wrong else "")
+        print(
+            f"{form:<22} {each:>9} {counts['read']:>9} {counts['refused']:>9} {len(wrong):>9}"
+        )
+        print(
+            *(f"  {what}" for what in wrong[:_SHOWN]),
+            sep="\n",
+            end="\n" if wrong else "",
+        )
     return int(any(counts.keys() - {"read", "refused"} for counts in found.values()))
 
 
@@ -211,7 +251,9 @@ def _table(data: bytes) -> bool:
     text = data.decode("latin-1")
     lines = [set(_numbers(line)) for line in re.split(r"[\r\n]+", text)]
     for time, energy in states_of(history):
-        assert any({time, energy} <= line for line in lines), f"({time}, {energy}) stands in no line"
+        assert any({time, energy} <= line for line in lines), (
+            f"({time}, {energy}) stands in no line"
+        )
     return True
 
 

@@ -23,4 +23,6 @@ def scan() -> tuple[dict[str, float], ...]:
     """Switched runs: times, true signs of both springs, and the computed residual."""
     names = ("tr_s", "td_s", "sign1", "sign2", "R_sim")
     with results("chain_scan.csv").open(encoding="ascii") as lines:
-        return tuple({name: float(row[name]) for name in names} for row in csv.DictReader(lines))
+        return tuple(
+            {name: float(row[name]) for name in names} for row in csv.DictReader(lines)
+        )

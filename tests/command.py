@@ -26,34 +26,59 @@ ROLLOVER = str(ROOT / "sample_data" / "rollover.csv")
 DECK = str(ROOT / "sample_data" / "switching.k")
 MATSUM = str(ROOT / "sample_data" / "rollover_box.matsum")
 BOX = str(ROOT / "sample_data" / "rolloverT01.gz")
-OSCILLATOR = tuple(shlex.split("--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6"))
+OSCILLATOR = tuple(
+    shlex.split("--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6")
+)
 _TEMPORARY = Path(tempfile.gettempdir())
 _ANSWERED: dict[Hashable, Result] = {}
 INTERRUPTIBLE = (
-    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\nfrom d2rpick.__main__ import main; main()"
+    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\nfrom "
+    "d2rpick.__main__ import main; main()"
 )
 # No colour variables and no options that the tester's own environment may set.
-_ENVIRONMENT = {"NO_COLOR": None, "FORCE_COLOR": None, "COLUMNS": None, "D2RPICK_SUGGEST_TD": None}
+_ENVIRONMENT = {
+    "NO_COLOR": None,
+    "FORCE_COLOR": None,
+    "COLUMNS": None,
+    "D2RPICK_SUGGEST_TD": None,
+}
 # Before 8.2, click's runner mixes the streams unless it is told not to.
-_APART: dict[str, Any] = {"mix_stderr": False} if "mix_stderr" in signature(CliRunner).parameters else {}
+_APART: dict[str, Any] = (
+    {"mix_stderr": False} if "mix_stderr" in signature(CliRunner).parameters else {}
+)
 
 
 def run(
-    *args: str, stdin: bytes | None = None, color: bool = False, env: Mapping[str, str | None] | None = None
+    *args: str,
+    stdin: bytes | None = None,
+    color: bool = False,
+    env: Mapping[str, str | None] | None = None,
 ) -> Result:
     """Call ``d2rpick`` with these arguments; whatever it raises but the exit itself is raised here.
 
     What was asked before of files of the clone alone is not computed again.
     """
     given = {**_ENVIRONMENT, **(env or {})}
-    around = frozenset((name, value) for name, value in os.environ.items() if name != "PYTEST_CURRENT_TEST")
+    around = frozenset(
+        (name, value)
+        for name, value in os.environ.items()
+        if name != "PYTEST_CURRENT_TEST"
+    )
     asked = (args, stdin, color, *given.items(), around, Path.cwd())
     if asked in _ANSWERED:
         return _ANSWERED[asked]
-    result = CliRunner(**_APART).invoke(d2rpick, args, input=stdin, color=color, env=given)
+    result = CliRunner(**_APART).invoke(
+        d2rpick, args, input=stdin, color=color, env=given
+    )
     if result.exception and not isinstance(result.exception, SystemExit):
         raise result.exception
-    if not any(_changes(folder) for folder in (Path.cwd(), *(Path(arg).absolute() for arg in args if "/" in arg))):
+    if not any(
+        _changes(folder)
+        for folder in (
+            Path.cwd(),
+            *(Path(arg).absolute() for arg in args if "/" in arg),
+        )
+    ):
         _ANSWERED[asked] = result
     return result
 
@@ -76,7 +101,9 @@ def refused(*args: str) -> str:
 def _changes(path: Path) -> bool:
     """Whether a file is temporary, or of a temporary folder; those of the clone stay as they are."""
     path = Path(os.path.normpath(path))
-    return not path.is_relative_to(ROOT) and (path == _TEMPORARY or _TEMPORARY in path.parents)
+    return not path.is_relative_to(ROOT) and (
+        path == _TEMPORARY or _TEMPORARY in path.parents
+    )
 
 
 def unwrapped(text: str) -> str:
@@ -91,7 +118,12 @@ def started(*args: str, **options: Any) -> Iterator[subprocess.Popen[Any]]:
     It can be interrupted also where this process cannot, as in the background of a shell.
     """
     command = [sys.executable, "-c", INTERRUPTIBLE, *args]
-    given = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "cwd": ROOT, **options}
+    given = {
+        "stdout": subprocess.PIPE,
+        "stderr": subprocess.PIPE,
+        "cwd": ROOT,
+        **options,
+    }
     with subprocess.Popen(command, start_new_session=True, **given) as process:
         watch = Timer(TIME_LIMIT, _end, [process.pid])
         watch.start()

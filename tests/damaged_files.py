@@ -23,7 +23,9 @@ Read = TypeVar("Read")
 
 STATES = 6
 PARTS = (7, 3)
-MEMORY = 1 << 22  # far above what the small files need, far below what a damaged length may promise
+MEMORY = (
+    1 << 22
+)  # far above what the small files need, far below what a damaged length may promise
 
 
 def true_binout(data: bytes) -> list[tuple[int, bool]]:
@@ -32,22 +34,32 @@ def true_binout(data: bytes) -> list[tuple[int, bool]]:
     if run is not None and run.complete and not run.notes:
         assert {"time", *run.channels} == {*GLSTAT}, "a lost variable is told"
         for times in (refused_or(lambda: run.time), refused_or(lambda: run.part_time)):
-            assert times is None or times[:1].tolist() in ([], [1 / 8]), "a lost first state is told"
-    return true_columns(lambda: Binout([("binout", data)]), ("internal_energy", "z_momentum"), values)
+            assert times is None or times[:1].tolist() in ([], [1 / 8]), (
+                "a lost first state is told"
+            )
+    return true_columns(
+        lambda: Binout([("binout", data)]), ("internal_energy", "z_momentum"), values
+    )
 
 
 def t01_value(name: str, state: int, part: int = 0) -> float:
     return value(state, part, {"internal_energy": 1, "z_momentum": 5}[name])
 
 
-def true_t01(data: bytes, of: Callable[..., float] = t01_value) -> list[tuple[int, bool]]:
+def true_t01(
+    data: bytes, of: Callable[..., float] = t01_value
+) -> list[tuple[int, bool]]:
     """Read everything; what is read must be true."""
-    return true_columns(lambda: TimeHistory(data, "runT01"), ("internal_energy", "z_momentum"), of)
+    return true_columns(
+        lambda: TimeHistory(data, "runT01"), ("internal_energy", "z_momentum"), of
+    )
 
 
 def true_text(data: bytes) -> list[tuple[int, bool]]:
     """The same of a text."""
-    return true_t01(data, lambda name, state, part=0: printed(t01_value(name, state, part)))
+    return true_t01(
+        data, lambda name, state, part=0: printed(t01_value(name, state, part))
+    )
 
 
 def printed(number: float) -> float:
@@ -65,7 +77,11 @@ def true_columns(
     for name in names:
         columns = [(lambda: run.time, partial(run.channel, name), partial(true, name))]
         columns += [
-            (lambda: run.part_time, partial(run.part_channel, name, [id_]), partial(true, name, part=id_))
+            (
+                lambda: run.part_time,
+                partial(run.part_channel, name, [id_]),
+                partial(true, name, part=id_),
+            )
             for id_ in PARTS
         ]
         for times, numbers, of_state in columns:
@@ -143,9 +159,13 @@ class Damaged:
             for _ in range(random.randint(what == "flip", 4)):
                 changed[random.choice(self.structure)] = random.randrange(256)
             at = random.choice(marks)
-            changed[at:at] = random.randbytes(random.randint(1, 40) if what == "insert" else 0)
+            changed[at:at] = random.randbytes(
+                random.randint(1, 40) if what == "insert" else 0
+            )
             return bytes(changed)
-        records = [self.data[begin:end] for begin, end in pairwise([*marks, len(changed)])]
+        records = [
+            self.data[begin:end] for begin, end in pairwise([*marks, len(changed)])
+        ]
         first, length = random.randrange(len(records)), random.randint(1, 30)
         length += self.per_state > 1 and length % self.per_state == 0
         moved = records[first : first + length]

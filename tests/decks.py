@@ -22,7 +22,12 @@ def row(*ids: int, width: int = 8) -> str:
     return wide(*ids, width=width)
 
 
-def write(folder: Path, deck: str | bytes, files: Mapping[str, str] | None = None, name: str = MAIN) -> str:
+def write(
+    folder: Path,
+    deck: str | bytes,
+    files: Mapping[str, str] | None = None,
+    name: str = MAIN,
+) -> str:
     """Path of the main deck, written with the files it includes."""
     for other, text in (files or {}).items():
         (folder / other).parent.mkdir(parents=True, exist_ok=True)
@@ -32,7 +37,9 @@ def write(folder: Path, deck: str | bytes, files: Mapping[str, str] | None = Non
     return str(path)
 
 
-def read(folder: Path, deck: str | bytes, files: Mapping[str, str] | None = None) -> Deck:
+def read(
+    folder: Path, deck: str | bytes, files: Mapping[str, str] | None = None
+) -> Deck:
     return read_deck(write(folder, deck, files))
 
 
@@ -45,6 +52,10 @@ def spans(deck: Deck) -> list[tuple[int | None, float, float | None]]:
     return [(window.part, window.tr, window.td) for window in windows(deck).windows]
 
 
-def found(folder: Path, deck: str | bytes, files: Mapping[str, str] | None = None) -> Counter[str]:
+def found(
+    folder: Path, deck: str | bytes, files: Mapping[str, str] | None = None
+) -> Counter[str]:
     """How often each rule objects."""
-    return Counter(finding.rule for finding in check_deck(write(folder, deck, files)).findings)
+    return Counter(
+        finding.rule for finding in check_deck(write(folder, deck, files)).findings
+    )

@@ -12,10 +12,17 @@ T_END = 1.2
 
 
 @cache
-def drop(*windows: tuple[float, float], height: float = 0.4, tilt: float = 30.0, interval: float = 8e-4) -> Record:
+def drop(
+    *windows: tuple[float, float],
+    height: float = 0.4,
+    tilt: float = 30.0,
+    interval: float = 8e-4,
+) -> Record:
     """Compute a run that is switched in ``windows`` [s]."""
     parameters = Parameters(speed=0.0, drop=height, tilt=tilt, mesh=MESH)
-    return simulate(parameters, T_END, *(RigidWindow(*one) for one in windows), interval=interval)
+    return simulate(
+        parameters, T_END, *(RigidWindow(*one) for one in windows), interval=interval
+    )
 
 
 def written(record: Record, folder: Path) -> list[str]:

@@ -47,7 +47,10 @@ def reference(history: History) -> Reference:
 
 
 def suggest_in_window(
-    history: History, window: tuple[float, float] | None, settings: Settings, fits: Fits | None = None
+    history: History,
+    window: tuple[float, float] | None,
+    settings: Settings,
+    fits: Fits | None = None,
 ) -> Suggestion:
     """Choose both times in a record that was made in memory."""
     return suggest_of(reference(history), window, settings, fits=fits)

@@ -16,12 +16,17 @@ from typing import NamedTuple
 from tests.command import ROOT, run
 
 README = ROOT / "README.md"
-PAGES = {str(path.relative_to(ROOT)): path for path in (README, *sorted((ROOT / "docs").glob("*.md")))}
+PAGES = {
+    str(path.relative_to(ROOT)): path
+    for path in (README, *sorted((ROOT / "docs").glob("*.md")))
+}
 
 _FENCED = re.compile(r"^```(\w*)\n(.*?)^```$", flags=re.DOTALL | re.MULTILINE)
 _PROMPT = "$ d2rpick "  # lines of a card begin with "$ " too
 # A command, continued where its lines end with a backslash, and what is shown up to the next prompt.
-_SESSION = re.compile(r"^\$ (d2rpick (?:.*\\\n)*.*)\n((?:(?!\$ d2rpick ).*\n)*)", flags=re.MULTILINE)
+_SESSION = re.compile(
+    r"^\$ (d2rpick (?:.*\\\n)*.*)\n((?:(?!\$ d2rpick ).*\n)*)", flags=re.MULTILINE
+)
 # The last digits of a number at full precision differ from machine to machine.
 _FULL_PRECISION = re.compile(r"\d+\.\d{13,}(?:e[+-]\d+)?")
 _NEXT_TO_NOTHING = re.compile(r"\b\d\.\d+e-(?:0[5-9]|[1-9]\d)\b")
@@ -58,7 +63,10 @@ def sessions(text: str) -> Iterator[Session]:
     """Sessions of a page in their order."""
     for block in blocks(text, "console"):
         assert block.startswith(_PROMPT), block
-        yield from (Session(command, shown.rstrip("\n")) for command, shown in _SESSION.findall(block))
+        yield from (
+            Session(command, shown.rstrip("\n"))
+            for command, shown in _SESSION.findall(block)
+        )
 
 
 def printed(command: str) -> str:

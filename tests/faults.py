@@ -16,7 +16,11 @@ _MORE = int(os.environ.get("D2RPICK_THOROUGH", "1"))
 
 def cases(count: int) -> settings:
     """So many examples of hypothesis, slow or large as they are."""
-    return settings(max_examples=count * _MORE, deadline=None, suppress_health_check=list(HealthCheck))
+    return settings(
+        max_examples=count * _MORE,
+        deadline=None,
+        suppress_health_check=list(HealthCheck),
+    )
 
 
 def inputs(count: int) -> int:
@@ -31,7 +35,11 @@ def some(items: Sequence[Item], step: int = 97) -> Sequence[Item]:
 
 def cuts(text: bytes) -> list[int]:
     """Where to cut a text: next to all ends of its lines and at some places between, everywhere in a thorough run."""
-    ends = {found.end() + shift for found in re.finditer(rb"\n|$", text) for shift in (-2, -1, 0, 1)}
+    ends = {
+        found.end() + shift
+        for found in re.finditer(rb"\n|$", text)
+        for shift in (-2, -1, 0, 1)
+    }
     return sorted({*some(range(len(text)), 7), *ends} & {*range(len(text) + 1)})
 
 
@@ -47,7 +55,9 @@ FAULTS = st.lists(
     min_size=1,
     max_size=3,
 )
-State = tuple[float | None, list[float | None]]  # time and energies; None for what is no number
+State = tuple[
+    float | None, list[float | None]
+]  # time and energies; None for what is no number
 
 
 def damage(text: bytes, faults: list[Fault], borders: list[int]) -> bytes:
@@ -57,7 +67,10 @@ def damage(text: bytes, faults: list[Fault], borders: list[int]) -> bytes:
         end = min(len(text), at + 1 + int(much**4 * len(text)))
         if byte % 2 and borders:
             first = int(where * (len(borders) - 1))
-            at, end = borders[first], borders[min(len(borders) - 1, first + 1 + int(3 * much))]
+            at, end = (
+                borders[first],
+                borders[min(len(borders) - 1, first + 1 + int(3 * much))],
+            )
         span = text[at:end]
         text = {
             "flip": text[:at] + bytes([byte]) + text[at + 1 :],
@@ -90,7 +103,10 @@ def states_of(text: bytes, start: bytes, width: int) -> list[tuple[bytes, list[b
             states.append((line[len(start) :], []))
         elif states:
             states[-1][1].append(line)
-    return [(field if not field[width : width + 1].strip() else b"", lines) for field, lines in states]
+    return [
+        (field if not field[width : width + 1].strip() else b"", lines)
+        for field, lines in states
+    ]
 
 
 def value(field: bytes, width: int) -> float | None:
@@ -102,7 +118,10 @@ def value(field: bytes, width: int) -> float | None:
 
 def glstat_states(text: bytes) -> list[State]:
     def is_energy(line: bytes) -> bool:
-        return line[31:32] == b"." and line[:32].rstrip(b".").rstrip() == b" internal energy"
+        return (
+            line[31:32] == b"."
+            and line[:32].rstrip(b".").rstrip() == b" internal energy"
+        )
 
     return [
         (value(time, 14), [value(line[32:], 14) for line in lines if is_energy(line)])
@@ -113,15 +132,23 @@ def glstat_states(text: bytes) -> list[State]:
 def matsum_states(text: bytes, id_: int) -> list[State]:
     label = b" mat.#=%5d             inten=" % id_
     return [
-        (value(time, 13), [value(line[31:], 13) for line in lines if line.startswith(label)])
+        (
+            value(time, 13),
+            [value(line[31:], 13) for line in lines if line.startswith(label)],
+        )
         for time, lines in states_of(text, b" time =", 13)
     ]
 
 
-def is_within(found: list[tuple[float, float]], states: list[State], most: int = 1) -> bool:
+def is_within(
+    found: list[tuple[float, float]], states: list[State], most: int = 1
+) -> bool:
     """Whether ``found`` stand in ``states``, in their order, each in a state with ``most`` such lines."""
     rest = iter(states)
     return all(
-        any(time == here and energy in energies and len(energies) <= most for here, energies in rest)
+        any(
+            time == here and energy in energies and len(energies) <= most
+            for here, energies in rest
+        )
         for time, energy in found
     )

@@ -20,7 +20,10 @@ DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 def documents() -> dict[str, Document]:
     """Give the documents of all results by the names of their schemas, as ``suggest-1``."""
-    found = (reproduction.DOCUMENT, *(import_module(f"d2rpick.report.{result}").DOCUMENT for result in FORMATS))
+    found = (
+        reproduction.DOCUMENT,
+        *(import_module(f"d2rpick.report.{result}").DOCUMENT for result in FORMATS),
+    )
     return {one.name.removeprefix("d2rpick/").replace("/", "-"): one for one in found}
 
 
@@ -36,7 +39,11 @@ def schema_of(document: Document) -> dict[str, Any]:
     whole = _plain(document.whole.schema, defined, document.closed)
     for kind in document.also:
         _plain(kind, defined, document.closed)
-    about = {"$schema": DRAFT, "title": f"d2rpick {document.name.split('/')[1]}", "description": document.meaning}
+    about = {
+        "$schema": DRAFT,
+        "title": f"d2rpick {document.name.split('/')[1]}",
+        "description": document.meaning,
+    }
     return {**about, **whole, **({"$defs": defined} if defined else {})}
 
 
@@ -44,20 +51,35 @@ def _plain(schema: Any, defined: dict[str, Any], closed: bool) -> Any:
     """Put schemas in the place of kinds and fields; what has a name is defined once and referred to."""
     if isinstance(schema, Field):
         found = _plain(kind_of(schema.kind), defined, closed)
-        described = defined[kind_of(schema.kind).name] if kind_of(schema.kind).name else found
+        described = (
+            defined[kind_of(schema.kind).name] if kind_of(schema.kind).name else found
+        )
         described.update({"description": schema.meaning} if schema.meaning else {})
         return found
     if isinstance(schema, Kind):
         if not schema.name:
             return _plain(schema.schema, defined, closed)
-        defined[schema.name] = {**_plain(schema.schema, defined, closed), **defined.get(schema.name, {})}
+        defined[schema.name] = {
+            **_plain(schema.schema, defined, closed),
+            **defined.get(schema.name, {}),
+        }
         return {"$ref": f"#/$defs/{schema.name}"}
     if isinstance(schema, Mapping):
         found = {key: _plain(value, defined, closed) for key, value in schema.items()}
-        return {**found, "additionalProperties": False} if closed and "properties" in found else found
-    return [_plain(one, defined, closed) for one in schema] if isinstance(schema, (list, tuple)) else schema
+        return (
+            {**found, "additionalProperties": False}
+            if closed and "properties" in found
+            else found
+        )
+    return (
+        [_plain(one, defined, closed) for one in schema]
+        if isinstance(schema, (list, tuple))
+        else schema
+    )
 
 
 if __name__ == "__main__":
     for name, document in documents().items():
-        (SCHEMAS / f"{name}.json").write_text(f"{json.dumps(schema_of(document), indent=1)}\n", "utf-8")
+        (SCHEMAS / f"{name}.json").write_text(
+            f"{json.dumps(schema_of(document), indent=1)}\n", "utf-8"
+        )

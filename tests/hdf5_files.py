@@ -20,7 +20,11 @@ def written(write: Callable[[h5py.File], None]) -> io.BytesIO:
 
 
 def plain(file: h5py.File) -> None:
-    file["time"], file["internal_energy"], file["kinetic_energy"] = TIME, ENERGY, KINETIC
+    file["time"], file["internal_energy"], file["kinetic_energy"] = (
+        TIME,
+        ENERGY,
+        KINETIC,
+    )
 
 
 def columns_upright(file: h5py.File) -> None:
@@ -60,7 +64,9 @@ def pandas_values_block(file: h5py.File) -> None:
     rows["index"], rows["values_block_0"] = TIME, np.column_stack([KINETIC, ENERGY])
     file["run/table"] = rows
     file["run"].attrs["pandas_type"] = np.bytes_(b"frame_table")
-    file["run"].attrs["info"] = np.bytes_(b"(dp0\nI1\n(dp1\nsVindex\np6\n(dp7\nVindex_name\np8\nVtime\np9\nss.")
+    file["run"].attrs["info"] = np.bytes_(
+        b"(dp0\nI1\n(dp1\nsVindex\np6\n(dp7\nVindex_name\np8\nVtime\np9\nss."
+    )
     names = b"(lp0\nVkinetic_energy\np1\naVinternal_energy\np2\na."
     file["run/table"].attrs["values_block_0_kind"] = np.bytes_(names)
     file["run/_i_table/index/sorted"] = np.arange(9.0)
@@ -69,12 +75,18 @@ def pandas_values_block(file: h5py.File) -> None:
 def pandas_frame(file: h5py.File) -> None:
     """The "fixed" store: an index, and a block of columns of each type."""
     file.create_group("run")
-    file["run"].attrs["pandas_type"], file["run"].attrs["nblocks"] = np.bytes_(b"frame"), 2
+    file["run"].attrs["pandas_type"], file["run"].attrs["nblocks"] = (
+        np.bytes_(b"frame"),
+        2,
+    )
     file["run/axis1"] = TIME
     file["run/axis1"].attrs["name"] = np.bytes_(b"time")
     file["run/block0_items"] = np.array([b"kinetic_energy", b"internal_energy"])
     file["run/block0_values"] = np.column_stack([KINETIC, ENERGY])
-    file["run/block1_items"], file["run/block1_values"] = np.array([b"note"]), np.full((4, 1), b"x")
+    file["run/block1_items"], file["run/block1_values"] = (
+        np.array([b"note"]),
+        np.full((4, 1), b"x"),
+    )
 
 
 def pandas_series(file: h5py.File) -> None:
@@ -84,12 +96,24 @@ def pandas_series(file: h5py.File) -> None:
 
 
 def lasso(file: h5py.File) -> None:
-    file["glstat/time"], file["glstat/internal_energy"], file["glstat/kinetic_energy"] = TIME, ENERGY, KINETIC
+    (
+        file["glstat/time"],
+        file["glstat/internal_energy"],
+        file["glstat/kinetic_energy"],
+    ) = TIME, ENERGY, KINETIC
     file["glstat/title"] = np.array([b"Sphere      "])
-    file["glstat/version"], file["glstat/revision"] = np.array([b"smp s  "]), np.array([b"365"])
+    file["glstat/version"], file["glstat/revision"] = (
+        np.array([b"smp s  "]),
+        np.array([b"365"]),
+    )
     file["matsum/time"], file["matsum/internal_energy"] = TIME + 1e-6, PARTS
-    file["matsum/ids"], file["matsum/legend_ids"] = np.array([1, 101]), np.array([101, 1, 7])
-    file["matsum/legend"] = np.array([b"box".ljust(80) + b"ground".ljust(80) + b"unseen".ljust(80)])
+    file["matsum/ids"], file["matsum/legend_ids"] = (
+        np.array([1, 101]),
+        np.array([101, 1, 7]),
+    )
+    file["matsum/legend"] = np.array(
+        [b"box".ljust(80) + b"ground".ljust(80) + b"unseen".ljust(80)]
+    )
 
 
 LAYOUTS = {

@@ -48,12 +48,22 @@ def _junit() -> Any:
 
 @cache
 def _sarif() -> jsonschema.Draft4Validator:
-    return jsonschema.Draft4Validator(json.loads((OF_OTHERS / "sarif-2.1.0.json").read_text("utf-8")))
+    return jsonschema.Draft4Validator(
+        json.loads((OF_OTHERS / "sarif-2.1.0.json").read_text("utf-8"))
+    )
 
 
 @cache
-def _holder(name: str, definition: str | None = None) -> jsonschema.Draft202012Validator:
-    schema = json.loads((files("d2rpick") / "schemas" / f"{name}.json").read_text("utf-8"))
+def _holder(
+    name: str, definition: str | None = None
+) -> jsonschema.Draft202012Validator:
+    schema = json.loads(
+        (files("d2rpick") / "schemas" / f"{name}.json").read_text("utf-8")
+    )
     jsonschema.Draft202012Validator.check_schema(schema)
-    asked = {"$ref": f"#/$defs/{definition}", "$defs": schema["$defs"]} if definition else schema
+    asked = (
+        {"$ref": f"#/$defs/{definition}", "$defs": schema["$defs"]}
+        if definition
+        else schema
+    )
     return jsonschema.Draft202012Validator(asked)

@@ -46,9 +46,13 @@ class LsdaWriter:
     def __post_init__(self) -> None:
         s = self.style
         self._head = struct.Struct(s.order + _FIELDS[s.length] + _FIELDS[s.command])
-        self._symbol = struct.Struct(s.order + _FIELDS[s.type_id] + _FIELDS[s.offset] + _FIELDS[s.length])
+        self._symbol = struct.Struct(
+            s.order + _FIELDS[s.type_id] + _FIELDS[s.offset] + _FIELDS[s.length]
+        )
         self._offset = struct.Struct(s.order + _FIELDS[s.offset])
-        self.data += bytes([8, s.length, s.offset, s.command, s.type_id, s.order == "<", 0, 0])
+        self.data += bytes(
+            [8, s.length, s.offset, s.command, s.type_id, s.order == "<", 0, 0]
+        )
         self._link = len(self.data) + self._head.size
         self.record(7, self._offset.pack(0))
         self._path = "/"
@@ -64,10 +68,18 @@ class LsdaWriter:
         self.record(2, (text or path).encode())
 
     def put(self, name: str, values: Any, kind: str) -> None:
-        raw = values if isinstance(values, bytes) else np.asarray(values, self.style.order + kind).tobytes()
+        raw = (
+            values
+            if isinstance(values, bytes)
+            else np.asarray(values, self.style.order + kind).tobytes()
+        )
         count = len(raw) // int(kind[1])
-        entry = bytes(name, "ascii") + self._symbol.pack(_TYPES[kind], len(self.data), count)
-        self._dirty.setdefault(self._path, []).append(self._head.pack(self._head.size + len(entry), 4) + entry)
+        entry = bytes(name, "ascii") + self._symbol.pack(
+            _TYPES[kind], len(self.data), count
+        )
+        self._dirty.setdefault(self._path, []).append(
+            self._head.pack(self._head.size + len(entry), 4) + entry
+        )
         code = struct.pack(self.style.order + _FIELDS[self.style.type_id], _TYPES[kind])
         self.record(3, code + bytes([len(name)]) + name.encode() + raw)
 
@@ -75,7 +87,11 @@ class LsdaWriter:
         """Write a symbol table and link it to the last one."""
         body = b""
         for path, entries in self._dirty.items():
-            body += self._head.pack(self._head.size + len(path), 2) + path.encode() + b"".join(entries)
+            body += (
+                self._head.pack(self._head.size + len(path), 2)
+                + path.encode()
+                + b"".join(entries)
+            )
         body += self._head.pack(self._head.size + self.style.offset, 6)
         self._offset.pack_into(self.data, self._link, len(self.data))
         self.record(5, body + self._offset.pack(0))
@@ -86,7 +102,9 @@ class LsdaWriter:
 def values(name: str, state: int, part: int = 0) -> float:
     """A number that belongs to one variable, state and part only, exact in single precision to state 4000."""
     names = [*GLSTAT, *MATSUM]
-    return names.index(name) * 8192.0 + state + part / 64 if name != "time" else state / 8
+    return (
+        names.index(name) * 8192.0 + state + part / 64 if name != "time" else state / 8
+    )
 
 
 def binout(
@@ -115,23 +133,33 @@ def binout(
         made.put("revision", bytes(10), "i1")
     if not parts_of:
         made.put("ids", parts, "i4")
-    made.put("legend", b"".join(title.encode().ljust(70) for title in titles.values()), "i1")
+    made.put(
+        "legend", b"".join(title.encode().ljust(70) for title in titles.values()), "i1"
+    )
     made.put("legend_ids", list(titles), "i4")
     for state in states:
         if glstat:
-            made.cd(f"/glstat/d{state:06d}", f"../../glstat/d{state:06d}" if relative else None)
+            made.cd(
+                f"/glstat/d{state:06d}",
+                f"../../glstat/d{state:06d}" if relative else None,
+            )
             made.put("cycle", [state], "i4")
             for name in GLSTAT:
                 made.put(name, [values(name, state + shift)], style.real)
         if state % matsum_every == 0:
             number = state // matsum_every  # each branch counts its own states
-            made.cd(f"/matsum/d{number:06d}", f"../../matsum/d{number:06d}" if relative else None)
+            made.cd(
+                f"/matsum/d{number:06d}",
+                f"../../matsum/d{number:06d}" if relative else None,
+            )
             made.put("time", [values("time", state + shift)], style.real)
             here = parts_of(state) if parts_of else parts
             if parts_of:
                 made.put("ids", here, "i4")
             for name in MATSUM:
-                made.put(name, [values(name, state + shift, id_) for id_ in here], style.real)
+                made.put(
+                    name, [values(name, state + shift, id_) for id_ in here], style.real
+                )
         if tables:
             made.table()
     return made

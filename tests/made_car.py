@@ -15,7 +15,13 @@ from tests.made_t01 import MadePart, headed
 
 BODY: Final = (1, 2, 3, 4, 5, 6)
 WHEELS: Final = (7, 8, 9)
-TITLES: Final = {**dict.fromkeys(BODY, "panel"), 6: "engine", 7: "hubs", 8: "tyre", 9: "tyre"}
+TITLES: Final = {
+    **dict.fromkeys(BODY, "panel"),
+    6: "engine",
+    7: "hubs",
+    8: "tyre",
+    9: "tyre",
+}
 MASSES: Final = np.array([70.0, 80.0, 90.0, 75.0, 85.0, 200.0, 30.0, 10.0, 10.0])
 ENGINE: Final = BODY.index(6)
 LANDS, WHEELS_LAND = 0.15, 0.06
@@ -25,42 +31,70 @@ _CODES: Final = (1, 2, 3, 4, 5, 6)  # energies, momentum, mass
 
 def quads() -> Iterator[tuple[int, tuple[int, int, int, int]]]:
     """Elements as part and nodes: six that share nodes, and two wheels of a hub and a tyre each."""
-    yield from ((part, (n, n + 1, n + 5, n + 4)) for part, n in zip(BODY, (1, 2, 3, 5, 6, 7), strict=True))
+    yield from (
+        (part, (n, n + 1, n + 5, n + 4))
+        for part, n in zip(BODY, (1, 2, 3, 5, 6, 7), strict=True)
+    )
     for first, tyre in ((21, 8), (31, 9)):
-        yield from ((of, (n, n + 1, n + 3, n + 2)) for of, n in ((7, first), (tyre, first + 2)))
+        yield from (
+            (of, (n, n + 1, n + 3, n + 2)) for of, n in ((7, first), (tyre, first + 2))
+        )
 
 
 def places() -> dict[int, tuple[float, float, float]]:
     """Nodes of the mesh [m]: the body is no plane, so that its parts show how it turns."""
-    found = {1 + x + 4 * y: (1.2 * x, 0.8 * y, 0.3 * (x - 1) * (y - 1)) for x in range(4) for y in range(3)}
+    found = {
+        1 + x + 4 * y: (1.2 * x, 0.8 * y, 0.3 * (x - 1) * (y - 1))
+        for x in range(4)
+        for y in range(3)
+    }
     for first, y in ((21, -1.0), (31, 3.0)):
-        found |= {first + x + 2 * z: (1.0 + 0.4 * x, y, -0.5 + 0.2 * z) for x in range(2) for z in range(3)}
+        found |= {
+            first + x + 2 * z: (1.0 + 0.4 * x, y, -0.5 + 0.2 * z)
+            for x in range(2)
+            for z in range(3)
+        }
     return found
 
 
 def centres() -> Samples:
     """Where the parts lie, (parts, 3): means of their elements."""
     at = places()
-    return np.array([np.mean([at[n] for of, nodes in quads() if of == part for n in nodes], axis=0) for part in TITLES])
+    return np.array(
+        [
+            np.mean(
+                [at[n] for of, nodes in quads() if of == part for n in nodes], axis=0
+            )
+            for part in TITLES
+        ]
+    )
 
 
 def momenta(periods: float, wheels_land: float = WHEELS_LAND) -> Samples:
     """Momenta over `TIME`, (n, parts, 3): the engine swings so often until the landing, the wheels fly away."""
     body, masses = len(BODY), MASSES[: len(BODY)]
     inside = np.repeat(centres()[np.newaxis, :body], TIME.size, axis=0)
-    inside[:, ENGINE] += np.outer(0.02 * np.sin(2 * np.pi * periods * TIME / LANDS), (0.2, 0.6, 0.8))
+    inside[:, ENGINE] += np.outer(
+        0.02 * np.sin(2 * np.pi * periods * TIME / LANDS), (0.2, 0.6, 0.8)
+    )
     inside -= np.einsum("p,npi->ni", masses / masses.sum(), inside)[:, np.newaxis]
     sine, cosine = np.sin(1.5 * TIME), np.cos(1.5 * TIME)
     where = inside.copy()
-    where[:, :, 1] = cosine[:, np.newaxis] * inside[:, :, 1] - sine[:, np.newaxis] * inside[:, :, 2]
-    where[:, :, 2] = sine[:, np.newaxis] * inside[:, :, 1] + cosine[:, np.newaxis] * inside[:, :, 2]
+    where[:, :, 1] = (
+        cosine[:, np.newaxis] * inside[:, :, 1] - sine[:, np.newaxis] * inside[:, :, 2]
+    )
+    where[:, :, 2] = (
+        sine[:, np.newaxis] * inside[:, :, 1] + cosine[:, np.newaxis] * inside[:, :, 2]
+    )
     velocity = np.empty((TIME.size, len(TITLES), 3))
     velocity[:, :body] = np.gradient(where, TIME, axis=0, edge_order=2)
     velocity[:, body:] = (0.0, 3.0, 0.0)
     velocity += (4.0, -2.5, -1.0)
     for parts, begin in ((slice(body), LANDS), (slice(body, None), wheels_land)):
         after = np.clip(TIME - begin, 0.0, None)[:, np.newaxis]
-        velocity[:, parts, 2] += 2.0 * np.sin(60 * after) ** 2 - 9.81 * TIME[:, np.newaxis]
+        velocity[:, parts, 2] += (
+            2.0 * np.sin(60 * after) ** 2 - 9.81 * TIME[:, np.newaxis]
+        )
     return np.asarray(velocity * MASSES[:, np.newaxis])
 
 
@@ -71,9 +105,16 @@ def t01(folder: Path, periods: float, wheels_land: float = WHEELS_LAND) -> str:
     parts = [MadePart(part, title, _CODES) for part, title in TITLES.items()]
     made = headed(parts, globals_=len(_CODES))
     for i in range(TIME.size):
-        rows = [[energy[i] * m / 100, p @ p / (2 * m), *p, m] for p, m in zip(moved[i], MASSES, strict=True)]
+        rows = [
+            [energy[i] * m / 100, p @ p / (2 * m), *p, m]
+            for p, m in zip(moved[i], MASSES, strict=True)
+        ]
         whole = np.sum(rows, axis=0)
-        made.state(TIME[i], [whole[0], whole[1], *whole[2:5], whole[5]], [value for row in rows for value in row])
+        made.state(
+            TIME[i],
+            [whole[0], whole[1], *whole[2:5], whole[5]],
+            [value for row in rows for value in row],
+        )
     name = folder / "MADET01"
     name.write_bytes(bytes(made.data))
     return str(name)
@@ -81,12 +122,16 @@ def t01(folder: Path, periods: float, wheels_land: float = WHEELS_LAND) -> str:
 
 def starter(folder: Path, more: str = "") -> str:
     """Write the starter deck of Radioss, and give its name."""
-    nodes = "".join(f"{node:10d}{x:20g}{y:20g}{z:20g}\n" for node, (x, y, z) in places().items())
+    nodes = "".join(
+        f"{node:10d}{x:20g}{y:20g}{z:20g}\n" for node, (x, y, z) in places().items()
+    )
     text = f"#RADIOSS STARTER\n/BEGIN\nMADE\n      2022         0\n/NODE\n{nodes}"
     text += "/MAT/ELAST/1\nsteel\n              7800.0\n         210000000000                 0.3\n"
     text += "/PROP/SHELL/1\nshell\n        24\n\n\n         3         0               0.001\n"
     for part, title in TITLES.items():
-        rows = (_row(n, *nodes) for n, (of, nodes) in enumerate(quads(), 1) if of == part)
+        rows = (
+            _row(n, *nodes) for n, (of, nodes) in enumerate(quads(), 1) if of == part
+        )
         text += f"/PART/{part}\n{title}\n{_row(1, 1)}/SHELL/{part}\n{''.join(rows)}"
     name = folder / "MADE_0000.rad"
     text += "/GRAV/1\ngravity\n" + f"{'':10}{'Z':>10}".ljust(80) + f"{-9.81:20g}\n"
@@ -96,14 +141,21 @@ def starter(folder: Path, more: str = "") -> str:
 
 def keywords(folder: Path, more: str = "") -> str:
     """Write the same as a deck of LS-DYNA, and give its name."""
-    text = "*KEYWORD\n" + "".join(f"*PART\n{title}\n{_row(part, 1, 1)}" for part, title in TITLES.items())
+    text = "*KEYWORD\n" + "".join(
+        f"*PART\n{title}\n{_row(part, 1, 1)}" for part, title in TITLES.items()
+    )
     text += f"*SECTION_SHELL\n{_row(1, 2)}     0.001     0.001     0.001     0.001\n"
     text += "*MAT_ELASTIC\n         1    7800.0    2.1e11       0.3\n*NODE\n"
-    text += "".join(f"{node:8d}{x:16g}{y:16g}{z:16g}\n" for node, (x, y, z) in places().items())
-    rows = (_row(n, part, *nodes, width=8) for n, (part, nodes) in enumerate(quads(), 1))
+    text += "".join(
+        f"{node:8d}{x:16g}{y:16g}{z:16g}\n" for node, (x, y, z) in places().items()
+    )
+    rows = (
+        _row(n, part, *nodes, width=8) for n, (part, nodes) in enumerate(quads(), 1)
+    )
     name = folder / "made.k"
     text += (
-        f"*LOAD_BODY_Z\n         1{9.81:10g}\n*DEFINE_CURVE\n         1\n{_row(0, 1, width=20)}{_row(1, 1, width=20)}"
+        f"*LOAD_BODY_Z\n         1{9.81:10g}\n*DEFINE_CURVE\n         1\n"
+        f"{_row(0, 1, width=20)}{_row(1, 1, width=20)}"
     )
     name.write_text(f"{text}*ELEMENT_SHELL\n{''.join(rows)}{more}*END\n")
     return str(name)

@@ -34,9 +34,20 @@ class State:
 
     def values(self) -> list[float]:
         """Give what the state begins with."""
-        whole = [sum(self.kinetic), sum(self.internal), sum(self.kinetic) + sum(self.internal), *self.model]
+        whole = [
+            sum(self.kinetic),
+            sum(self.internal),
+            sum(self.kinetic) + sum(self.internal),
+            *self.model,
+        ]
         velocities = np.ravel(self.velocities)
-        parts = [*self.internal, *self.kinetic, *velocities, *self.masses, *self.hourglass]
+        parts = [
+            *self.internal,
+            *self.kinetic,
+            *velocities,
+            *self.masses,
+            *self.hourglass,
+        ]
         return [self.time, *whole, *parts, *self.walls]
 
 
@@ -95,11 +106,37 @@ class D3plotWriter:
     def words(self) -> dict[str, int]:
         """Give the control words by their names."""
         parts = len(self.ids)
-        sizes = {"numnp": 5, "nel8": 2, "nel4": 1, "nel2": 1, "nelt": 1, "nv3d": 7, "nv2d": 9, "nv1d": 6, "nv3dt": 8}
-        switches = {"filetype": self.family, "ndim": 4, "icode": 6, "iu": 1, "iv": 1, "ia": 1, "maxint": -10003}
+        sizes = {
+            "numnp": 5,
+            "nel8": 2,
+            "nel4": 1,
+            "nel2": 1,
+            "nelt": 1,
+            "nv3d": 7,
+            "nv2d": 9,
+            "nv1d": 6,
+            "nv3dt": 8,
+        }
+        switches = {
+            "filetype": self.family,
+            "ndim": 4,
+            "icode": 6,
+            "iu": 1,
+            "iv": 1,
+            "ia": 1,
+            "maxint": -10003,
+        }
         of_wall = 4 if self.name.strip().startswith("R") or self.release >= 971 else 1
         values = 6 + self.values_of_part * parts + of_wall * self.walls
-        found = {**sizes, **switches, "nglbv": values, "nmmat": parts, "nummat8": parts, "extra": 64, **self.control}
+        found = {
+            **sizes,
+            **switches,
+            "nglbv": values,
+            "nmmat": parts,
+            "nummat8": parts,
+            "extra": 64,
+            **self.control,
+        }
         return {"narbs": self._numbers(found).size if self.numbered else 0, **found}
 
     def head(self) -> bytes:
@@ -112,10 +149,14 @@ class D3plotWriter:
         data[13 * self.width : 13 * self.width + 4] = self.name.encode()
         data[14 * self.width : 15 * self.width] = self.real([self.release])
         solids = abs(words["nel8"])
-        elements = 9 * solids + 9 * words["nelt"] + 6 * words["nel2"] + 5 * words["nel4"]
+        elements = (
+            9 * solids + 9 * words["nelt"] + 6 * words["nel2"] + 5 * words["nel4"]
+        )
         data += self.whole(self.sections.get("control", ()))
         data += self.real([0.5 + node for node in range(3 * words["numnp"])])
-        data += self.whole([1] * elements) + self.whole(self.sections.get("elements", ()))
+        data += self.whole([1] * elements) + self.whole(
+            self.sections.get("elements", ())
+        )
         if self.numbered:
             data += self.whole(self._numbers(words))
         data += self.whole(self.sections.get("ids", ()))
@@ -123,14 +164,23 @@ class D3plotWriter:
 
     def _numbers(self, words: dict[str, int]) -> Any:
         """Ids of nodes, elements and parts."""
-        counts = [words["numnp"], abs(words["nel8"]), words["nel2"], words["nel4"], words["nelt"]]
+        counts = [
+            words["numnp"],
+            abs(words["nel8"]),
+            words["nel2"],
+            words["nel4"],
+            words["nelt"],
+        ]
         head = [-1, 1, 1, 1, 1, *counts, 0, 0, 0, len(self.ids), 0, len(self.ids)]
         each = [number for count in counts for number in range(1, count + 1)]
-        return np.array([*head, *each, *self.ids, *self.ids, *range(1, len(self.ids) + 1)])
+        return np.array(
+            [*head, *each, *self.ids, *self.ids, *range(1, len(self.ids) + 1)]
+        )
 
     def _titles(self) -> bytes:
         rows = b"".join(
-            self.whole([id_]) + title.encode().ljust(72) for id_, title in zip(self.ids, self.titles, strict=False)
+            self.whole([id_]) + title.encode().ljust(72)
+            for id_, title in zip(self.ids, self.titles, strict=False)
         )
         parts = self.whole([90001, len(self.titles)]) + rows if self.titles else b""
         end = self.real([END])
@@ -146,13 +196,21 @@ class D3plotWriter:
             + words["nelt"] * words["nv3dt"]
         )
         solids = abs(words["nel8"]) + words["nel4"] + words["nel2"] + words["nelt"]
-        deleted = solids if words["maxint"] <= -10000 else words["numnp"] if words["maxint"] < 0 else 0
+        deleted = (
+            solids
+            if words["maxint"] <= -10000
+            else words["numnp"]
+            if words["maxint"] < 0
+            else 0
+        )
         rest = 9 * words["numnp"] + elements + deleted + self.more_of_state
         return self.real([*state.values(), *[0.125] * rest])
 
     def file(self, states: Sequence[State], *, ended: bool = True) -> bytes:
         """Write a file of states alone, filled up behind the mark of its end."""
-        return self.filled(b"".join(map(self.state, states)) + (self.real([END]) if ended else b""))
+        return self.filled(
+            b"".join(map(self.state, states)) + (self.real([END]) if ended else b"")
+        )
 
     def filled(self, data: bytes) -> bytes:
         """Fill a file up to whole blocks."""
@@ -162,8 +220,16 @@ class D3plotWriter:
         """Write one file of all."""
         return self.head() + self.file(states)
 
-    def written(self, states: Sequence[State], per_file: int = 1, name: str = "d3plot") -> dict[str, bytes]:
+    def written(
+        self, states: Sequence[State], per_file: int = 1, name: str = "d3plot"
+    ) -> dict[str, bytes]:
         """Write a family of so many states a file, by the names of its files."""
-        groups = [states[begin : begin + per_file] for begin in range(0, len(states), per_file)]
-        behind = {f"{name}{number:02d}": self.file(group) for number, group in enumerate(groups, start=1)}
+        groups = [
+            states[begin : begin + per_file]
+            for begin in range(0, len(states), per_file)
+        ]
+        behind = {
+            f"{name}{number:02d}": self.file(group)
+            for number, group in enumerate(groups, start=1)
+        }
         return {name: self.filled(self.head()), **behind}

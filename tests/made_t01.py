@@ -21,7 +21,9 @@ class T01Writer:
         self.marks.append(len(self.data))
         self.data += struct.pack(">i", len(body)) + body + struct.pack(">i", len(body))
 
-    def titled(self, first: Sequence[int], title: str, last: Sequence[int] = ()) -> None:
+    def titled(
+        self, first: Sequence[int], title: str, last: Sequence[int] = ()
+    ) -> None:
         self.record(packed("i", first) + title.encode() + packed("i", last))
 
     def integers(self, *numbers: int) -> None:
@@ -57,17 +59,31 @@ class T01TextWriter(T01Writer):
     def line(self, text: str) -> None:
         self.data += text.encode() + self.line_end
 
-    def titled(self, first: Sequence[int], title: str, last: Sequence[int] = ()) -> None:
-        is_run = not last and len(self.marks) < 2  # then the name of the file stands before it
+    def titled(
+        self, first: Sequence[int], title: str, last: Sequence[int] = ()
+    ) -> None:
+        is_run = (
+            not last and len(self.marks) < 2
+        )  # then the name of the file stands before it
         if is_run:
             self.line("runT01 FORMAT")
             title = title[:72] if first else title
         self.marks.append(len(self.data))
-        said = 40 if last else len(title)  # of a part the solver says 40, whatever there is
-        count = [f"{len(first):5d}I"] * bool(first) + [f"{said:5d}C"] + [f"{len(last):5d}I"] * bool(last)
+        said = (
+            40 if last else len(title)
+        )  # of a part the solver says 40, whatever there is
+        count = (
+            [f"{len(first):5d}I"] * bool(first)
+            + [f"{said:5d}C"]
+            + [f"{len(last):5d}I"] * bool(last)
+        )
         self.line("ZZZZZEOR" + "".join(count))
         width = 5 if is_run else 10
-        self.line("".join(f"{n:{width}d}" for n in first) + title + "".join(_five(n) for n in last))
+        self.line(
+            "".join(f"{n:{width}d}" for n in first)
+            + title
+            + "".join(_five(n) for n in last)
+        )
 
     def integers(self, *numbers: int) -> None:
         self._numbers("I", [f"{n:10d}" for n in numbers], 16)
@@ -130,10 +146,19 @@ def t01(
     start: int = 0,
     made: T01Writer | None = None,
 ) -> T01Writer:
-    made = headed(parts, globals_=globals_, code=code, title=title, subset_variables=subset_variables, made=made)
+    made = headed(
+        parts,
+        globals_=globals_,
+        code=code,
+        title=title,
+        subset_variables=subset_variables,
+        made=made,
+    )
     for state in range(start, start + states):
         globals_of = [value(state, 0, code) for code in range(1, globals_ + 1)]
-        of_parts = [value(state, part.id, code) for part in parts for code in part.codes]
+        of_parts = [
+            value(state, part.id, code) for part in parts for code in part.codes
+        ]
         made.state(state / 8, globals_of, of_parts, subset_variables)
     return made
 
@@ -151,7 +176,9 @@ def headed(
     """Write what stands before the states, into ``made`` where it is given: a text."""
     made = T01Writer() if made is None else made
     made.titled([code], "made for tests".ljust(80))
-    made.titled([], "Fri Nov 20 23:34:18 2026 RADIOSS OpenRadioss,       linuxa64 gf".ljust(80))
+    made.titled(
+        [], "Fri Nov 20 23:34:18 2026 RADIOSS OpenRadioss,       linuxa64 gf".ljust(80)
+    )
     if code >= 3050:
         made.setting(2)
         made.setting(title)
@@ -159,7 +186,12 @@ def headed(
     made.integers(len(parts), 2, 1, 1, 1 + len(groups), globals_)
     made.integers(*range(1, globals_ + 1))
     for part in parts:
-        numbers = (0, 0 if part.is_group else part.material, 0 if part.is_group else 2, len(part.codes))
+        numbers = (
+            0,
+            0 if part.is_group else part.material,
+            0 if part.is_group else 2,
+            len(part.codes),
+        )
         made.titled([part.id], part.title.ljust(title), numbers)
         made.integers(*part.codes)
     for number in (1, 2, 3):
@@ -172,7 +204,10 @@ def headed(
         made.titled([node], "corner".ljust(title))
     made.integers(*range(1, 7))
     for number, group in enumerate(groups, start=2):
-        made.titled([number, group.kind, 0, len(group.members), len(group.variables)], "forces".ljust(title))
+        made.titled(
+            [number, group.kind, 0, len(group.members), len(group.variables)],
+            "forces".ljust(title),
+        )
         for id_, name in group.members.items():
             made.titled([id_], name.ljust(title))
         made.integers(*group.variables)

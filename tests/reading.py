@@ -23,26 +23,50 @@ class InPieces(OnDisk):
     block, gap, window = 256, 32, 64
 
 
-def run_of(reader: Reader, *contents: bytes | str, selection: Selection | None = None, name: str = "run") -> Run:
+def run_of(
+    reader: Reader,
+    *contents: bytes | str,
+    selection: Selection | None = None,
+    name: str = "run",
+) -> Run:
     """Open contents as the legs of one run in one format; texts are latin-1."""
-    data = [content.encode("latin-1") if isinstance(content, str) else content for content in contents]
-    names = [name] if len(data) == 1 else [f"{name}{number}" for number in range(1, len(data) + 1)]
-    legs = reader.open_legs([Source(*file) for file in zip(names, data, strict=True)], selection or Selection())
+    data = [
+        content.encode("latin-1") if isinstance(content, str) else content
+        for content in contents
+    ]
+    names = (
+        [name]
+        if len(data) == 1
+        else [f"{name}{number}" for number in range(1, len(data) + 1)]
+    )
+    legs = reader.open_legs(
+        [Source(*file) for file in zip(names, data, strict=True)],
+        selection or Selection(),
+    )
     return Run(tuple(names), (Legs(legs),))
 
 
 def history_of(
-    reader: Reader, *contents: bytes | str, selection: Selection | None = None, name: str = "run"
+    reader: Reader,
+    *contents: bytes | str,
+    selection: Selection | None = None,
+    name: str = "run",
 ) -> History:
     """Read the history that is selected, by default the internal energy."""
     selection = selection or Selection()
     return run_of(reader, *contents, selection=selection, name=name).history(selection)
 
 
-def read(names: Sequence[str], selection: Selection | None = None, input_format: str = "auto") -> Reference:
+def read(
+    names: Sequence[str], selection: Selection | None = None, input_format: str = "auto"
+) -> Reference:
     """Read as `d2rpick.choice.question.read` does; what is found in files of the clone, which stay, is found once."""
     selection = selection or Selection()
-    asked = tuple(names), selection._replace(parts=(), flying=(), springs=None), input_format
+    asked = (
+        tuple(names),
+        selection._replace(parts=(), flying=(), springs=None),
+        input_format,
+    )
     of_clone = all(Path(name).absolute().is_relative_to(ROOT) for name in names)
     return Reference.of((_opened if of_clone else open_run)(*asked), selection)
 
@@ -55,7 +79,9 @@ def solved(name: str, *parts: str) -> Reference:
     return read([stored(name)], Selection(parts=parts))
 
 
-def read_history(names: Sequence[str], selection: Selection | None = None, input_format: str = "auto") -> History:
+def read_history(
+    names: Sequence[str], selection: Selection | None = None, input_format: str = "auto"
+) -> History:
     """Read the history that is selected of a run, by default the internal energy."""
     return read(names, selection, input_format).history
 

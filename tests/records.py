@@ -8,7 +8,15 @@ from dataclasses import replace
 import numpy as np
 from hypothesis import strategies as st
 
-from d2rpick.histories.history import Balance, Given, History, Momenta, Record, Samples, rows_of
+from d2rpick.histories.history import (
+    Balance,
+    Given,
+    History,
+    Momenta,
+    Record,
+    Samples,
+    rows_of,
+)
 from d2rpick.histories.samples import find_crossings
 from d2rpick.vibration.modes import Mode
 from d2rpick.vibration.oscillator import from_mode, lacking_energy
@@ -35,9 +43,13 @@ def vibration(parameters: Samples) -> Mode:
     return Mode(omega, alpha, cosine, sine, 0.0)
 
 
-def table(time: Samples, energy: Samples, *momenta: Momenta, balance: Balance | None = None) -> History:
+def table(
+    time: Samples, energy: Samples, *momenta: Momenta, balance: Balance | None = None
+) -> History:
     """A record of an energy, with momenta and energies of the model where there are any."""
-    return History(time, energy, ("made.csv",), "csv", "E", evidence=Given(momenta, balance))
+    return History(
+        time, energy, ("made.csv",), "csv", "E", evidence=Given(momenta, balance)
+    )
 
 
 def until(history: History, time: float) -> History:
@@ -46,7 +58,10 @@ def until(history: History, time: float) -> History:
     def cut(record: Record) -> Record:
         return rows_of(record, record.time <= time)
 
-    momenta, balance = tuple(cut(one) for one in history.momenta), history.balance and cut(history.balance)
+    momenta, balance = (
+        tuple(cut(one) for one in history.momenta),
+        history.balance and cut(history.balance),
+    )
     return replace(cut(history), evidence=Given(momenta, balance, history.masses))
 
 
@@ -70,12 +85,18 @@ def level_crossings(modes: Sequence[Mode], td: float, start: float) -> Samples:
     """Times in (start, td) where the energy of these modes passes its level at ``td``, shape (n,)."""
     per_period = 2000  # of the fastest mode: a straight line between such times is exact to 1e-7 of a period
     fastest = max(mode.omega for mode in modes)
-    time = np.linspace(start, td, int((td - start) * fastest / (2 * np.pi) * per_period) + 2)
-    crossings = find_crossings(time, energy_of(modes, time), float(energy_of(modes, np.array([td]))[0]))[0]
+    time = np.linspace(
+        start, td, int((td - start) * fastest / (2 * np.pi) * per_period) + 2
+    )
+    crossings = find_crossings(
+        time, energy_of(modes, time), float(energy_of(modes, np.array([td]))[0])
+    )[0]
     return np.asarray(crossings[crossings < td])
 
 
-def replayed_residual(modes: Mode | Sequence[Mode], tr: Samples, td: Samples | float) -> Samples:
+def replayed_residual(
+    modes: Mode | Sequence[Mode], tr: Samples, td: Samples | float
+) -> Samples:
     """Replay each tr of shape (n,) up to ``td`` and give the residual there, of all modes together [-].
 
     ``td`` is one for all, or one for each.  Energy norm of what the switched run lacks at td, over that of the
@@ -84,7 +105,9 @@ def replayed_residual(modes: Mode | Sequence[Mode], tr: Samples, td: Samples | f
     lack, whole = np.zeros(tr.shape), np.zeros(tr.shape)
     for mode in [modes] if isinstance(modes, Mode) else modes:
         oscillator, at_td = from_mode(mode, td)
-        at_tr = oscillator.free(at_td, tr - td)  # the closed form runs backwards as well
+        at_tr = oscillator.free(
+            at_td, tr - td
+        )  # the closed form runs backwards as well
         lack += lacking_energy(oscillator, at_td, oscillator.rigid(at_tr, td - tr))
         whole += oscillator.vibration_energy(at_td)
     return np.sqrt(lack / whole)

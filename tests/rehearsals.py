@@ -6,7 +6,15 @@ from pathlib import Path
 import numpy as np
 
 from d2rpick.models.box_model import Parameters
-from d2rpick.models.box_run import BOX, Outcome, Record, RigidWindow, scan, scan_times, simulate
+from d2rpick.models.box_run import (
+    BOX,
+    Outcome,
+    Record,
+    RigidWindow,
+    scan,
+    scan_times,
+    simulate,
+)
 from d2rpick.report import history_files
 from tests.command import answer, put
 from tests.energies import sure
@@ -30,7 +38,9 @@ def _halton(index: int, base: int) -> float:
 
 
 def _set(index: int) -> Parameters:
-    stiffness, strain, damping, speed, mesh = (_halton(index, base) for base in (2, 3, 5, 7, 11))
+    stiffness, strain, damping, speed, mesh = (
+        _halton(index, base) for base in (2, 3, 5, 7, 11)
+    )
     return Parameters(
         stiffness=3e6 * 3**stiffness,
         yield_strain=3.5e-3 * 2**strain,
@@ -74,16 +84,23 @@ class Rehearsal:
         return self.mean_ratio / self.announced - 1
 
 
-def rehearse(parameters: Parameters, folder: Path, *, every: int = 1, interval: float = 1e-4) -> Rehearsal:
+def rehearse(
+    parameters: Parameters, folder: Path, *, every: int = 1, interval: float = 1e-4
+) -> Rehearsal:
     """Run one set; of the times of a scan take one in ``every``."""
     reference = simulate(parameters, T_END, interval=interval)
     shown = reference.time <= sure(reference.landed) + 0.04
     td = round(sure(reference.landed) - BEFORE_LANDING, 3)
-    file = put(folder / "reference.matsum", history_files.BOX_WRITERS["matsum"](_until(reference, int(shown.sum()))))
+    file = put(
+        folder / "reference.matsum",
+        history_files.BOX_WRITERS["matsum"](_until(reference, int(shown.sum()))),
+    )
     found = answer("suggest", "--td", str(td), "--part", "box", str(file))
     tr = found["recommended"]["tr"] if found["recommended"] else None
     flight = found["flight"]
-    times = sorted({*scan_times(sure(reference.released), td)[::every], *([tr] if tr else [])})
+    times = sorted(
+        {*scan_times(sure(reference.released), td)[::every], *([tr] if tr else [])}
+    )
     outcomes = tuple(scan(parameters, reference, times, td, jobs=1))
     chosen = next((one for one in outcomes if one.tr == tr), None)
     return Rehearsal(
@@ -104,11 +121,16 @@ def rehearse(parameters: Parameters, folder: Path, *, every: int = 1, interval: 
 def _mean_ratio(parameters: Parameters, tr: float, td: float, interval: float) -> float:
     """Mean energy of the box after td, switched over not switched, if no ground came."""
     flying = replace(parameters, ground=NO_GROUND)
-    runs = (simulate(flying, td + MEAN_OVER, *windows, interval=interval) for windows in ((RigidWindow(tr, td),), ()))
+    runs = (
+        simulate(flying, td + MEAN_OVER, *windows, interval=interval)
+        for windows in ((RigidWindow(tr, td),), ())
+    )
     means = [float(run.internal_energy[run.time > td, BOX].mean()) for run in runs]
     return means[0] / means[1]
 
 
 def _until(record: Record, states: int) -> Record:
     """Give the first states of a record."""
-    return Record._make(value[:states] if isinstance(value, np.ndarray) else value for value in record)
+    return Record._make(
+        value[:states] if isinstance(value, np.ndarray) else value for value in record
+    )

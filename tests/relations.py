@@ -28,8 +28,14 @@ from tests.made_t01 import MadePart, headed
 from tests.text_files import glstat_text, matsum_text
 
 _IDS: Final = (7, 3)  # of the parts: the first vibrates, the second is elsewhere
-_ROUNDED: Final = 1e-9  # of the time or the residual: what another scale changes by rounding
-_TEXTS: Final = {",": ".", ";": ",", "\t": "."}  # separators of a table with their decimal signs
+_ROUNDED: Final = (
+    1e-9  # of the time or the residual: what another scale changes by rounding
+)
+_TEXTS: Final = {
+    ",": ".",
+    ";": ",",
+    "\t": ".",
+}  # separators of a table with their decimal signs
 
 
 class MadeRun(NamedTuple):
@@ -95,7 +101,14 @@ def make_run(random: Random) -> MadeRun:
     for mode in range(mode_count):
         size = energy * (1.0 if mode == 0 else random.uniform(0.02, 0.3))
         phase = random.uniform(0, 2 * math.pi)
-        angle = 2 * math.pi / period * (1.0 if mode == 0 else random.uniform(1.3, 3.5)) * (time - load) + phase
+        angle = (
+            2
+            * math.pi
+            / period
+            * (1.0 if mode == 0 else random.uniform(1.3, 3.5))
+            * (time - load)
+            + phase
+        )
         envelope = size * np.exp(-damping * np.maximum(time - load, 0.0))
         internal += envelope * np.sin(angle) ** 2
         kinetic += envelope * np.cos(angle) ** 2
@@ -104,21 +117,37 @@ def make_run(random: Random) -> MadeRun:
     pushed = energy * 3 * np.maximum(time - landing, 0.0) / flight
     internal = internal * np.sin(math.pi / 2 * loaded) ** 2 + pushed
     other = energy * 0.2 * np.sin(math.pi / 2 * loaded) ** 2
-    return MadeRun(time, internal, kinetic, other, load, landing, load + random.uniform(0.5, 0.95) * flight)
+    return MadeRun(
+        time,
+        internal,
+        kinetic,
+        other,
+        load,
+        landing,
+        load + random.uniform(0.5, 0.95) * flight,
+    )
 
 
 # How a run is written.
 
 
-def csv(folder: Path, columns: Mapping[str, Samples], name: str = "run.csv", separator: str = ",") -> list[str]:
+def csv(
+    folder: Path,
+    columns: Mapping[str, Samples],
+    name: str = "run.csv",
+    separator: str = ",",
+) -> list[str]:
     """Write columns with all digits; the names of the files."""
     rows = (
-        separator.join(map(repr, row)) for row in zip(*(column.tolist() for column in columns.values()), strict=True)
+        separator.join(map(repr, row))
+        for row in zip(*(column.tolist() for column in columns.values()), strict=True)
     )
     text = "\n".join([separator.join(columns), *rows, ""])
     file = folder / name
     file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(text if _TEXTS[separator] == "." else text.replace(".", _TEXTS[separator]))
+    file.write_text(
+        text if _TEXTS[separator] == "." else text.replace(".", _TEXTS[separator])
+    )
     return [str(file)]
 
 
@@ -148,7 +177,9 @@ def rounded(run: MadeRun, digits: int) -> MadeRun:
     def printed(column: Samples) -> Samples:
         return np.array([float(f"{value:.{digits - 1}E}") for value in column])
 
-    return run._replace(time=printed(run.time), internal=printed(run.internal), other=printed(run.other))
+    return run._replace(
+        time=printed(run.time), internal=printed(run.internal), other=printed(run.other)
+    )
 
 
 def single(run: MadeRun) -> MadeRun:
@@ -157,7 +188,9 @@ def single(run: MadeRun) -> MadeRun:
     def stored(column: Samples) -> Samples:
         return column.astype(np.float32).astype(float)
 
-    return run._replace(time=stored(run.time), internal=stored(run.internal), other=stored(run.other))
+    return run._replace(
+        time=stored(run.time), internal=stored(run.internal), other=stored(run.other)
+    )
 
 
 def binout(folder: Path, run: MadeRun) -> list[str]:
@@ -182,16 +215,24 @@ def time_history(folder: Path, run: MadeRun) -> list[str]:
     return put(folder, "runT01", bytes(made.data))
 
 
-def matsum(folder: Path, run: MadeRun, ids: Sequence[int] = _IDS, name: str = "matsum") -> list[str]:
+def matsum(
+    folder: Path, run: MadeRun, ids: Sequence[int] = _IDS, name: str = "matsum"
+) -> list[str]:
     energies = dict(zip(_IDS, (run.internal, run.other), strict=True))
-    return put(folder, name, matsum_text(run.time, ids, np.stack([energies[id_] for id_ in ids], axis=1)))
+    return put(
+        folder,
+        name,
+        matsum_text(run.time, ids, np.stack([energies[id_] for id_ in ids], axis=1)),
+    )
 
 
 # Changes that must not matter, or matter in a known way.
 
 
 def same_numbers(
-    write: Callable[[Path, MadeRun], list[str]], as_stored: Callable[[MadeRun], MadeRun], parts: int | None = None
+    write: Callable[[Path, MadeRun], list[str]],
+    as_stored: Callable[[MadeRun], MadeRun],
+    parts: int | None = None,
 ) -> Callable[[MadeRun, Path, Random], tuple[Asked, Asked]]:
     """Write a table of the numbers that another format stores, and that format."""
 
@@ -203,31 +244,48 @@ def same_numbers(
 
 
 def in_single_precision(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
-    return asked(run, csv(folder, columns_of(run))), asked(run, csv(folder, columns_of(single(run)), "single.csv"))
+    return asked(run, csv(folder, columns_of(run))), asked(
+        run, csv(folder, columns_of(single(run)), "single.csv")
+    )
 
 
 def other_order_of_parts(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
     turned = matsum(folder, run, _IDS[::-1], "matsum_turned")
-    return asked(run, matsum(folder, run), parts=_IDS[0]), asked(run, turned, parts=_IDS[0])
+    return asked(run, matsum(folder, run), parts=_IDS[0]), asked(
+        run, turned, parts=_IDS[0]
+    )
 
 
 def further_columns(run: MadeRun, folder: Path, random: Random) -> tuple[Asked, Asked]:
-    more = {"pressure": np.array([random.gauss(0, 1) for _ in run.time]), **columns_of(run), "status": run.other}
+    more = {
+        "pressure": np.array([random.gauss(0, 1) for _ in run.time]),
+        **columns_of(run),
+        "status": run.other,
+    }
     in_front = {"time": run.time, **more}
-    return asked(run, csv(folder, columns_of(run))), asked(run, csv(folder, in_front, "more.csv"))
+    return asked(run, csv(folder, columns_of(run))), asked(
+        run, csv(folder, in_front, "more.csv")
+    )
 
 
 def kinetic_energy_too(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
     more = {**columns_of(run), "kinetic_energy": run.kinetic}
-    return asked(run, csv(folder, columns_of(run))), asked(run, csv(folder, more, "more.csv"))
+    return asked(run, csv(folder, columns_of(run))), asked(
+        run, csv(folder, more, "more.csv")
+    )
 
 
-def scaled(time: float, energy: float, shift: float = 0.0) -> Callable[[MadeRun, Path, Random], tuple[Asked, Asked]]:
+def scaled(
+    time: float, energy: float, shift: float = 0.0
+) -> Callable[[MadeRun, Path, Random], tuple[Asked, Asked]]:
     """Write times and energies in other units, and times from another origin, so many spans of the record later."""
 
     def change(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
         later = shift * float(run.time[-1])
-        columns = {"time": time * run.time + later, "internal_energy": energy * run.internal}
+        columns = {
+            "time": time * run.time + later,
+            "internal_energy": energy * run.internal,
+        }
         again = Asked(
             csv(folder, columns, "other.csv"), time * run.td + later, time * run.load_end + later,
             time * run.landing + later,
@@ -238,21 +296,36 @@ def scaled(time: float, energy: float, shift: float = 0.0) -> Callable[[MadeRun,
 
 
 def doubled_last_state(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
-    doubled = {name: np.append(column, column[-1]) for name, column in columns_of(run).items()}
-    return asked(run, csv(folder, columns_of(run))), asked(run, csv(folder, doubled, "doubled.csv"))
+    doubled = {
+        name: np.append(column, column[-1]) for name, column in columns_of(run).items()
+    }
+    return asked(run, csv(folder, columns_of(run))), asked(
+        run, csv(folder, doubled, "doubled.csv")
+    )
 
 
-def cut_after_the_landing(run: MadeRun, folder: Path, random: Random) -> tuple[Asked, Asked]:
+def cut_after_the_landing(
+    run: MadeRun, folder: Path, random: Random
+) -> tuple[Asked, Asked]:
     end = np.searchsorted(run.time, run.landing) + random.randrange(1, 6)
     cut = {name: column[:end] for name, column in columns_of(run).items()}
-    return asked(run, csv(folder, columns_of(run))), asked(run, csv(folder, cut, "cut.csv"))
+    return asked(run, csv(folder, columns_of(run))), asked(
+        run, csv(folder, cut, "cut.csv")
+    )
 
 
-def legs_in_another_order(run: MadeRun, folder: Path, random: Random) -> tuple[Asked, Asked]:
+def legs_in_another_order(
+    run: MadeRun, folder: Path, random: Random
+) -> tuple[Asked, Asked]:
     cuts = sorted(random.sample(range(5, len(run.time) - 5), 2))
     names = []
-    for number, (begin, end) in enumerate(zip([0, *cuts], [*cuts, len(run.time)], strict=True)):
-        leg = {name: column[max(begin - 2, 0) : end] for name, column in columns_of(run).items()}
+    for number, (begin, end) in enumerate(
+        zip([0, *cuts], [*cuts, len(run.time)], strict=True)
+    ):
+        leg = {
+            name: column[max(begin - 2, 0) : end]
+            for name, column in columns_of(run).items()
+        }
         names += csv(folder, leg, f"leg{number}.csv")
     turned = random.sample(names, len(names))
     return asked(run, names), asked(run, turned)
@@ -260,12 +333,25 @@ def legs_in_another_order(run: MadeRun, folder: Path, random: Random) -> tuple[A
 
 def every_second_state(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked]:
     thinned = {name: column[::2] for name, column in columns_of(run).items()}
-    return asked(run, csv(folder, columns_of(run))), asked(run, csv(folder, thinned, "thinned.csv"))
+    return asked(run, csv(folder, columns_of(run))), asked(
+        run, csv(folder, thinned, "thinned.csv")
+    )
 
 
 def other_names(run: MadeRun, folder: Path, random: Random) -> tuple[Asked, Asked]:
-    name = random.choice(("a b/glstat.csv", "Läufe/T01", "--td/1.csv", "x" * 200, "=cmd/matsum.txt", ".hidden"))
-    return asked(run, csv(folder, columns_of(run))), asked(run, csv(folder, columns_of(run), name))
+    name = random.choice(
+        (
+            "a b/glstat.csv",
+            "Läufe/T01",
+            "--td/1.csv",
+            "x" * 200,
+            "=cmd/matsum.txt",
+            ".hidden",
+        )
+    )
+    return asked(run, csv(folder, columns_of(run))), asked(
+        run, csv(folder, columns_of(run), name)
+    )
 
 
 def other_signs(run: MadeRun, folder: Path, random: Random) -> tuple[Asked, Asked]:
@@ -281,14 +367,21 @@ def extracted_table(run: MadeRun, folder: Path, _: Random) -> tuple[Asked, Asked
 
 
 RELATIONS: Final[Mapping[str, Relation]] = {
-    "hdf5": Relation(same_numbers(lambda folder, run: hdf5(folder, columns_of(run)), lambda run: run)),
+    "hdf5": Relation(
+        same_numbers(lambda folder, run: hdf5(folder, columns_of(run)), lambda run: run)
+    ),
     "glstat": Relation(
         same_numbers(
-            lambda folder, run: put(folder, "glstat", glstat_text(run.time, run.internal)), lambda run: rounded(run, 6)
+            lambda folder, run: put(
+                folder, "glstat", glstat_text(run.time, run.internal)
+            ),
+            lambda run: rounded(run, 6),
         ),
         exact=False,
     ),
-    "matsum": Relation(same_numbers(matsum, lambda run: rounded(run, 5), _IDS[0]), exact=False),
+    "matsum": Relation(
+        same_numbers(matsum, lambda run: rounded(run, 5), _IDS[0]), exact=False
+    ),
     "binout": Relation(same_numbers(binout, single, _IDS[0]), exact=False),
     "radioss-th": Relation(same_numbers(time_history, single, _IDS[0]), exact=False),
     "single precision": Relation(in_single_precision, exact=False),
@@ -314,14 +407,25 @@ def choose(question: Asked) -> Chosen:
     """Read the files and choose tr."""
     parts = () if question.parts is None else (str(question.parts),)
     settings = Settings(after=question.after, landing=question.landing, margin=0.0)
-    answer = suggest_of(read(question.names, Selection(parts=parts)), question.td, settings, with_better=False)
+    answer = suggest_of(
+        read(question.names, Selection(parts=parts)),
+        question.td,
+        settings,
+        with_better=False,
+    )
     best = answer.chosen
     grade = answer.quality.grade if answer.quality else ""
     if best is None:
         return Chosen(None, 0.0, None, 0.0, grade, answer.basis)
-    half_width = (best.tr_high - best.tr_low) / 2 if best.tr_low is not None and best.tr_high is not None else 0.0
+    half_width = (
+        (best.tr_high - best.tr_low) / 2
+        if best.tr_low is not None and best.tr_high is not None
+        else 0.0
+    )
     above = (best.residual_high or 0.0) - (best.residual or 0.0)
-    return Chosen(best.tr, half_width, best.residual, max(above, 0.0), grade, answer.basis)
+    return Chosen(
+        best.tr, half_width, best.residual, max(above, 0.0), grade, answer.basis
+    )
 
 
 def difference(relation: Relation, run: MadeRun, first: Chosen, second: Chosen) -> str:
@@ -333,7 +437,11 @@ def difference(relation: Relation, run: MadeRun, first: Chosen, second: Chosen) 
     if first.tr is not None and second.tr is not None:
         span = relation.scale * float(run.time[-1])
         moved = relation.scale * first.tr + relation.shift * float(run.time[-1])
-        stated = 0.0 if relation.exact else relation.scale * first.half_width + second.half_width
+        stated = (
+            0.0
+            if relation.exact
+            else relation.scale * first.half_width + second.half_width
+        )
         if abs(second.tr - moved) > stated + _ROUNDED * span:
             return f"tr {moved:.9g} became {second.tr:.9g}, stated to {stated:.2g}"
     if first.residual is not None and second.residual is not None:
@@ -349,7 +457,9 @@ def check_relation(name: str, random: Random) -> bool:
     """Compare the two answers of one history; whether a tr was chosen. AssertionError if they do not follow."""
     relation, run = RELATIONS[name], make_run(random)
     with TemporaryDirectory() as folder:
-        first, second = (choose(question) for question in relation.change(run, Path(folder), random))
+        first, second = (
+            choose(question) for question in relation.change(run, Path(folder), random)
+        )
     wrong = difference(relation, run, first, second)
     assert not wrong, wrong
     return first.tr is not None and second.tr is not None

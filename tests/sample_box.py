@@ -30,7 +30,10 @@ def files(record: Record) -> Mapping[str, bytes]:
     """Content by the name of the file."""
     suffixes = {"csv": "csv", "hdf5": "h5", "glstat": "glstat", "matsum": "matsum"}
     return {
-        **{f"rollover_box.{suffixes[form]}": write(record) for form, write in BOX_WRITERS.items()},
+        **{
+            f"rollover_box.{suffixes[form]}": write(record)
+            for form, write in BOX_WRITERS.items()
+        },
         "rollover_box.binout": binout(record),
         "rollover_boxT01": t01(record),
         "rollover_box.d3plot": d3plot(record, family=1),
@@ -92,7 +95,11 @@ def t01(record: Record) -> bytes:
     made.integers(count, 0, 0, 1, 0, _GLOBALS)
     made.integers(*range(1, _GLOBALS + 1))
     for number, title in enumerate(PARTS, start=1):
-        made.record(struct.pack(">i", number) + title.encode().ljust(40) + struct.pack(">4i", 0, 1, 2, len(_T01_PART)))
+        made.record(
+            struct.pack(">i", number)
+            + title.encode().ljust(40)
+            + struct.pack(">4i", 0, 1, 2, len(_T01_PART))
+        )
         made.integers(*_T01_PART)
     made.record(struct.pack(">5i", 0, 0, 0, count, 0) + b"GLOBAL MODEL".ljust(40))
     made.integers(*range(1, count + 1))
@@ -110,7 +117,9 @@ def d3plot(record: Record, family: int) -> bytes:
     """A family of one file in double precision, without nodes and elements."""
     nothing = dict.fromkeys(("numnp", "nel8", "nel4", "nel2", "nelt"), 0)
     ids = tuple(range(1, len(PARTS) + 1))
-    made = D3plotWriter(8, ids=ids, titles=PARTS, title=_TITLE, control=nothing, family=family)
+    made = D3plotWriter(
+        8, ids=ids, titles=PARTS, title=_TITLE, control=nothing, family=family
+    )
     masses, speed = _masses(), record.momentum.sum(axis=1) / record.mass
     velocities = record.momentum / np.array(masses)
     states = [
@@ -118,7 +127,9 @@ def d3plot(record: Record, family: int) -> bytes:
             time=float(record.time[i]),
             kinetic=record.kinetic_energy[i].tolist(),
             internal=record.internal_energy[i].tolist(),
-            velocities=np.stack([velocities[i].real, 0 * velocities[i].real, velocities[i].imag], axis=1),
+            velocities=np.stack(
+                [velocities[i].real, 0 * velocities[i].real, velocities[i].imag], axis=1
+            ),
             masses=masses,
             hourglass=[0.0] * len(PARTS),
             model=(float(speed[i].real), 0.0, float(speed[i].imag)),
@@ -138,14 +149,20 @@ def _t01_globals(record: Record) -> Samples:
         11: record.friction_energy, 14: record.friction_energy,
     }  # fmt: skip
     nothing = 0 * record.time
-    return np.stack([known.get(code, nothing) for code in range(1, _GLOBALS + 1)], axis=1)
+    return np.stack(
+        [known.get(code, nothing) for code in range(1, _GLOBALS + 1)], axis=1
+    )
 
 
 def _masses() -> tuple[float, float]:
     structure = build(Parameters())
-    return float(structure.masses[: structure.of_box].sum()), float(structure.masses[structure.of_box :].sum())
+    return float(structure.masses[: structure.of_box].sum()), float(
+        structure.masses[structure.of_box :].sum()
+    )
 
 
 if __name__ == "__main__":
-    for name, content in files(simulate(Parameters(), T_END, interval=INTERVAL)).items():
+    for name, content in files(
+        simulate(Parameters(), T_END, interval=INTERVAL)
+    ).items():
         (ROOT / "sample_data" / name).write_bytes(content)

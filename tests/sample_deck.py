@@ -15,7 +15,11 @@ from tests.command import ROOT
 
 DECK = ROOT / "sample_data" / "rollover_box.k"
 FLYING = ROOT / "sample_data" / "flying_box"
-_X, _Y, _Z = np.linspace(-0.9, 0.0, 4), np.linspace(0.0, 1.5, 6), np.linspace(0.2, 1.4, 5)
+_X, _Y, _Z = (
+    np.linspace(-0.9, 0.0, 4),
+    np.linspace(0.0, 1.5, 6),
+    np.linspace(0.2, 1.4, 5),
+)
 _SLED, _MAIN = 3, 9999  # a part, and the main node of the rigid body
 _CARDS = """*SECTION_SHELL
 $#   secid    elform      shrf       nip
@@ -38,12 +42,22 @@ class _Mesh:
         self.nodes: dict[tuple[float, ...], int] = {}
         self.shells: list[tuple[int, list[int]]] = []
 
-    def grid(self, part: int, fixed: int, at: float, one: Samples, other: Samples) -> None:
+    def grid(
+        self, part: int, fixed: int, at: float, one: Samples, other: Samples
+    ) -> None:
         """Fill a rectangle, at a constant coordinate ``fixed``, with shells."""
         for a, b in itertools.pairwise(one):
             for c, d in itertools.pairwise(other):
                 corners = [(a, c), (b, c), (b, d), (a, d)]
-                self.shells.append((part, [self._node(*np.insert(corner, fixed, at)) for corner in corners]))
+                self.shells.append(
+                    (
+                        part,
+                        [
+                            self._node(*np.insert(corner, fixed, at))
+                            for corner in corners
+                        ],
+                    )
+                )
 
     def _node(self, *place: float) -> int:
         key = tuple(round(float(value), 6) for value in place)
@@ -85,7 +99,9 @@ def _mesh() -> _Mesh:
 def _lines(mesh: _Mesh) -> Iterator[str]:
     yield "*KEYWORD\n*TITLE\nrollover box on a sled, coarse"
     yield "*PART"
-    for number, (title, section, material) in enumerate((("box", 1, 1), ("step", 2, 1), ("sled", 1, 2)), start=1):
+    for number, (title, section, material) in enumerate(
+        (("box", 1, 1), ("step", 2, 1), ("sled", 1, 2)), start=1
+    ):
         yield f"{title}\n{number:10d}{section:10d}{material:10d}"
     yield _CARDS + "*NODE"
     for (x, y, z), number in mesh.nodes.items():
@@ -101,11 +117,17 @@ def _starter(mesh: _Mesh) -> Iterator[str]:
     used = sorted({node for _, nodes in shells for node in nodes})
     places = {number: place for place, number in mesh.nodes.items()}
     yield "#RADIOSS STARTER\n/BEGIN\nBOX\n      2022         0"
-    yield f"{'kg':>20}{'m':>20}{'s':>20}\n" * 2 + "/TITLE\nflying box\n/MAT/PLAS_JOHNS/1\nsteel"
+    yield (
+        f"{'kg':>20}{'m':>20}{'s':>20}\n" * 2
+        + "/TITLE\nflying box\n/MAT/PLAS_JOHNS/1\nsteel"
+    )
     yield f"{7850:20d}\n{2.1e11:20g}{0.3:20g}{0:10d}\n{3.5e8:20g}{6e8:20g}{0.5:20g}{0:20d}{0:20d}"
     yield f"{0:20d}{0:20d}{0:10d}{0:10d}{0:20d}{0:20d}\n" + f"{0:20d}" * 4
     for number, (form, thickness) in enumerate(((24, 0.005), (12, 0.002)), start=1):
-        yield f"/PROP/SHELL/{number}\nshell\n{form:10d}{0:10d}{0:10d}{0:10d}{'':20}{0:20d}\n" + f"{0:20d}" * 5
+        yield (
+            f"/PROP/SHELL/{number}\nshell\n{form:10d}{0:10d}{0:10d}{0:10d}{'':20}{0:20d}\n"
+            + f"{0:20d}" * 5
+        )
         yield f"{3:10d}{0:10d}{thickness:20g}{0:20d}{'':10}{1:10d}{1:10d}"
     yield "/NODE"
     for node in used:
@@ -118,7 +140,10 @@ def _starter(mesh: _Mesh) -> Iterator[str]:
                 yield f"{id_:10d}" + "".join(f"{node:10d}" for node in nodes)
     for group, members in ((1, used), (2, [*used, _MAIN])):
         yield f"/GRNOD/NODE/{group}\nnodes"
-        yield from ("".join(f"{node:10d}" for node in members[at : at + 10]) for at in range(0, len(members), 10))
+        yield from (
+            "".join(f"{node:10d}" for node in members[at : at + 10])
+            for at in range(0, len(members), 10)
+        )
     yield f"/RBODY/1\nbody\n{_MAIN:10d}{0:10d}{0:10d}{0:10d}{0:20d}{1:10d}{0:10d}{0:10d}{0:10d}"
     yield f"{0:20d}{0:20d}{0:20d}\n" * 2 + f"{0:10d}{0:10d}{0:10d}"
     yield f"/INIVEL/TRA/1\nflight\n{4:20d}{0:20d}{2:20d}{2:10d}{0:10d}\n/TH/PART/1\nparts\nDEF\n{1:10d}{2:10d}\n/END"

@@ -7,16 +7,38 @@ DENSITY, MODULUS = 1000.0, 1e9
 
 
 def cubes(
-    masses: tuple[float, ...], springs: list[tuple[int, int, float]], prop: str = "SPRING", more: str = ""
+    masses: tuple[float, ...],
+    springs: list[tuple[int, int, float]],
+    prop: str = "SPRING",
+    more: str = "",
 ) -> str:
     """Write cubes of some masses in a row along x, 10 apart, and springs between corners: 10 is the first of cube 1."""
     sides = [(mass / DENSITY) ** (1 / 3) for mass in masses]
-    corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
-    text = "#RADIOSS STARTER\n/BEGIN\nbox\n" + wide(2022, 0) + 2 * wide("kg", "m", "s", width=REAL)
+    corners = [
+        (0, 0, 0),
+        (1, 0, 0),
+        (1, 1, 0),
+        (0, 1, 0),
+        (0, 0, 1),
+        (1, 0, 1),
+        (1, 1, 1),
+        (0, 1, 1),
+    ]
+    text = (
+        "#RADIOSS STARTER\n/BEGIN\nbox\n"
+        + wide(2022, 0)
+        + 2 * wide("kg", "m", "s", width=REAL)
+    )
     text += f"/MAT/ELAST/1\nm\n{wide(DENSITY, width=REAL)}{wide(MODULUS, 0.3, width=REAL)}/PROP/SOLID/1\ns\n{wide(24)}"
     for number, side in enumerate(sides, start=1):
-        nodes = [(10 * number + i, *(side * one for one in corner)) for i, corner in enumerate(corners)]
-        text += "/NODE\n" + "".join(wide(n)[:-1] + wide(x + 10 * number, y, z, width=REAL) for n, x, y, z in nodes)
+        nodes = [
+            (10 * number + i, *(side * one for one in corner))
+            for i, corner in enumerate(corners)
+        ]
+        text += "/NODE\n" + "".join(
+            wide(n)[:-1] + wide(x + 10 * number, y, z, width=REAL)
+            for n, x, y, z in nodes
+        )
         text += f"/PART/{number}\np\n{wide(1, 1)}/BRICK/{number}\n{wide(number, *(n for n, *_ in nodes))}"
     for number, (one, other, stiffness) in enumerate(springs, start=50):
         text += f"/PROP/{prop}/{number}\nk\n{wide(0.0, width=REAL)}{wide(stiffness, 10.0, width=REAL)}{more}"

@@ -20,11 +20,17 @@ HOME, TEMPORARY = Path("/home/one"), Path(tempfile.gettempdir())
 
 def test_no_test_names_what_lies_beside_the_clone() -> None:
     modules = [path.relative_to(ROOT) for path in (ROOT / "tests").rglob("*.py")]
-    judged = [one for one in modules if one.parts[1] != "real" and one.stem not in ("alone", "test_alone")]
+    judged = [
+        one
+        for one in modules
+        if one.parts[1] != "real" and one.stem not in ("alone", "test_alone")
+    ]
     assert len(judged) > 100
     for module in judged:
         text = (ROOT / module).read_text("utf-8")
-        assert not re.findall(r"""["'/]shared["'/]|D2RPICK_REAL|mark\.real|ROOT\.parent""", text), module
+        assert not re.findall(
+            r"""["'/]shared["'/]|D2RPICK_REAL|mark\.real|ROOT\.parent""", text
+        ), module
         climbs = re.findall(r"__file__\)(?:\.resolve\(\))?\.parents\[(\d+)\]", text)
         assert all(int(up) < len(module.parts) for up in climbs), module
 
@@ -64,7 +70,15 @@ def test_what_lies_beside_the_clone_cannot_be_opened() -> None:
 
 def test_each_file_of_the_data_has_a_line_that_says_what_wrote_it() -> None:
     """And all of them are small."""
-    files = {str(path.relative_to(DATA)): path.stat().st_size for path in DATA.rglob("*") if path.is_file()}
-    told = re.findall(r"^\| `(.+?)` \| .+ \| .+ \|$", (DATA / "README.md").read_text("utf-8"), re.MULTILINE)
+    files = {
+        str(path.relative_to(DATA)): path.stat().st_size
+        for path in DATA.rglob("*")
+        if path.is_file()
+    }
+    told = re.findall(
+        r"^\| `(.+?)` \| .+ \| .+ \|$",
+        (DATA / "README.md").read_text("utf-8"),
+        re.MULTILINE,
+    )
     assert sorted(told) == sorted(files.keys() - {"README.md"})
     assert sum(files.values()) < 2_000_000

@@ -12,14 +12,20 @@ from tests.relations import RELATIONS
 @pytest.mark.slow
 @pytest.mark.parametrize("form", FORMATS)
 def test_whatever_the_damage_an_input_is_read_or_refused(form: str) -> None:
-    found = Counter(case(form, 0, number) for number in range(inputs(1_000_000) // len(FORMATS) + 1))
-    print(f"{form}: {found['read']} read, {found['refused']} refused")  # shown by pytest -rP
+    found = Counter(
+        case(form, 0, number) for number in range(inputs(1_000_000) // len(FORMATS) + 1)
+    )
+    print(
+        f"{form}: {found['read']} read, {found['refused']} refused"
+    )  # shown by pytest -rP
     assert found.keys() <= {"read", "refused"}
     assert found["read"] > 0
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("relation", [name for name, relation in RELATIONS.items() if relation.exact])
+@pytest.mark.parametrize(
+    "relation", [name for name, relation in RELATIONS.items() if relation.exact]
+)
 def test_an_answer_does_not_change_with_what_must_not_matter(relation: str) -> None:
     found = Counter(case(relation, 0, number) for number in range(3))
     assert found.keys() <= {"read", "refused"}

@@ -19,7 +19,9 @@ from d2rpick.base.workers import Cluster
 from tests import variants
 from tests.command import ROOT, refused, run
 
-pytestmark = pytest.mark.skipif(not find_spec("distributed"), reason="needs the extra 'dask'")
+pytestmark = pytest.mark.skipif(
+    not find_spec("distributed"), reason="needs the extra 'dask'"
+)
 PATIENCE = 30.0  # [s]
 
 
@@ -37,7 +39,9 @@ def until(true: Callable[[], Any]) -> Any:
 def process(*args: str, **options: Any) -> Iterator[subprocess.Popen[str]]:
     """Run a Python program until the end of the block."""
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, **options}
-    with subprocess.Popen([sys.executable, *args], cwd=ROOT, text=True, **quiet) as started:
+    with subprocess.Popen(
+        [sys.executable, *args], cwd=ROOT, text=True, **quiet
+    ) as started:
         try:
             yield started
         finally:
@@ -45,17 +49,30 @@ def process(*args: str, **options: Any) -> Iterator[subprocess.Popen[str]]:
 
 
 @contextmanager
-def cluster(folder: Path, names: tuple[str, ...]) -> Iterator[tuple[str, dict[str, subprocess.Popen[str]]]]:
+def cluster(
+    folder: Path, names: tuple[str, ...]
+) -> Iterator[tuple[str, dict[str, subprocess.Popen[str]]]]:
     """Start a scheduler and workers of these names, each of one thread; the address, and the processes by name."""
     listed = folder / "scheduler.json"
     common = ("--no-dashboard", "--scheduler-file", str(listed), "--host", "127.0.0.1")
     with ExitStack() as stack:
-        stack.enter_context(process("-m", "distributed.cli.dask_scheduler", *common, "--port", "0"))
+        stack.enter_context(
+            process("-m", "distributed.cli.dask_scheduler", *common, "--port", "0")
+        )
         until(lambda: listed.exists() and listed.read_text())
         workers = {
             name: stack.enter_context(
                 process(
-                    *("-m", "distributed.cli.dask_worker", *common, "--name", name, "--nthreads", "1", "--no-nanny"),
+                    *(
+                        "-m",
+                        "distributed.cli.dask_worker",
+                        *common,
+                        "--name",
+                        name,
+                        "--nthreads",
+                        "1",
+                        "--no-nanny",
+                    ),
                     *("--local-directory", str(folder)),
                 )
             )
@@ -69,16 +86,46 @@ def test_a_study_on_a_cluster_outlives_the_death_of_a_worker(tmp_path: Path) -> 
     from distributed import Client  # slow
 
     sources = variants.variants(tmp_path)
-    expected = json.loads(run(*variants.STUDY, "-f", "json", *sources, sources[0]).stdout)
+    expected = json.loads(
+        run(*variants.STUDY, "-f", "json", *sources, sources[0]).stdout
+    )
     slow, ledger = tmp_path / "slow.csv", tmp_path / "ledger.ndjson"
     os.mkfifo(slow)  # whoever reads it waits
-    with cluster(tmp_path, ("one", "two")) as (address, workers), Client(address, set_as_default=False) as client:
+    with (
+        cluster(tmp_path, ("one", "two")) as (address, workers),
+        Client(address, set_as_default=False) as client,
+    ):
         client.wait_for_workers(2, timeout=PATIENCE)
-        args = ("study", "--td", str(variants.TD), "--scheduler", address, "-f", "json", "--resume", str(ledger))
+        args = (
+            "study",
+            "--td",
+            str(variants.TD),
+            "--scheduler",
+            address,
+            "-f",
+            "json",
+            "--resume",
+            str(ledger),
+        )
         names = [os.path.relpath(name, ROOT) for name in (*sources, str(slow))]
-        with process("-m", "d2rpick", *args, *names, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as study:
-            until(lambda: ledger.exists() and ledger.read_bytes().count(b"\n") == len(sources))
-            (busy,) = until(lambda: [address for address, calls in client.processing().items() if calls])
+        with process(
+            "-m",
+            "d2rpick",
+            *args,
+            *names,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+        ) as study:
+            until(
+                lambda: (
+                    ledger.exists() and ledger.read_bytes().count(b"\n") == len(sources)
+                )
+            )
+            (busy,) = until(
+                lambda: [
+                    address for address, calls in client.processing().items() if calls
+                ]
+            )
             victim = client.scheduler_info(n_workers=-1)["workers"][busy]["id"]
             slow.unlink()
             slow.write_bytes(Path(sources[0]).read_bytes())
@@ -106,7 +153,9 @@ def test_what_a_worker_found_before_it_died_is_not_lost(tmp_path: Path) -> None:
         for answer in farm.answers(abs, range(500)):
             found.append(answer)
             if len(found) == 100:
-                until(lambda: not any(client.processing().values()))  # so all that was begun is found
+                until(
+                    lambda: not any(client.processing().values())
+                )  # so all that was begun is found
             if len(found) == 101:
                 workers["one"].kill()
                 until(lambda: len(client.scheduler_info(n_workers=-1)["workers"]) == 1)
@@ -114,10 +163,18 @@ def test_what_a_worker_found_before_it_died_is_not_lost(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_what_cannot_be_read_on_a_cluster_is_a_row_and_no_scheduler_an_error(tmp_path: Path) -> None:
+def test_what_cannot_be_read_on_a_cluster_is_a_row_and_no_scheduler_an_error(
+    tmp_path: Path,
+) -> None:
     with cluster(tmp_path, ("one",)) as (address, _):
         args = ("study", "--td", str(variants.TD), "--scheduler", address)
-        result = run(*args, "-f", "ndjson", variants.write(tmp_path / "run.csv"), str(tmp_path / "absent.csv"))
+        result = run(
+            *args,
+            "-f",
+            "ndjson",
+            variants.write(tmp_path / "run.csv"),
+            str(tmp_path / "absent.csv"),
+        )
     statuses = [json.loads(line).get("status") for line in result.stdout.splitlines()]
     assert (result.exit_code, statuses) == (1, ["ok", "unreadable", None])
 
@@ -126,12 +183,26 @@ def test_where_no_scheduler_answers_the_study_ends(tmp_path: Path) -> None:
     told = "no answer from a Dask scheduler ("
     with pytest.raises(D2RPickError, match=f"^tcp://127.0.0.1:9: {re.escape(told)}"):
         Cluster("tcp://127.0.0.1:9", patience=0.3)
-    asked = ("study", "--td", str(variants.TD), variants.write(tmp_path / "run.csv"), "--scheduler", "nonsense://x")
+    asked = (
+        "study",
+        "--td",
+        str(variants.TD),
+        variants.write(tmp_path / "run.csv"),
+        "--scheduler",
+        "nonsense://x",
+    )
     assert refused(*asked).startswith(f"nonsense://x: {told}")
 
 
-def test_without_the_package_its_name_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_without_the_package_its_name_is_told(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     assert "pip install distributed" in refused(
-        "study", "--td", "0.064", variants.write(tmp_path / "run.csv"), "--scheduler", "tcp://127.0.0.1:9"
+        "study",
+        "--td",
+        "0.064",
+        variants.write(tmp_path / "run.csv"),
+        "--scheduler",
+        "tcp://127.0.0.1:9",
     )

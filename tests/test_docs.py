@@ -17,7 +17,17 @@ from d2rpick.cli import COMMANDS
 from d2rpick.histories.formats import READERS
 from d2rpick.rules import RULES, read_configuration
 from tests.command import DECK, ENERGY, GLSTAT, ROOT, run
-from tests.examples import PAGES, blocks, folder_of_a_reader, languages, printed, prose, rounded, sessions, text_of
+from tests.examples import (
+    PAGES,
+    blocks,
+    folder_of_a_reader,
+    languages,
+    printed,
+    prose,
+    rounded,
+    sessions,
+    text_of,
+)
 
 README = text_of("README.md")
 ALL = "\n".join(text_of(page) for page in PAGES)
@@ -33,7 +43,12 @@ def slug(heading: str) -> str:
 
 def anchors(page: Path) -> set[str]:
     """Anchors of a page."""
-    return {slug(heading) for heading in re.findall(r"^#+ (.*)$", prose(page.read_text("utf-8")), flags=re.MULTILINE)}
+    return {
+        slug(heading)
+        for heading in re.findall(
+            r"^#+ (.*)$", prose(page.read_text("utf-8")), flags=re.MULTILINE
+        )
+    }
 
 
 def links(page: str) -> Iterator[tuple[Path, str]]:
@@ -46,14 +61,22 @@ def links(page: str) -> Iterator[tuple[Path, str]]:
 
 def one_is_quick(pages: Iterable[str]) -> list[Any]:
     """Pages of which the README alone is tried each time."""
-    return [page if page == "README.md" else pytest.param(page, marks=pytest.mark.slow) for page in pages]
+    return [
+        page if page == "README.md" else pytest.param(page, marks=pytest.mark.slow)
+        for page in pages
+    ]
 
 
 @pytest.mark.parametrize("page", one_is_quick(PAGES))
 def test_the_sessions_on_a_page_show_what_the_commands_print(page: str) -> None:
     with folder_of_a_reader():
-        for command, shown in sessions(text_of(page)):  # in order and in one folder, as a reader would type them
-            assert f"{command}\n{rounded(printed(command))}" == f"{command}\n{rounded(shown)}"
+        for command, shown in sessions(
+            text_of(page)
+        ):  # in order and in one folder, as a reader would type them
+            assert (
+                f"{command}\n{rounded(printed(command))}"
+                == f"{command}\n{rounded(shown)}"
+            )
 
 
 def test_the_sessions_show_the_commands_that_matter_most() -> None:
@@ -61,7 +84,9 @@ def test_the_sessions_show_the_commands_that_matter_most() -> None:
     assert {*COMMANDS} - {"rule"} <= shown
 
 
-@pytest.mark.parametrize("page", one_is_quick(page for page in PAGES if "pycon" in languages(text_of(page))))
+@pytest.mark.parametrize(
+    "page", one_is_quick(page for page in PAGES if "pycon" in languages(text_of(page)))
+)
 def test_the_python_on_a_page_gives_what_it_shows(page: str) -> None:
     source = "".join(blocks(text_of(page), "pycon"))
     test = doctest.DocTestParser().get_doctest(source, {}, page, page, 0)
@@ -74,7 +99,9 @@ def test_the_python_on_a_page_gives_what_it_shows(page: str) -> None:
 @pytest.mark.parametrize("page", PAGES)
 def test_no_example_escapes_the_tests(page: str) -> None:
     text = text_of(page)
-    assert text.count("\n```") == 2 * len(re.findall(r"^```\w+$", text, flags=re.MULTILINE))
+    assert text.count("\n```") == 2 * len(
+        re.findall(r"^```\w+$", text, flags=re.MULTILINE)
+    )
     assert languages(text) <= KINDS
     assert not [block for block in blocks(text, "text") if "d2rpick " in block]
 
@@ -90,10 +117,15 @@ def test_no_page_repeats_another() -> None:
     paragraphs = [
         paragraph
         for page in PAGES
-        for paragraph in {" ".join(found.split()) for found in re.split(r"\n\n|\n(?=[|*])", prose(text_of(page)))}
+        for paragraph in {
+            " ".join(found.split())
+            for found in re.split(r"\n\n|\n(?=[|*])", prose(text_of(page)))
+        }
         if len(paragraph) > 80
     ]
-    assert not {paragraph for paragraph in paragraphs if paragraphs.count(paragraph) > 1}
+    assert not {
+        paragraph for paragraph in paragraphs if paragraphs.count(paragraph) > 1
+    }
 
 
 def test_the_readme_is_read_in_five_minutes() -> None:
@@ -101,7 +133,9 @@ def test_the_readme_is_read_in_five_minutes() -> None:
 
 
 def test_the_readme_leads_to_every_page() -> None:
-    assert {*PAGES.values()} - {ROOT / "README.md"} <= {path for path, _ in links("README.md")}
+    assert {*PAGES.values()} - {ROOT / "README.md"} <= {
+        path for path, _ in links("README.md")
+    }
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -114,20 +148,32 @@ def test_links_of_a_page_lead_somewhere(page: str) -> None:
 def test_the_files_that_the_recipes_name_exist() -> None:
     named = re.findall(r"`((?:d2rpick|tests)/[\w/.-]+)`", text_of("docs/developing.md"))
     assert len(named) > 20
-    assert not {name for name in named if "NAME" not in name and not (ROOT / name).exists()}
+    assert not {
+        name for name in named if "NAME" not in name and not (ROOT / name).exists()
+    }
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_has_help_and_is_documented_with_its_options(command: str) -> None:
-    assert re.search(rf"^  {command}  +\w", README, flags=re.MULTILINE)  # in the help of all
+def test_every_command_has_help_and_is_documented_with_its_options(
+    command: str,
+) -> None:
+    assert re.search(
+        rf"^  {command}  +\w", README, flags=re.MULTILINE
+    )  # in the help of all
     shown = run(command, "--help").stdout
     assert re.search(r"Examples:\n +d2rpick", shown)
     options = set(
         re.findall(
-            r"(?<![\w-])--[a-z][a-z0-9-]+", re.split(r"\n[A-Z][a-z ]+:\n", shown, maxsplit=1)[1].split("Examples:")[0]
+            r"(?<![\w-])--[a-z][a-z0-9-]+",
+            re.split(r"\n[A-Z][a-z ]+:\n", shown, maxsplit=1)[1].split("Examples:")[0],
         )
     )
-    common = {"--help", "--input-format", "--output-format", "--output-file"}  # by their short names
+    common = {
+        "--help",
+        "--input-format",
+        "--output-format",
+        "--output-file",
+    }  # by their short names
     assert not {option for option in options - common if option not in ALL}
 
 
@@ -144,7 +190,9 @@ def test_the_two_commands_of_the_readme_are_one_line_each() -> None:
     first, second = blocks(README, "sh")
     assert [block.count("\n") for block in (first, second)] == [1, 1]
     (command,) = re.findall(r"\.venv/bin/(d2rpick .*)", first)
-    assert command in {re.sub(r" --limit \d+", "", command) for command, _ in sessions(README)}
+    assert command in {
+        re.sub(r" --limit \d+", "", command) for command, _ in sessions(README)
+    }
     assert "pytest" in second
 
 
@@ -158,8 +206,14 @@ def test_the_jobs_in_the_documentation_run() -> None:
     shutil.copy(DECK, "main.k")
     Path("d2rpick").symlink_to(ROOT)  # where the clone lies
     jobs = "".join(blocks(ALL, "yaml"))
-    assert [Path(name, "pyproject.toml").exists() for name in re.findall(r"pip install (.*)", jobs)] == [True, True]
-    assert [Path(name, ".pre-commit-hooks.yaml").exists() for name in re.findall(r"repo: (.*)", jobs)] == [True]
+    assert [
+        Path(name, "pyproject.toml").exists()
+        for name in re.findall(r"pip install (.*)", jobs)
+    ] == [True, True]
+    assert [
+        Path(name, ".pre-commit-hooks.yaml").exists()
+        for name in re.findall(r"repo: (.*)", jobs)
+    ] == [True]
     shutil.copy(GLSTAT, "glstat")
     calls = re.findall(r"- (?:run: )?d2rpick (.*)", jobs)
     assert len(calls) == 2
@@ -179,7 +233,10 @@ def test_the_settings_in_the_documentation_are_taken(page: str, here: Path) -> N
     (here / "d2rpick.toml").write_text(settings)
     shown = run("suggest", "--deck", "x.k", "x.csv", "--show-settings").stdout
     table = tomllib.loads(settings)
-    taken = {*table, *table.pop("suggest")} - {"suggest", "fail-on"}  # which check alone takes
+    taken = {*table, *table.pop("suggest")} - {
+        "suggest",
+        "fail-on",
+    }  # which check alone takes
     assert shown.count(f"# settings, {here / 'd2rpick.toml'}") == len(taken)
 
 
@@ -193,20 +250,28 @@ def test_the_parquet_of_the_recipes_is_read() -> None:
 
 
 def test_the_pre_commit_hook_is_the_one_of_the_documentation() -> None:
-    hook = dict(re.findall(r"(\w+): (.*)", (ROOT / ".pre-commit-hooks.yaml").read_text("utf-8")))
+    hook = dict(
+        re.findall(r"(\w+): (.*)", (ROOT / ".pre-commit-hooks.yaml").read_text("utf-8"))
+    )
     assert f"      - id: {hook['id']}\n" in ALL
     assert hook["entry"].split() == ["d2rpick", "check"]
-    assert [bool(re.search(hook["files"], name)) for name in ("a/run.k", "RUN.KEY", "x.dyn", "k.py", "glstat")] == [
-        *(True, True, True, False, False)
-    ]
+    assert [
+        bool(re.search(hook["files"], name))
+        for name in ("a/run.k", "RUN.KEY", "x.dyn", "k.py", "glstat")
+    ] == [*(True, True, True, False, False)]
 
 
 def test_the_changelog_begins_with_this_version() -> None:
     changelog = (ROOT / "CHANGELOG.md").read_text("utf-8")
-    assert re.findall(r"^## (\S+)", changelog, flags=re.MULTILINE)[0] == d2rpick.__version__
+    assert (
+        re.findall(r"^## (\S+)", changelog, flags=re.MULTILINE)[0]
+        == d2rpick.__version__
+    )
 
 
 def test_every_sample_has_a_line_on_what_wrote_it() -> None:
     text = (ROOT / "sample_data" / "README.md").read_text("utf-8")
-    names = {path.name for path in (ROOT / "sample_data").iterdir() if path.suffix != ".md"}
+    names = {
+        path.name for path in (ROOT / "sample_data").iterdir() if path.suffix != ".md"
+    }
     assert not {name for name in names if f"| `{name}` |" not in text}

@@ -40,7 +40,8 @@ class Outcome(NamedTuple):
     def kept(self) -> bool:
         """Whether each window ends before the landing."""
         return all(
-            landing is None or td < landing for (_, td), landing in zip(self.windows, self.landings, strict=True)
+            landing is None or td < landing
+            for (_, td), landing in zip(self.windows, self.landings, strict=True)
         )
 
 
@@ -49,9 +50,13 @@ def outcome(parameters: Parameters, interval: float = INTERVAL) -> Outcome:
     with tempfile.TemporaryDirectory() as folder:
         files = written(simulate(parameters, T_END, interval=interval), Path(folder))
         windows = plan_of(read(files, BOX), Settings()).windows
-    switched = simulate(parameters, T_END, *(RigidWindow(*one) for one in windows), interval=interval)
+    switched = simulate(
+        parameters, T_END, *(RigidWindow(*one) for one in windows), interval=interval
+    )
     contacts = switched.landings
-    after = tuple(next((start for start, _ in contacts if start > tr), None) for tr, _ in windows)
+    after = tuple(
+        next((start for start, _ in contacts if start > tr), None) for tr, _ in windows
+    )
     return Outcome(windows, after)
 
 
@@ -67,6 +72,7 @@ if __name__ == "__main__":
         found = outcome(parameters)
         pairs = zip(found.windows, found.landings, strict=True)
         told = "; ".join(
-            f"{tr:.4f} to {td:.4f}, contact {at if at is None else round(at, 4)}" for (tr, td), at in pairs
+            f"{tr:.4f} to {td:.4f}, contact {at if at is None else round(at, 4)}"
+            for (tr, td), at in pairs
         )
         print(f"{number:2d} {'kept' if found.kept else 'NOT KEPT'}  {told}", flush=True)

@@ -39,7 +39,9 @@ def history(path: Path) -> History:
     return run.history(Selection(parts=("box",) if run.parts else ()))
 
 
-def test_by_default_the_trip_is_over_and_the_ground_comes_when_they_do_in_the_study(computed: Record) -> None:
+def test_by_default_the_trip_is_over_and_the_ground_comes_when_they_do_in_the_study(
+    computed: Record,
+) -> None:
     assert 0.070 <= sure(computed.released) <= 0.090
     assert sure(computed.landed) == pytest.approx(0.380, abs=0.005)
     assert np.abs(computed.imbalance).max() < 0.01
@@ -52,24 +54,33 @@ def test_every_format_has_its_sample(fresh: Mapping[str, bytes]) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_sample_is_what_the_model_gives(name: str, fresh: Mapping[str, bytes], tmp_path: Path) -> None:
+def test_a_sample_is_what_the_model_gives(
+    name: str, fresh: Mapping[str, bytes], tmp_path: Path
+) -> None:
     kept, now = history(KEPT / name), history(put(tmp_path / name, fresh[name]))
     np.testing.assert_allclose(kept.time, now.time, rtol=1e-6)
-    np.testing.assert_allclose(kept.energy, now.energy, rtol=1e-3, atol=1e-2)  # rounding grows with every contact
+    np.testing.assert_allclose(
+        kept.energy, now.energy, rtol=1e-3, atol=1e-2
+    )  # rounding grows with every contact
     assert (KEPT / name).stat().st_size < LARGEST
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_energies_of_a_sample_balance_and_its_health_is_right(name: str) -> None:
     health = answer("info", str(KEPT / name))["health"]
-    if not name.endswith(("matsum", "d3plot", "d3thdt")):  # have no energies of the whole model, or no external work
+    if not name.endswith(
+        ("matsum", "d3plot", "d3thdt")
+    ):  # have no energies of the whole model, or no external work
         assert health["energy_ratio_min"] > 0.999
         assert health["energy_ratio_max"] < 1.001
         assert health["sliding_share"] < 1e-6
 
 
 @pytest.mark.usefixtures("by_level")
-@pytest.mark.parametrize("name", [name for name in NAMES if name.endswith(("matsum", "binout", "d3plot", "d3thdt"))])
+@pytest.mark.parametrize(
+    "name",
+    [name for name in NAMES if name.endswith(("matsum", "binout", "d3plot", "d3thdt"))],
+)
 def test_one_run_has_one_answer_in_every_file_of_its_parts(name: str) -> None:
     found = answer("suggest", "--td", "0.37", "--part", "box", str(KEPT / name))
     assert found["recommended"]["tr"] == pytest.approx(0.09703, abs=sample_box.INTERVAL)

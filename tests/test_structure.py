@@ -58,7 +58,9 @@ def statements(module: str) -> Iterator[ast.AST]:
     rest: list[ast.AST] = [parsed(module)]
     while rest:
         yield (node := rest.pop())
-        rest += [one for one in ast.iter_child_nodes(node) if not isinstance(one, ast.expr)]
+        rest += [
+            one for one in ast.iter_child_nodes(node) if not isinstance(one, ast.expr)
+        ]
 
 
 @cache
@@ -74,12 +76,17 @@ def _imports(module: str) -> Iterator[str]:
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{module}: relative import"
             origin = (node.module or "").removeprefix("d2rpick.")
-            inside = [f"{origin}.{alias.name}".removeprefix("d2rpick.") for alias in node.names]
+            inside = [
+                f"{origin}.{alias.name}".removeprefix("d2rpick.")
+                for alias in node.names
+            ]
             yield from (name if name in MODULES else origin for name in inside)
 
 
 LAYER = {folder: height for height, folders in enumerate(LAYERS) for folder in folders}
-INNER = sorted(name for name in MODULES if name != "d2rpick")  # the public face stands above all
+INNER = sorted(
+    name for name in MODULES if name != "d2rpick"
+)  # the public face stands above all
 
 
 def folder(module: str) -> str:
@@ -97,14 +104,22 @@ def test_a_module_imports_only_from_its_folder_and_from_lower_layers() -> None:
         (module, name)
         for module in INNER
         for name in imports(module) & inner
-        if folder(name) != folder(module) and LAYER[folder(name)] >= LAYER[folder(module)]
+        if folder(name) != folder(module)
+        and LAYER[folder(name)] >= LAYER[folder(module)]
     }
     assert not found
-    assert not [module for module in INNER if "d2rpick" in imports(module)]  # the public face stands above all
+    assert not [
+        module for module in INNER if "d2rpick" in imports(module)
+    ]  # the public face stands above all
 
 
 def test_the_command_line_knows_the_library_results_and_base_alone() -> None:
-    known = {folder(name) for module in INNER if folder(module) == "cli" for name in imports(module) & {*INNER}}
+    known = {
+        folder(name)
+        for module in INNER
+        if folder(module) == "cli"
+        for name in imports(module) & {*INNER}
+    }
     assert known == {"cli", "api", "report", "base"}
 
 
@@ -115,15 +130,27 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
 
 @pytest.mark.parametrize("library", RESERVED)
 def test_a_library_stays_behind_its_module(library: str) -> None:
-    importing = {module for module in MODULES if library in {folder(name) for name in imports(module)}}
+    importing = {
+        module
+        for module in MODULES
+        if library in {folder(name) for name in imports(module)}
+    }
     assert importing
     assert {folder(module) for module in importing} <= {*RESERVED[library]}
 
 
 def test_what_does_not_ship_is_imported_where_its_absence_is_told() -> None:
-    importing = {module for module in MODULES if "validation" in {folder(name) for name in imports(module)}}
+    importing = {
+        module
+        for module in MODULES
+        if "validation" in {folder(name) for name in imports(module)}
+    }
     assert importing == {"cli.models"}
-    top = [ast.unparse(node) for node in parsed("cli.models").body if not isinstance(node, ast.FunctionDef)]
+    top = [
+        ast.unparse(node)
+        for node in parsed("cli.models").body
+        if not isinstance(node, ast.FunctionDef)
+    ]
     assert not [text for text in top if "import" in text and "validation" in text]
 
 
@@ -158,9 +185,16 @@ def swapped(tree: ast.Module) -> Iterator[str]:
 def test_tests_swap_names_of_the_standard_library_alone() -> None:
     """Where a module of ours moves, a test that swaps a name in it would have to be written anew."""
     sources = {path: path.read_text("utf-8") for path in (ROOT / "tests").rglob("*.py")}
-    for path, tree in ((path, ast.parse(text)) for path, text in sources.items() if SWAP.search(text)):
+    for path, tree in (
+        (path, ast.parse(text)) for path, text in sources.items() if SWAP.search(text)
+    ):
         froms = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
-        theirs = {one.name for node in froms if node.module in sys.stdlib_module_names for one in node.names}
+        theirs = {
+            one.name
+            for node in froms
+            if node.module in sys.stdlib_module_names
+            for one in node.names
+        }
         assert {*swapped(tree)} <= theirs | sys.stdlib_module_names, path
 
 
@@ -177,7 +211,12 @@ def loaded(*args: str) -> frozenset[str]:
         "from d2rpick.__main__ import main; main()"
     )
     result = subprocess.run(
-        [sys.executable, "-c", code, *args], capture_output=True, text=True, check=True, cwd=ROOT, timeout=TIME_LIMIT
+        [sys.executable, "-c", code, *args],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=ROOT,
+        timeout=TIME_LIMIT,
     )
     assert result.stdout
     return frozenset(result.stderr.split())
@@ -186,7 +225,9 @@ def loaded(*args: str) -> frozenset[str]:
 @cache
 def beside(libraries: str) -> frozenset[str]:
     """Modules of a process that imports nothing but some libraries."""
-    return frozenset(printed_by(f"import sys, {libraries}; print(*sys.modules)").split())
+    return frozenset(
+        printed_by(f"import sys, {libraries}; print(*sys.modules)").split()
+    )
 
 
 def share(modules: frozenset[str]) -> float:
@@ -198,10 +239,38 @@ def share(modules: frozenset[str]) -> float:
 
 # What else of the standard library and of numpy costs start-up, and an answer to a plain table does without.
 UNNEEDED = {
-    *("pathlib", "json", "csv", "tempfile", "hashlib", "array", "heapq", "unicodedata", "logging", "subprocess", "xml"),
-    *("concurrent.futures", "multiprocessing", "shutil", "tomllib", "difflib", "zlib", "traceback", "unittest"),
+    *(
+        "pathlib",
+        "json",
+        "csv",
+        "tempfile",
+        "hashlib",
+        "array",
+        "heapq",
+        "unicodedata",
+        "logging",
+        "subprocess",
+        "xml",
+    ),
+    *(
+        "concurrent.futures",
+        "multiprocessing",
+        "shutil",
+        "tomllib",
+        "difflib",
+        "zlib",
+        "traceback",
+        "unittest",
+    ),
     *("importlib.metadata", "importlib.resources"),
-    *("numpy.ma", "numpy.typing", "numpy.polynomial", "numpy.random", "numpy.testing", "numpy.f2py"),
+    *(
+        "numpy.ma",
+        "numpy.typing",
+        "numpy.polynomial",
+        "numpy.random",
+        "numpy.testing",
+        "numpy.f2py",
+    ),
 }
 SUGGEST = ("suggest", "--exit-zero", "--quiet", "--td")  # -q costs click difflib
 CARD = ("card", "--tr", "0.02", "--td", "0.09")
@@ -212,21 +281,32 @@ CARD = ("card", "--tr", "0.02", "--td", "0.09")
     [
         (("--help",), "click", 0.02),
         (("--version",), "click", 0.02),
-        *(((command, "--help"), "click", 0.12) for command in ("suggest", "explore", "info")),
+        *(
+            ((command, "--help"), "click", 0.12)
+            for command in ("suggest", "explore", "info")
+        ),
         (("check", "-f", "json", DECK), "click", 0.21),
         (("rule", "D2R201"), "click", 0.21),
         ((*CARD, "--part", "1"), "click", 0.12),
         ((*CARD, "--solver", "radioss", "--node", "1", "--end", "1"), "click", 0.12),
-        *(((*SUGGEST, "0.064", file), "click, numpy", 0.37) for file in (ENERGY, GLSTAT)),
+        *(
+            ((*SUGGEST, "0.064", file), "click, numpy", 0.37)
+            for file in (ENERGY, GLSTAT)
+        ),
     ],
 )
-def test_a_command_loads_only_what_its_answer_needs(args: tuple[str, ...], libraries: str, most: float) -> None:
+def test_a_command_loads_only_what_its_answer_needs(
+    args: tuple[str, ...], libraries: str, most: float
+) -> None:
     """No library but these, and so much of the package at most: a file more is worth a thought."""
     there = beside(libraries)
     assert "d2rpick" not in there
     mine = loaded(*args) - there
     own = frozenset(name for name in mine if folder(name) == "d2rpick")
-    assert {folder(name) for name in mine - own} <= {*sys.stdlib_module_names, *re.findall(r"\w+", libraries)}
+    assert {folder(name) for name in mine - own} <= {
+        *sys.stdlib_module_names,
+        *re.findall(r"\w+", libraries),
+    }
     assert share(own) <= most
 
 
@@ -255,7 +335,12 @@ def test_a_small_deck_needs_little_of_what_python_has() -> None:
 def printed_by(code: str) -> str:
     """What a fresh interpreter prints."""
     result = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT, timeout=TIME_LIMIT
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=ROOT,
+        timeout=TIME_LIMIT,
     )
     return result.stdout
 
@@ -263,7 +348,12 @@ def printed_by(code: str) -> str:
 def test_the_package_alone_imports_nothing() -> None:
     """What typing and its like make is looked through for garbage, unless the command line comes first."""
     code = "import sys; before = {*sys.modules}; import d2rpick; print(*({*sys.modules} - before))"
-    assert {*printed_by(code).split()} <= {"d2rpick", "d2rpick.api", "d2rpick.base", "__future__"}
+    assert {*printed_by(code).split()} <= {
+        "d2rpick",
+        "d2rpick.api",
+        "d2rpick.base",
+        "__future__",
+    }
 
 
 def test_no_garbage_is_looked_for_at_the_end() -> None:
@@ -274,7 +364,9 @@ def test_no_garbage_is_looked_for_at_the_end() -> None:
     assert printed_by(code).splitlines()[-1] == "True"
 
 
-def test_the_command_line_offers_the_grades_and_the_formats_of_models_there_are() -> None:
+def test_the_command_line_offers_the_grades_and_the_formats_of_models_there_are() -> (
+    None
+):
     assert output.GRADES == GRADES
     assert tuple(OSCILLATOR_WRITERS) == models.HISTORIES
 
@@ -283,14 +375,26 @@ def test_the_command_line_offers_the_grades_and_the_formats_of_models_there_are(
 SCHEMAS = [
     f"schemas/{name}.json"
     for name in (
-        *("suggest-1", "explore-1", "plan-1", "parts-1", "calibrate-1", "verify-1", "info-1", "check-1", "study-1"),
+        *(
+            "suggest-1",
+            "explore-1",
+            "plan-1",
+            "parts-1",
+            "calibrate-1",
+            "verify-1",
+            "info-1",
+            "check-1",
+            "study-1",
+        ),
         *("reproduce-2", "rollover-1", "drive-1"),
     )
 ]
 
 
 def test_every_schema_is_listed() -> None:
-    assert {*SCHEMAS} == {f"schemas/{path.name}" for path in (PACKAGE / "schemas").iterdir()}
+    assert {*SCHEMAS} == {
+        f"schemas/{path.name}" for path in (PACKAGE / "schemas").iterdir()
+    }
 
 
 @pytest.mark.parametrize("name", ["py.typed", *SCHEMAS])

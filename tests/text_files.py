@@ -42,7 +42,12 @@ def glstat_text(times: ArrayLike, energies: ArrayLike) -> bytes:
 
 def matsum_head(ids: Sequence[int]) -> bytes:
     titles = b"".join(b"%9d     %-72s\n" % (id_, b"Part %d" % id_) for id_ in ids)
-    return HEAD + b"\n{BEGIN LEGEND}\n Entity #        Title\n" + titles + b"{END LEGEND}\n\n\n\n"
+    return (
+        HEAD
+        + b"\n{BEGIN LEGEND}\n Entity #        Title\n"
+        + titles
+        + b"{END LEGEND}\n\n\n\n"
+    )
 
 
 def matsum_part(id_: int, energy: float, lines: int = 4) -> bytes:
@@ -55,14 +60,26 @@ def matsum_part(id_: int, energy: float, lines: int = 4) -> bytes:
         b" x-mom=" + zero + b"     y-mom=" + zero + b"     z-mom=" + zero + b"\n"
         b" x-rbv=" + zero + b"     y-rbv=" + zero + b"     z-rbv=" + zero + b"\n"
     )  # fmt: skip
-    return text if lines == 3 else text + b"                         hgeng=" + zero + b"\n\n\n"
+    return (
+        text
+        if lines == 3
+        else text + b"                         hgeng=" + zero + b"\n\n\n"
+    )
 
 
-def matsum_state(time: float, ids: Sequence[int], energies: ArrayLike, lines: int = 4) -> bytes:
+def matsum_state(
+    time: float, ids: Sequence[int], energies: ArrayLike, lines: int = 4
+) -> bytes:
     parts = zip(ids, np.asarray(energies).tolist(), strict=True)
-    return f" time ={time:13.4E}\n".encode() + b"".join(matsum_part(id_, energy, lines) for id_, energy in parts)
+    return f" time ={time:13.4E}\n".encode() + b"".join(
+        matsum_part(id_, energy, lines) for id_, energy in parts
+    )
 
 
-def matsum_text(times: ArrayLike, ids: Sequence[int], energies: ArrayLike, lines: int = 4) -> bytes:
+def matsum_text(
+    times: ArrayLike, ids: Sequence[int], energies: ArrayLike, lines: int = 4
+) -> bytes:
     states = zip(np.asarray(times).tolist(), np.asarray(energies), strict=True)
-    return matsum_head(ids) + b"".join(matsum_state(time, ids, row, lines) for time, row in states)
+    return matsum_head(ids) + b"".join(
+        matsum_state(time, ids, row, lines) for time, row in states
+    )

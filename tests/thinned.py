@@ -52,8 +52,14 @@ TABLES = {
     "chain_ref": ("time_s", "x3_m", "IE_spring1_J", "IE_spring2_J", "IE_total_J"),
     "load_L1_ref": ("time_s", "IE_spring1_J", "IE_J", "momentum_x_solver"),
     "load_L3_ref": ("time_s", "IE_spring1_J", "IE_J", "momentum_x_solver"),
-    **{f"oscillator_{name}_ref": ("time_s", "IE_J", "KE_J", "momentum_x", "EXTWORK_J") for name in ("S1", "S2", "S4")},
-    **{f"oscillator_{name}": ("time_s", "IE_J") for name in ("ref", "d2r_13_64", "d2r_6_80", "d2r_13p587_68p753")},
+    **{
+        f"oscillator_{name}_ref": ("time_s", "IE_J", "KE_J", "momentum_x", "EXTWORK_J")
+        for name in ("S1", "S2", "S4")
+    },
+    **{
+        f"oscillator_{name}": ("time_s", "IE_J")
+        for name in ("ref", "d2r_13_64", "d2r_6_80", "d2r_13p587_68p753")
+    },
     "rollover_r20": ("time_s", "boxIE_J"),
 }
 
@@ -85,8 +91,13 @@ def thin(data: bytes, kept: Thinned) -> bytes:
         made.record(record)
     of_subsets = sum(copy_subset(records, made) for _ in range(subsets))
     of_groups = [skip_group(records) for _ in range(groups)]
-    states = zip(*[records] * sum(map(bool, (True, variables, before, of_subsets, *of_groups))), strict=True)
-    inside = [state for state in states if np.frombuffer(state[0], ">f4")[0] <= kept.end]
+    states = zip(
+        *[records] * sum(map(bool, (True, variables, before, of_subsets, *of_groups))),
+        strict=True,
+    )
+    inside = [
+        state for state in states if np.frombuffer(state[0], ">f4")[0] <= kept.end
+    ]
     of_parts = 1 + bool(variables)
     for state in [*inside[: -1 : kept.every], inside[-1]]:
         for record in state[:of_parts]:
@@ -140,9 +151,15 @@ def columns_of(text: str, names: tuple[str, ...]) -> str:
 def main(folder: Path) -> None:
     """Write all of them, and print their sizes."""
     for name, kept in RUNS.items():
-        write(f"{name}.gz", thin(gzip.decompress((folder / f"{name}.gz").read_bytes()), kept))
+        write(
+            f"{name}.gz",
+            thin(gzip.decompress((folder / f"{name}.gz").read_bytes()), kept),
+        )
     for name, columns in TABLES.items():
-        write(f"{name}.csv.gz", columns_of((folder / f"{name}.csv").read_text("ascii"), columns).encode())
+        write(
+            f"{name}.csv.gz",
+            columns_of((folder / f"{name}.csv").read_text("ascii"), columns).encode(),
+        )
 
 
 def write(name: str, content: bytes) -> None:

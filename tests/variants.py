@@ -14,17 +14,29 @@ STUDY = ("study", "--td", str(TD), "--jobs", "1")
 
 def variant(rate: float = 1.0, size: float = 1.0) -> Mode:
     """The paper's oscillator with another rate and amplitude."""
-    return Mode(rate * OMEGA_2, MODE.alpha, size * MODE.cosine, size * MODE.sine, MODE.origin)
+    return Mode(
+        rate * OMEGA_2, MODE.alpha, size * MODE.cosine, size * MODE.sine, MODE.origin
+    )
 
 
 def write(path: Path, mode: Mode | None = None, end: float = 0.15) -> str:
     """Write the record of an oscillator as a table; the name of the file."""
     time = TIME[: int(np.searchsorted(TIME, end, side="right"))]
     table = np.stack([time, (mode or variant()).energy(time)], axis=1)
-    np.savetxt(path, table, delimiter=",", header="time,internal_energy", comments="", fmt="%.9g")
+    np.savetxt(
+        path,
+        table,
+        delimiter=",",
+        header="time,internal_energy",
+        comments="",
+        fmt="%.9g",
+    )
     return str(path)
 
 
 def variants(folder: Path, rates: tuple[float, ...] = (1.0, 1.001, 0.999)) -> list[str]:
     """Write runs whose rates differ; names of the files."""
-    return [write(folder / f"run{i}.csv", variant(rate)) for i, rate in enumerate(rates, start=1)]
+    return [
+        write(folder / f"run{i}.csv", variant(rate))
+        for i, rate in enumerate(rates, start=1)
+    ]

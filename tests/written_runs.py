@@ -34,13 +34,21 @@ class Written(NamedTuple):
 
 def as_totals(run: Written, folder: Path) -> str:
     """Write a table of kinetic and internal energy."""
-    columns = {"time": run.time, "internal_energy": run.internal.sum(axis=1), "kinetic_energy": run.kinetic.sum(axis=1)}
+    columns = {
+        "time": run.time,
+        "internal_energy": run.internal.sum(axis=1),
+        "kinetic_energy": run.kinetic.sum(axis=1),
+    }
     return _table(columns, folder)
 
 
 def as_momenta(run: Written, folder: Path, *, kinetic: bool = True) -> str:
     """Write a table of energies, momenta and mass of the model."""
-    return _table(_of_momenta(run, kinetic=kinetic) | {"mass": np.full(run.time.size, run.masses.sum())}, folder)
+    return _table(
+        _of_momenta(run, kinetic=kinetic)
+        | {"mass": np.full(run.time.size, run.masses.sum())},
+        folder,
+    )
 
 
 def as_momenta_alone(run: Written, folder: Path, *, kinetic: bool = True) -> str:
@@ -52,7 +60,11 @@ def _of_momenta(run: Written, *, kinetic: bool) -> dict[str, Samples]:
     whole = run.momentum.sum(axis=1)
     columns = {"time": run.time, "internal_energy": run.internal.sum(axis=1)}
     columns |= {"kinetic_energy": run.kinetic.sum(axis=1)} if kinetic else {}
-    return columns | {"x_momentum": whole[:, 0], "y_momentum": whole[:, 1], "z_momentum": 0 * run.time}
+    return columns | {
+        "x_momentum": whole[:, 0],
+        "y_momentum": whole[:, 1],
+        "z_momentum": 0 * run.time,
+    }
 
 
 def as_glstat(run: Written, folder: Path, *, kinetic: bool = True) -> str:
@@ -60,8 +72,14 @@ def as_glstat(run: Written, folder: Path, *, kinetic: bool = True) -> str:
     blocks = [HEAD + b"\n"]
     columns = _of_glstat(run, kinetic=kinetic)
     for state, time in enumerate(run.time.tolist()):
-        head = b" dt of cycle%8d is controlled by solid              1 of part         1\n\n" % (24 * state + 1)
-        lines = [glstat_line(name.replace("_", " "), float(values[state])) for name, values in columns.items()]
+        head = (
+            b" dt of cycle%8d is controlled by solid              1 of part         1\n\n"
+            % (24 * state + 1)
+        )
+        lines = [
+            glstat_line(name.replace("_", " "), float(values[state]))
+            for name, values in columns.items()
+        ]
         blocks += [head, glstat_line("time", time), *lines, b"\n\n"]
     path = folder / "glstat"
     path.write_bytes(b"".join(blocks))
@@ -90,7 +108,11 @@ def _of_glstat(run: Written, *, kinetic: bool) -> dict[str, Samples]:
     moving, inner = run.kinetic.sum(axis=1), run.internal.sum(axis=1)
     columns = {"time_step": 0 * run.time + 1e-4}
     columns |= {"kinetic_energy": moving} if kinetic else {}
-    columns |= {"internal_energy": inner, "system_damping_energy": run.damped, "external_work": run.work}
+    columns |= {
+        "internal_energy": inner,
+        "system_damping_energy": run.damped,
+        "external_work": run.work,
+    }
     columns |= {"total_energy": moving + inner + run.damped} if kinetic else {}
     axes = {"global_x_velocity": velocity[:, 0], "global_y_velocity": velocity[:, 1]}
     return columns | axes | {"global_z_velocity": 0 * run.time}
@@ -99,15 +121,29 @@ def _of_glstat(run: Written, *, kinetic: bool) -> dict[str, Samples]:
 def as_t01(run: Written, folder: Path, *, kinetic: bool = True) -> str:
     """Write a T01 with one part for each mass."""
     names = (1, 2, 3, 4, 5, 6) if kinetic else (1, 3, 4, 5, 6)
-    parts = [MadePart(place + 1, f"mass {place + 1}", names) for place in range(run.masses.size)]
+    parts = [
+        MadePart(place + 1, f"mass {place + 1}", names)
+        for place in range(run.masses.size)
+    ]
     made = headed(parts, globals_=12)
     momentum, still = run.momentum.sum(axis=1), [0.0] * 5
     for state, time in enumerate(run.time.tolist()):
         energies = [float(run.internal[state].sum()), float(run.kinetic[state].sum())]
-        whole = [*energies, *momentum[state].tolist(), 0.0, float(run.masses.sum()), 1e-4, 0.0, float(run.work[state])]
+        whole = [
+            *energies,
+            *momentum[state].tolist(),
+            0.0,
+            float(run.masses.sum()),
+            1e-4,
+            0.0,
+            float(run.work[state]),
+        ]
         of_parts: list[float] = []
         for part, mass in enumerate(run.masses.tolist()):
-            inner, moving = float(run.internal[state, part]), float(run.kinetic[state, part])
+            inner, moving = (
+                float(run.internal[state, part]),
+                float(run.kinetic[state, part]),
+            )
             of_parts += [inner, moving] if kinetic else [inner]
             of_parts += [*run.momentum[state, part].tolist(), 0.0, mass]
         made.state(time, whole + still[:3], of_parts)
@@ -124,7 +160,10 @@ def as_matsum(run: Written, folder: Path) -> str:
     for state, time in enumerate(run.time.tolist()):
         text.append(f" time ={time:13.4E}\n".encode())
         for part in range(count):
-            inner, moving = float(run.internal[state, part]), float(run.kinetic[state, part])
+            inner, moving = (
+                float(run.internal[state, part]),
+                float(run.kinetic[state, part]),
+            )
             x, y = run.momentum[state, part].tolist()
             text.append(
                 f" mat.#={part + 1:5d}             inten={inner:13.4E}     kinen={moving:13.4E}"
@@ -140,7 +179,10 @@ def as_matsum(run: Written, folder: Path) -> str:
 
 def _table(columns: Mapping[str, Samples], folder: Path) -> str:
     rows = np.column_stack(list(columns.values())).tolist()
-    lines = [",".join(columns), *(",".join(f"{value:.7g}" for value in row) for row in rows)]
+    lines = [
+        ",".join(columns),
+        *(",".join(f"{value:.7g}" for value in row) for row in rows),
+    ]
     path = folder / "run.csv"
     path.write_text("\n".join(lines) + "\n", encoding="ascii")
     return str(path)

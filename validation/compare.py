@@ -35,7 +35,11 @@ class Run(NamedTuple):
     def contacts(self) -> list[float]:
         """Times at which contacts begin [s]."""
         size = float(np.ptp(self.contact))
-        changes = self.time[1:][np.abs(np.diff(self.contact)) > _CONTACT * size] if size else self.time[:0]
+        changes = (
+            self.time[1:][np.abs(np.diff(self.contact)) > _CONTACT * size]
+            if size
+            else self.time[:0]
+        )
         apart = np.diff(changes, prepend=-np.inf) > _SAME_CONTACT
         return [float(time) for time in changes[apart]]
 
@@ -57,13 +61,20 @@ class Comparison(NamedTuple):
 def read(names: Sequence[str]) -> Run:
     """Read the legs of a run."""
     (database,) = open_run(names, Selection()).databases
-    return Run(database.time, *(database.channel(name) for name in ("internal_energy", "contact_energy")))
+    return Run(
+        database.time,
+        *(database.channel(name) for name in ("internal_energy", "contact_energy")),
+    )
 
 
 def compare(reference: Run, switched: Run, td: float) -> Comparison:
     """Hold a switched run against its reference."""
-    theirs, ours = ([time for time in run.contacts() if time > td] for run in (reference, switched))
-    landing = min([*theirs[:1], *ours[:1], float(reference.time[-1]), float(switched.time[-1])])
+    theirs, ours = (
+        [time for time in run.contacts() if time > td] for run in (reference, switched)
+    )
+    landing = min(
+        [*theirs[:1], *ours[:1], float(reference.time[-1]), float(switched.time[-1])]
+    )
     time = reference.time[(reference.time > td) & (reference.time < landing)]
     wanted = np.interp(time, reference.time, reference.internal)
     found = np.interp(time, switched.time, switched.internal)
@@ -76,7 +87,9 @@ def compare(reference: Run, switched: Run, td: float) -> Comparison:
 
 def main() -> None:
     """Print the comparison."""
-    parser = argparse.ArgumentParser(prog="python -m validation.compare", description=__doc__)
+    parser = argparse.ArgumentParser(
+        prog="python -m validation.compare", description=__doc__
+    )
     parser.add_argument("--td", type=float, required=True)
     parser.add_argument("--reference", nargs="+", required=True)
     parser.add_argument("--switched", nargs="+", required=True)
@@ -87,7 +100,9 @@ def main() -> None:
         known = f"off by {found.deviation:.3g} of its peak, mean ratio {found.mean_ratio:.3f}"
     print(f"internal energy after td  {known}")
     print(f"compared up to            {found.landing:.6g}")
-    print(f"contacts shifted by       {', '.join(f'{1e3 * shift:+.2f}' for shift in found.shifts[:4]) or '-'} ms")
+    print(
+        f"contacts shifted by       {', '.join(f'{1e3 * shift:+.2f}' for shift in found.shifts[:4]) or '-'} ms"
+    )
 
 
 if __name__ == "__main__":

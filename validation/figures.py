@@ -19,7 +19,12 @@ if TYPE_CHECKING:
 RESULTS: Final = Path(__file__).parent / "results"
 PLACE: Final = Path(__file__).resolve().parents[1] / "docs" / "validation"
 # Deviations after td of the oscillator's four runs: (tr, td) [ms], computed.
-_PAIRS: Final = (("6, 80", 5.64), ("13, 64", 0.888), ("12.89, 64", 0.901), ("13.587, 68.753", 0.005))
+_PAIRS: Final = (
+    ("6, 80", 5.64),
+    ("13, 64", 0.888),
+    ("12.89, 64", 0.901),
+    ("13.587, 68.753", 0.005),
+)
 # Windows of the falling box whose contacts are compared, and what they are called.
 _DROPS: Final = {
     "drop2_pert": "not switched, start changed by 1e-6", "drop2_null1": "rigid for 0.1 ms",
@@ -35,21 +40,45 @@ _ABSORBS: Final = 0.05  # least share of the rise of the total energy in a part 
 
 def table(name: str) -> NDArray[Any]:
     """Read a table of results; empty cells are nan."""
-    return np.genfromtxt(RESULTS / f"{name}.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
+    return np.genfromtxt(
+        RESULTS / f"{name}.csv", delimiter=",", names=True, dtype=None, encoding="utf-8"
+    )
 
 
 def oscillators() -> Figure:
     """Residuals that were predicted beside those of the solver, for one and for two modes."""
     figure = Figure(figsize=(10, 4.2), layout="constrained")
     left, right = figure.subplots(1, 2)
-    left.bar([name for name, _ in _PAIRS], [error for _, error in _PAIRS], color=REFERENCE, width=0.5)
-    left.set(yscale="log", ylim=(1e-3, 10), ylabel="largest deviation after td [-]", xlabel="tr, td [ms]")
+    left.bar(
+        [name for name, _ in _PAIRS],
+        [error for _, error in _PAIRS],
+        color=REFERENCE,
+        width=0.5,
+    )
+    left.set(
+        yscale="log",
+        ylim=(1e-3, 10),
+        ylabel="largest deviation after td [-]",
+        xlabel="tr, td [ms]",
+    )
     left.set_title("oscillator: vibration after td, OpenRadioss", fontsize="small")
     rows = table("chain_scan")
     right.plot([0, 2.2], [0, 2.2], color=FLIGHT, linewidth=1)
     single = table("oscillators_scan")
-    right.plot(rows["R_theory"], rows["R_sim"], ".", color=REFERENCE, label=f"two modes, {rows.size} switched runs")
-    right.plot(single["R_theory"], single["R_sim"], "o", color=SWITCHED, label=f"one mode, {single.size} switched runs")
+    right.plot(
+        rows["R_theory"],
+        rows["R_sim"],
+        ".",
+        color=REFERENCE,
+        label=f"two modes, {rows.size} switched runs",
+    )
+    right.plot(
+        single["R_theory"],
+        single["R_sim"],
+        "o",
+        color=SWITCHED,
+        label=f"one mode, {single.size} switched runs",
+    )
     right.legend(fontsize="x-small")
     right.set(xlabel="residual predicted [-]", ylabel="residual computed [-]")
     right.set_title("chain of two springs, and three oscillators", fontsize="small")
@@ -64,12 +93,20 @@ def rollover() -> Figure:
     left, right = figure.subplots(1, 2)
     left.plot(tr, np.abs(rows["droll_td_deg"]), ".-", color=REFERENCE, linewidth=0.8)
     left.set(yscale="log", ylabel="|roll error| at td [degrees]")
-    right.plot(tr, rows["IEmean_td_to_380ms_J"] / rows["IEmean_ref_J"], ".-", color=REFERENCE, linewidth=0.8)
+    right.plot(
+        tr,
+        rows["IEmean_td_to_380ms_J"] / rows["IEmean_ref_J"],
+        ".-",
+        color=REFERENCE,
+        linewidth=0.8,
+    )
     right.axhline(1.0, color=SWITCHED, linewidth=0.8)
     right.set(ylabel="mean energy after td, over the reference")
     for axes in (left, right):
         axes.axvspan(0, 88.5, color=SWITCHED, alpha=0.1, linewidth=0, label="trip")
-        axes.axvline(88.58, color=GOOD, linestyle="--", linewidth=1, label="recommended tr")
+        axes.axvline(
+            88.58, color=GOOD, linestyle="--", linewidth=1, label="recommended tr"
+        )
         axes.set_xlabel("tr [ms]")
         axes.legend(fontsize="x-small")
     return _done(figure)
@@ -85,14 +122,36 @@ def car() -> Figure:
     left, right = figure.subplots(1, 2)
     left.plot(tr, rows["dangle_td_deg"], ".-", color=REFERENCE, linewidth=0.8)
     for place, (start, end) in enumerate(((2.3, 11.8), (28.1, 38.5))):
-        left.axvspan(start, end, color=SWITCHED, alpha=0.1, linewidth=0, label="_" if place else "contact")
+        left.axvspan(
+            start,
+            end,
+            color=SWITCHED,
+            alpha=0.1,
+            linewidth=0,
+            label="_" if place else "contact",
+        )
     left.axvline(38.05, color=GOOD, linestyle="--", linewidth=1, label="recommended tr")
-    left.set(yscale="log", xlabel="tr [ms]", ylabel="angle between the two bodies at td [degrees]")
+    left.set(
+        yscale="log",
+        xlabel="tr [ms]",
+        ylabel="angle between the two bodies at td [degrees]",
+    )
     left.legend(fontsize="x-small")
     level = rows["E_tr_J"] / rows["E_td_ref_J"]
-    for some, colour, name in ((flying, REFERENCE, "in flight"), (~flying, SWITCHED, "during the load")):
-        right.plot(level[some], rows["meanIE_td_landing_ratio"][some], ".", color=colour, label=name)
-    right.set(xlabel="E(tr)/E(td)", ylabel="mean energy until the landing, over the reference")
+    for some, colour, name in (
+        (flying, REFERENCE, "in flight"),
+        (~flying, SWITCHED, "during the load"),
+    ):
+        right.plot(
+            level[some],
+            rows["meanIE_td_landing_ratio"][some],
+            ".",
+            color=colour,
+            label=name,
+        )
+    right.set(
+        xlabel="E(tr)/E(td)", ylabel="mean energy until the landing, over the reference"
+    )
     right.legend(fontsize="x-small")
     return _done(figure)
 
@@ -106,7 +165,14 @@ def drop() -> Figure:
     colours = (REFERENCE, FLIGHT, GOOD, SWITCHED, "#cc79a7")
     for (run, name), colour in zip(_DROPS.items(), colours, strict=True):
         (row,) = rows[rows["run"] == run]
-        axes.plot(numbers, [row[f"dland{n}_ms"] for n in numbers], ".-", color=colour, linewidth=0.8, label=name)
+        axes.plot(
+            numbers,
+            [row[f"dland{n}_ms"] for n in numbers],
+            ".-",
+            color=colour,
+            linewidth=0.8,
+            label=name,
+        )
     axes.set(xlabel="contact", ylabel="contact comes later by [ms]")
     axes.legend(fontsize="x-small")
     return _done(figure)
@@ -129,15 +195,31 @@ def vibration() -> Figure:
     left.plot([0, 2], [0, 2], color=FLIGHT, linewidth=1)
     right.axvline(0.01, color="grey", linestyle="--", linewidth=1, label="1 % and 5 %")
     right.axvline(0.05, color="grey", linestyle="--", linewidth=1)
-    for (case, name), colour in zip(_VIBRATING.items(), (REFERENCE, FLIGHT, SWITCHED, "#cc79a7", GOOD), strict=True):
+    for (case, name), colour in zip(
+        _VIBRATING.items(), (REFERENCE, FLIGHT, SWITCHED, "#cc79a7", GOOD), strict=True
+    ):
         own = switched[switched["case"] == case]
         whole = own[own["energy"] == "total"]
         if not np.isnan(whole["R_predicted"]).all():
-            left.plot(whole["R_predicted"], whole["R_nodes"], "o", color=colour, markersize=4, label=name)
-        right.plot(whole["worth"], whole["rms"], "o", color=colour, markersize=4, label=name)
+            left.plot(
+                whole["R_predicted"],
+                whole["R_nodes"],
+                "o",
+                color=colour,
+                markersize=4,
+                label=name,
+            )
+        right.plot(
+            whole["worth"], whole["rms"], "o", color=colour, markersize=4, label=name
+        )
         parts = switched[absorbing & (switched["case"] == case)]
-        right.plot(parts["worth"], parts["rms"], "x", color=colour, markersize=4, label="_")
-    left.set(xlabel="residual predicted by the reference [-]", ylabel="residual of all nodes [-]")
+        right.plot(
+            parts["worth"], parts["rms"], "x", color=colour, markersize=4, label="_"
+        )
+    left.set(
+        xlabel="residual predicted by the reference [-]",
+        ylabel="residual of all nodes [-]",
+    )
     right.set(xscale="log", yscale="log", xlabel="worth of the vibration error [-]")
     right.set_ylabel("energy after the landing off by, of its rise [-]")
     right.set_title("dots: all parts, crosses: single parts", fontsize="small")

@@ -25,13 +25,20 @@ if TYPE_CHECKING:
 
 NAME: Final = "FRAME"
 MAIN_NODE: Final = 90001  # of the rigid body
-PARTS: Final = ("beams", "plates", "heavy plate", "feet")  # the switched parts, numbered from 1; the ground follows
+PARTS: Final = (
+    "beams",
+    "plates",
+    "heavy plate",
+    "feet",
+)  # the switched parts, numbered from 1; the ground follows
 
 _LENGTHS: Final = np.array([0.66, 0.38, 0.50])  # between corners [m]
 _BEAM_PIECES: Final = 6  # elements of one beam
 _FOOT_HEIGHT: Final = 0.075  # [m]
 _PLATE_SIDE: Final = 0.05  # of a plate, and of the square of a foot [m]
-_HALF_SIDES: Final = np.linspace(-_PLATE_SIDE / 2, _PLATE_SIDE / 2, 5)  # nodes along the side of a plate [m]
+_HALF_SIDES: Final = np.linspace(
+    -_PLATE_SIDE / 2, _PLATE_SIDE / 2, 5
+)  # nodes along the side of a plate [m]
 _RINGS: Final = 6  # shells along the height of a foot
 _PUSHED_CORNER: Final = (1, 1, 1)  # which end along each axis
 _HEAVY_CORNER: Final = (0, 1, 1)
@@ -90,7 +97,14 @@ _ELASTIC: Final = """/MAT/ELAST/{number}
 {modulus:20.10g}                 0.3"""
 _MATERIALS: Final = "\n".join(
     (
-        _PLASTIC.format(number=1, title="steel", density=7850, modulus=2.1e11, strength=350e6, hardening=5e8),
+        _PLASTIC.format(
+            number=1,
+            title="steel",
+            density=7850,
+            modulus=2.1e11,
+            strength=350e6,
+            hardening=5e8,
+        ),
         _ELASTIC.format(number=2, title="dense", density=8e4, modulus=2.1e11),
         _ELASTIC.format(number=3, title="ground", density=7850, modulus=2.1e11),
     )
@@ -148,7 +162,9 @@ class Mesh:
     """Nodes by their places, and the elements of each part as lists of node numbers."""
 
     places: list[Place] = field(default_factory=list)
-    elements: list[list[list[int]]] = field(default_factory=lambda: [[] for _ in _PARTS])
+    elements: list[list[list[int]]] = field(
+        default_factory=lambda: [[] for _ in _PARTS]
+    )
     _numbers: dict[Place, int] = field(default_factory=dict)
 
     def node(self, place: Iterable[float]) -> int:
@@ -161,16 +177,23 @@ class Mesh:
 
     def add_beam(self, start: Reals, end: Reals, beside: Reals) -> None:
         """Add the elements of a beam; the node ``beside`` it orients its section."""
-        stations = (start + share * (end - start) for share in np.linspace(0, 1, _BEAM_PIECES + 1))
+        stations = (
+            start + share * (end - start)
+            for share in np.linspace(0, 1, _BEAM_PIECES + 1)
+        )
         numbers = [self.node(station) for station in stations]
         orients = self.node(beside)
-        self.elements[_BEAMS] += [[first, second, orients] for first, second in pairwise(numbers)]
+        self.elements[_BEAMS] += [
+            [first, second, orients] for first, second in pairwise(numbers)
+        ]
 
     def add_grid(self, part: int, origin: Reals, first: Line, second: Line) -> None:
         """Add a grid of shells that two lines of nodes span from an origin."""
         for u, v in product(pairwise(first), pairwise(second)):
             corners = (u[0] + v[0], u[1] + v[0], u[1] + v[1], u[0] + v[1])
-            self.elements[part].append([self.node(origin + corner) for corner in corners])
+            self.elements[part].append(
+                [self.node(origin + corner) for corner in corners]
+            )
 
 
 def mesh_frame() -> Mesh:
@@ -181,7 +204,9 @@ def mesh_frame() -> Mesh:
     for corner, axis in product(corners, range(3)):
         if corner[axis] == 0:
             turned = np.abs(corner - axes[axis - 1])  # the other end along another axis
-            mesh.add_beam(_LENGTHS * corner, _LENGTHS * (corner + axes[axis]), _LENGTHS * turned)
+            mesh.add_beam(
+                _LENGTHS * corner, _LENGTHS * (corner + axes[axis]), _LENGTHS * turned
+            )
     for corner in corners:
         part = _HEAVY if tuple(corner) == _HEAVY_CORNER else _PLATES
         _add_plate(mesh, part, _LENGTHS * corner)
@@ -227,21 +252,33 @@ def write_deck(landing: Landing) -> str:
 
 def _node_cards(mesh: Mesh) -> str:
     places = {**dict(enumerate(mesh.places, start=1)), MAIN_NODE: tuple(_LENGTHS / 2)}
-    lines = (f"{number:10d}{x:20.9g}{y:20.9g}{z:20.9g}" for number, (x, y, z) in places.items())
+    lines = (
+        f"{number:10d}{x:20.9g}{y:20.9g}{z:20.9g}"
+        for number, (x, y, z) in places.items()
+    )
     return "\n".join(("/NODE", *lines))
 
 
 def _part_cards(mesh: Mesh) -> str:
     lines, numbers = [], count(1)
-    for part, (card, elements) in enumerate(zip(_PARTS, mesh.elements, strict=True), start=1):
-        lines += [f"/PART/{part}", card.title, f"{card.property:10d}{card.material:10d}", f"/{card.kind}/{part}"]
+    for part, (card, elements) in enumerate(
+        zip(_PARTS, mesh.elements, strict=True), start=1
+    ):
+        lines += [
+            f"/PART/{part}",
+            card.title,
+            f"{card.property:10d}{card.material:10d}",
+            f"/{card.kind}/{part}",
+        ]
         lines += [_integers([next(numbers), *nodes]) for nodes in elements]
     return "\n".join(lines)
 
 
 def _group(number: int, title: str, nodes: Iterable[int]) -> str:
     listed = list(nodes)
-    lines = (_integers(listed[first : first + 10]) for first in range(0, len(listed), 10))
+    lines = (
+        _integers(listed[first : first + 10]) for first in range(0, len(listed), 10)
+    )
     return "\n".join((f"/GRNOD/NODE/{number}", title, *lines))
 
 
@@ -252,10 +289,17 @@ def _integers(numbers: Iterable[int]) -> str:
 def _push_cards() -> str:
     times = np.linspace(0, _PUSH_TIME, 41)
     shape = np.sin(np.pi * times / _PUSH_TIME)
-    points = (f"{time:20.9g}{value:20.9g}" for time, value in zip([*times, 1.0], [*shape, 0.0], strict=True))
+    points = (
+        f"{time:20.9g}{value:20.9g}"
+        for time, value in zip([*times, 1.0], [*shape, 0.0], strict=True)
+    )
     lines = ["/FUNCT/1", "half a sine", *points]
     for number, (axis, force) in enumerate(zip("XYZ", _PUSH, strict=True), start=1):
-        lines += [f"/CLOAD/{number}", "push", f"{1:10d}{axis:>10}{0:10d}{0:10d}{3:10d}          {1:20d}{force:20.9g}"]
+        lines += [
+            f"/CLOAD/{number}",
+            "push",
+            f"{1:10d}{axis:>10}{0:10d}{0:10d}{3:10d}          {1:20d}{force:20.9g}",
+        ]
     return "\n".join(lines)
 
 

@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     Reals = NDArray[np.float64]
 
 _BEFORE: Final = 2e-4  # the landing has not begun so long before its first contact [s]
-_ALIGNED: Final = np.linspace(-2e-4, 2e-4, 81)  # shifts that are tried against the first contact [s]
+_ALIGNED: Final = np.linspace(
+    -2e-4, 2e-4, 81
+)  # shifts that are tried against the first contact [s]
 _END: Final = 0.2  # share of the time after the landing whose mean is the final energy
 TOTAL: Final = "total"
 
@@ -82,13 +84,24 @@ class Record:
 
     def energies(self, times: Reals | float) -> Reals:
         """Internal energies of the parts and their total at some times, shape (..., parts + 1) [energy]."""
-        energies = np.stack([np.interp(times, self._database.time, column) for column in self._internal.T], axis=-1)
+        energies = np.stack(
+            [
+                np.interp(times, self._database.time, column)
+                for column in self._internal.T
+            ],
+            axis=-1,
+        )
         return np.concatenate([energies, energies.sum(axis=-1, keepdims=True)], axis=-1)
 
     def align(self, reference: Course, since: Reals) -> None:
         """Move the start of the landing to where the total energy differs least from that of a reference."""
         off = [
-            np.mean((self.energies(self.landing + shift + since) - reference.energies)[:, -1] ** 2)
+            np.mean(
+                (self.energies(self.landing + shift + since) - reference.energies)[
+                    :, -1
+                ]
+                ** 2
+            )
             for shift in _ALIGNED
         ]
         self.landing += float(_ALIGNED[np.argmin(off)])
@@ -96,7 +109,10 @@ class Record:
     def course(self, nodes: Nodes, since: Reals) -> Course:
         """Give the run at some times since its landing."""
         end, start = self.landing + float(since[-1]), self.landing - _BEFORE
-        motion = interpolate(read_motion(self._legs, nodes, end - _BEFORE, end + _BEFORE), np.array([end]))
+        motion = interpolate(
+            read_motion(self._legs, nodes, end - _BEFORE, end + _BEFORE),
+            np.array([end]),
+        )
         return Course(
             landing=self.landing,
             energies=self.energies(self.landing + since),
@@ -106,11 +122,18 @@ class Record:
         )
 
     def _momentum(self, time: float) -> Reals:
-        sums = (self._database.part_channel(f"{axis}_momentum", self._ids).sum(axis=1) for axis in "xyz")
-        return np.array([np.interp(time, self._database.time, momentum) for momentum in sums])
+        sums = (
+            self._database.part_channel(f"{axis}_momentum", self._ids).sum(axis=1)
+            for axis in "xyz"
+        )
+        return np.array(
+            [np.interp(time, self._database.time, momentum) for momentum in sums]
+        )
 
 
-def compare_landings(reference: Course, switched: Course, parts: Sequence[str], nodes: Nodes) -> LandingDifference:
+def compare_landings(
+    reference: Course, switched: Course, parts: Sequence[str], nodes: Nodes
+) -> LandingDifference:
     """Compare a switched run with its reference after the landing."""
     last = slice(-round(_END * len(reference.energies)), None)
     rises = reference.energies.max(axis=0) - reference.before
@@ -122,9 +145,15 @@ def compare_landings(reference: Course, switched: Course, parts: Sequence[str], 
     )
     shares = np.stack([measure / rises for measure in measures] + [rises], axis=1)
     moved = nodes.centre(switched.places) - nodes.centre(reference.places)
-    impulses = [float(np.linalg.norm(one)) for one in (switched.impulse - reference.impulse, reference.impulse)]
+    impulses = [
+        float(np.linalg.norm(one))
+        for one in (switched.impulse - reference.impulse, reference.impulse)
+    ]
     return LandingDifference(
-        energies={title: EnergyDifference(*row) for title, row in zip([*parts, TOTAL], shares.tolist(), strict=True)},
+        energies={
+            title: EnergyDifference(*row)
+            for title, row in zip([*parts, TOTAL], shares.tolist(), strict=True)
+        },
         shift=switched.landing - reference.landing,
         impulse=impulses[0] / impulses[1],
         place=float(np.linalg.norm(moved)),

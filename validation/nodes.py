@@ -38,7 +38,9 @@ class Nodes:
 
     def centre(self, places: Reals) -> Reals:
         """Centre of mass of the nodes at some places (..., nodes, 3)."""
-        return np.asarray(np.einsum("n,...nx->...x", self.masses, places) / self.masses.sum())
+        return np.asarray(
+            np.einsum("n,...nx->...x", self.masses, places) / self.masses.sum()
+        )
 
 
 class Motion(NamedTuple):
@@ -71,15 +73,22 @@ def read_nodes(deck: Path) -> Nodes:
     masses = np.zeros(len(inventory.coordinates))
     for elements in inventory.elements:
         ends = elements.nodes[:, :2] if elements.kind in _LINES else elements.nodes
-        sizes, _ = sizes_and_lengths(elements.kind, elements.nodes, inventory.coordinates)
+        sizes, _ = sizes_and_lengths(
+            elements.kind, elements.nodes, inventory.coordinates
+        )
         for part in np.unique(elements.part).tolist():
             own = elements.part == part
             shares = np.ones(own.sum()) if elements.kind == SPRING else sizes[own]
             mass = of_parts[part][0]
             if mass is None:
-                raise ValueError(f"{deck}: the mass of part {part} is unknown; give its density and size")
+                raise ValueError(
+                    f"{deck}: the mass of part {part} is unknown; give its density and size"
+                )
             given = ends[own] != NO_NODE  # a triangle has no fourth node
-            of_nodes = given * (mass * shares / shares.sum() / given.sum(axis=1))[:, np.newaxis]
+            of_nodes = (
+                given
+                * (mass * shares / shares.sum() / given.sum(axis=1))[:, np.newaxis]
+            )
             np.add.at(masses, ends[own][given], of_nodes[given])
     return Nodes(inventory.coordinates[inventory.watched], masses[inventory.watched])
 
@@ -97,15 +106,23 @@ def _motion_of_leg(leg: Path, nodes: Nodes, start: float, end: float) -> Motion:
     record = history._head.counts.index(_COLUMNS * count)
     first = history._begins[record] + history._records.place(0)
     states = np.frombuffer(leg.read_bytes(), np.uint8, offset=history._records.at)
-    states = states[: history._states * history._stride].reshape(history._states, history._stride)
-    columns = np.ascontiguousarray(states[inside, first : first + _NUMBER * _COLUMNS * count])
+    states = states[: history._states * history._stride].reshape(
+        history._states, history._stride
+    )
+    columns = np.ascontiguousarray(
+        states[inside, first : first + _NUMBER * _COLUMNS * count]
+    )
     values = columns.view(">f4").astype(float).reshape(-1, count, _COLUMNS)
     return Motion(history.time[inside], nodes.places + values[..., :3], values[..., 3:])
 
 
-def compare_vibration(reference: Motion, switched: Motion, nodes: Nodes) -> VibrationError:
+def compare_vibration(
+    reference: Motion, switched: Motion, nodes: Nodes
+) -> VibrationError:
     """Compare the vibration of a switched run with that of its reference, at the times of the reference."""
-    inside = (reference.time >= switched.time[0]) & (reference.time <= switched.time[-1])
+    inside = (reference.time >= switched.time[0]) & (
+        reference.time <= switched.time[-1]
+    )
     reference = Motion(*(values[inside] for values in reference))
     wanted = remove_rigid_motion(reference, nodes)
     found = remove_rigid_motion(interpolate(switched, reference.time), nodes)
@@ -114,17 +131,22 @@ def compare_vibration(reference: Motion, switched: Motion, nodes: Nodes) -> Vibr
         return float(np.einsum("n,tnx,tnx->", nodes.masses, first, second))
 
     residual = np.sqrt(energy(found - wanted, found - wanted) / energy(wanted, wanted))
-    correlation = energy(found, wanted) / np.sqrt(energy(found, found) * energy(wanted, wanted))
+    correlation = energy(found, wanted) / np.sqrt(
+        energy(found, found) * energy(wanted, wanted)
+    )
     return VibrationError(float(residual), float(correlation))
 
 
 def interpolate(motion: Motion, times: Reals) -> Motion:
     """Give a motion at other times, which lie between its own."""
     after = np.clip(np.searchsorted(motion.time, times), 1, motion.time.size - 1)
-    share = (times - motion.time[after - 1]) / (motion.time[after] - motion.time[after - 1])
+    share = (times - motion.time[after - 1]) / (
+        motion.time[after] - motion.time[after - 1]
+    )
     share = share[:, np.newaxis, np.newaxis]
     places, velocities = (
-        values[after - 1] + share * (values[after] - values[after - 1]) for values in (motion.places, motion.velocities)
+        values[after - 1] + share * (values[after] - values[after - 1])
+        for values in (motion.places, motion.velocities)
     )
     return Motion(times, places, velocities)
 
@@ -135,7 +157,10 @@ def remove_rigid_motion(motion: Motion, nodes: Nodes) -> Reals:
     moving = motion.velocities - nodes.centre(motion.velocities)[:, np.newaxis]
     angular = np.einsum("n,tnx->tx", nodes.masses, np.cross(arms, moving))
     products = np.einsum("n,tnx,tny->txy", nodes.masses, arms, arms)
-    inertia = np.trace(products, axis1=1, axis2=2)[:, np.newaxis, np.newaxis] * np.eye(3) - products
+    inertia = (
+        np.trace(products, axis1=1, axis2=2)[:, np.newaxis, np.newaxis] * np.eye(3)
+        - products
+    )
     spin = np.linalg.solve(inertia, angular[..., np.newaxis])[..., 0]
     return np.asarray(moving - np.cross(spin[:, np.newaxis], arms))
 

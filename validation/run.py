@@ -21,7 +21,9 @@ _PROGRAMS = {
 
 def main() -> None:
     """Write deck and legs, run them, say which files came out."""
-    parser = argparse.ArgumentParser(prog="python -m validation.run", description=__doc__)
+    parser = argparse.ArgumentParser(
+        prog="python -m validation.run", description=__doc__
+    )
     parser.add_argument("model", choices=MODELS)
     parser.add_argument("folder", type=Path)
     parser.add_argument(
@@ -32,17 +34,41 @@ def main() -> None:
     solver = os.environ.get("OPENRADIOSS_PATH")
     if not solver:
         sys.exit("OPENRADIOSS_PATH is not set; it names the folder of OpenRadioss")
-    for name in run(MODELS[given.model], given.folder, [tuple(window) for window in given.window], Path(solver)):
+    for name in run(
+        MODELS[given.model],
+        given.folder,
+        [tuple(window) for window in given.window],
+        Path(solver),
+    ):
         print(name)
 
 
-def run(model: Model, folder: Path, windows: list[tuple[float, float]], solver: Path) -> list[Path]:
+def run(
+    model: Model, folder: Path, windows: list[tuple[float, float]], solver: Path
+) -> list[Path]:
     """Run a model in ``folder``, rigid in ``windows``; give its time histories, one for each leg."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / f"{model.name}_0000.rad").write_bytes(model.deck())
-    legs = [folder / f"{model.name}_{number:04d}.rad" for number in range(1, 2 * len(windows) + 2)]
-    written = [leg for leg, text in zip(legs, model.legs(windows), strict=False) if leg.write_text(text)]
-    _call(solver, "starter", folder, "-i", f"{model.name}_0000.rad", "-np", "1", "-nt", "1")
+    legs = [
+        folder / f"{model.name}_{number:04d}.rad"
+        for number in range(1, 2 * len(windows) + 2)
+    ]
+    written = [
+        leg
+        for leg, text in zip(legs, model.legs(windows), strict=False)
+        if leg.write_text(text)
+    ]
+    _call(
+        solver,
+        "starter",
+        folder,
+        "-i",
+        f"{model.name}_0000.rad",
+        "-np",
+        "1",
+        "-nt",
+        "1",
+    )
     for leg in written:
         _call(solver, "engine", folder, "-i", leg.name, "-nt", "1")
     return sorted(folder.glob(f"{model.name}T[0-9][0-9]"))
@@ -52,21 +78,45 @@ def _call(solver: Path, what: str, folder: Path, *options: str) -> None:
     """Call starter or engine in ``folder``, its words in a log there."""
     found = [solver / name for name in _PROGRAMS[what] if (solver / name).exists()]
     if not found:
-        sys.exit(f"{solver}: no {' or '.join(_PROGRAMS[what])}; OPENRADIOSS_PATH names the folder of OpenRadioss")
+        sys.exit(
+            f"{solver}: no {' or '.join(_PROGRAMS[what])}; OPENRADIOSS_PATH names the folder of OpenRadioss"
+        )
     configuration = os.environ.get("RAD_CFG_PATH", str(solver / "hm_cfg_files"))
     libraries = os.pathsep.join(
-        filter(None, (str(solver / "exec"), os.environ.get("LD_LIBRARY_PATH"), str(solver / "syslib")))
+        filter(
+            None,
+            (
+                str(solver / "exec"),
+                os.environ.get("LD_LIBRARY_PATH"),
+                str(solver / "syslib"),
+            ),
+        )
     )
     surroundings = {
         **os.environ, "RAD_CFG_PATH": configuration, "LD_LIBRARY_PATH": libraries, "OMP_STACKSIZE": "400m",
         "OMP_NUM_THREADS": "1",
     }  # fmt: skip
     log = folder / f"{what}_{Path(options[1]).stem}.log"
-    command = ["bash", "-c", 'ulimit -s unlimited; exec "$0" "$@"', str(found[0].resolve()), *options]
+    command = [
+        "bash",
+        "-c",
+        'ulimit -s unlimited; exec "$0" "$@"',
+        str(found[0].resolve()),
+        *options,
+    ]
     with log.open("w") as words:
-        done = subprocess.run(command, cwd=folder, env=surroundings, stdout=words, stderr=words, check=False)
+        done = subprocess.run(
+            command,
+            cwd=folder,
+            env=surroundings,
+            stdout=words,
+            stderr=words,
+            check=False,
+        )
     if done.returncode:
-        sys.exit(f"{log}: the {what} ended with {done.returncode}; its last words are there")
+        sys.exit(
+            f"{log}: the {what} ended with {done.returncode}; its last words are there"
+        )
 
 
 if __name__ == "__main__":

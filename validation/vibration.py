@@ -26,7 +26,12 @@ from validation.compare import compare, read
 from validation.frame_deck import Landing, write_deck
 from validation.landing import TOTAL, Record, compare_landings
 from validation.models import MODELS, Model
-from validation.nodes import compare_vibration, read_motion, read_nodes, vibration_energy
+from validation.nodes import (
+    compare_vibration,
+    read_motion,
+    read_nodes,
+    vibration_energy,
+)
 from validation.run import run
 
 if TYPE_CHECKING:
@@ -37,8 +42,17 @@ if TYPE_CHECKING:
     from validation.landing import LandingDifference
     from validation.nodes import Nodes, VibrationError
 
-_SMALLER_SCALE: Final = 0.85  # of the stable step: what this changes is the scatter of the model
-_HISTORY: Final = ("time", "internal_energy", "kinetic_energy", "x_momentum", "y_momentum", "z_momentum")
+_SMALLER_SCALE: Final = (
+    0.85  # of the stable step: what this changes is the scatter of the model
+)
+_HISTORY: Final = (
+    "time",
+    "internal_energy",
+    "kinetic_energy",
+    "x_momentum",
+    "y_momentum",
+    "z_momentum",
+)
 _THINNED: Final = 4  # every so many states are written to a csv history
 _GROUP_OF_BODY: Final = (60, 70)  # columns of the group in the card of a rigid body
 _CLEAR: Final = 2e-4  # states so near to td and to the landing are not compared [s]
@@ -66,8 +80,17 @@ class AllNodes(Model):
         text = super().deck().decode()
         before, rest = text.split("/TH/NODE/1\n")
         after = rest[rest.index("/TH/PART/") :]
-        nodes = text.partition(f"/GRNOD/NODE/{self.group}\n")[2].partition("\n/")[0].split("\n", 1)[1].split()
-        watched = "".join(f"{int(node):10d}{0:10d}node {node}\n" for node in nodes if int(node) != self.main)
+        nodes = (
+            text.partition(f"/GRNOD/NODE/{self.group}\n")[2]
+            .partition("\n/")[0]
+            .split("\n", 1)[1]
+            .split()
+        )
+        watched = "".join(
+            f"{int(node):10d}{0:10d}node {node}\n"
+            for node in nodes
+            if int(node) != self.main
+        )
         variables = "DX        DY        DZ        VX        VY        VZ"
         return f"{self._switch_group(before)}/TH/NODE/1\nnodes\n{variables}\n{watched}{after}".encode()
 
@@ -95,7 +118,9 @@ class Case(NamedTuple):
 def watch_all_nodes(name: str, group: int, interval: float) -> AllNodes:
     """Give a stored model that switches a group of nodes and writes their motion each ``interval`` [s]."""
     model = MODELS[name]
-    return AllNodes(name, model.what, model.main, model.t_end, interval, model.cap, group=group)
+    return AllNodes(
+        name, model.what, model.main, model.t_end, interval, model.cap, group=group
+    )
 
 
 _ROLL_PAIRS: Final = (
@@ -106,16 +131,37 @@ _CAR_PARTS: Final = (
     "floor", "rail_p", "rail_m", "side_p", "side_m", "roof", "bulkheads", "glass", "hood", "bumper", "bows", "engine",
     "battery", "wheels",
 )  # fmt: skip
-_LANDING, _REACH = 0.1155, 0.0975  # of the frame [s]; how far its lowest foot leads then [m]
+_LANDING, _REACH = (
+    0.1155,
+    0.0975,
+)  # of the frame [s]; how far its lowest foot leads then [m]
 _TD_FRAME: Final = 0.10025
-_FRAME_STARTS: Final = (0.019475, 0.018775, 0.01835, 0.028825, 0.0121, 0.045325, 0.048425, 0.014575, 0.024125)
+_FRAME_STARTS: Final = (
+    0.019475,
+    0.018775,
+    0.01835,
+    0.028825,
+    0.0121,
+    0.045325,
+    0.048425,
+    0.014575,
+    0.024125,
+)
 _FRAME_PAIRS: Final = tuple((tr, _TD_FRAME) for tr in _FRAME_STARTS)
 
 
 def _frame_case(speed: float, pairs: tuple[Pair, ...]) -> Case:
     """Give the frame with a speed of landing [m/s]; the ground lies where the frame lands at the same time."""
     landing = Landing(speed, _LANDING + _REACH / speed)
-    model = Frame(frame_deck.NAME, "frame on four feet", frame_deck.MAIN_NODE, 0.16, 5e-5, 2e-5, landing=landing)
+    model = Frame(
+        frame_deck.NAME,
+        "frame on four feet",
+        frame_deck.MAIN_NODE,
+        0.16,
+        5e-5,
+        2e-5,
+        landing=landing,
+    )
     return Case(model, frame_deck.PARTS, pairs, 0.004, 0.025)
 
 
@@ -127,11 +173,17 @@ CASES: Final = {
         flight_start=0.0885,
         after_landing=0.06,
     ),
-    "FRAME": _frame_case(5.0, (*_FRAME_PAIRS, (_TD_FRAME - 3e-5, _TD_FRAME))),  # the last one only stops the vibration
+    "FRAME": _frame_case(
+        5.0, (*_FRAME_PAIRS, (_TD_FRAME - 3e-5, _TD_FRAME))
+    ),  # the last one only stops the vibration
     "FRAME-FAST": _frame_case(10.0, _FRAME_PAIRS[::2]),
     "FRAME-SLOW": _frame_case(2.5, _FRAME_PAIRS[::2]),
     "CAR": Case(
-        watch_all_nodes("CAR", group=4, interval=1e-4), _CAR_PARTS, _CAR_PAIRS, flight_start=0.0386, after_landing=0.08
+        watch_all_nodes("CAR", group=4, interval=1e-4),
+        _CAR_PARTS,
+        _CAR_PAIRS,
+        flight_start=0.0386,
+        after_landing=0.08,
     ),
 }
 
@@ -181,19 +233,29 @@ class Reference:
         """Compare a switched run."""
         landing = self._compare_landings(legs, pair[1])
         start, end = pair[1] + _CLEAR, self.record(pair[1]).landing - _CLEAR
-        wanted, found = (read_motion(names, self.nodes, start, end) for names in (self.legs, legs))
+        wanted, found = (
+            read_motion(names, self.nodes, start, end) for names in (self.legs, legs)
+        )
         vibration = compare_vibration(wanted, found, self.nodes)
-        worth = vibration.residual**2 * self.vibration_energy / landing.energies[TOTAL].rise
-        theirs, ours = (read([str(leg) for leg in names]) for names in (self.legs, legs))
+        worth = (
+            vibration.residual**2 * self.vibration_energy / landing.energies[TOTAL].rise
+        )
+        theirs, ours = (
+            read([str(leg) for leg in names]) for names in (self.legs, legs)
+        )
         mean_energy = compare(theirs, ours, pair[1]).mean_ratio
-        return Row(pair, predict(self.history, *pair), vibration, mean_energy, worth, landing)
+        return Row(
+            pair, predict(self.history, *pair), vibration, mean_energy, worth, landing
+        )
 
     def _compare_landings(self, legs: Sequence[Path], td: float) -> LandingDifference:
         since = np.arange(0.0, self.case.after_landing, self.case.model.interval)
         wanted = self.record(td).course(self.nodes, since)
         switched = Record(legs, self.case.parts, td)
         switched.align(wanted, since)
-        return compare_landings(wanted, switched.course(self.nodes, since), self.case.parts, self.nodes)
+        return compare_landings(
+            wanted, switched.course(self.nodes, since), self.case.parts, self.nodes
+        )
 
     def record(self, td: float) -> Record:
         """Give the histories of the reference with its landing after td [s]."""
@@ -203,16 +265,28 @@ class Reference:
         """Write energies and momenta of the switched parts as csv, every fourth state."""
         (database,) = open_run([str(leg) for leg in self.legs], Selection()).databases
         ids = [part.id for part in database.parts if part.title in self.case.parts]
-        columns = [database.time, *(database.part_channel(name, ids).sum(axis=1) for name in _HISTORY[1:])]
+        columns = [
+            database.time,
+            *(database.part_channel(name, ids).sum(axis=1) for name in _HISTORY[1:]),
+        ]
         rows = np.stack(columns, axis=1)[::_THINNED]
-        np.savetxt(self.history, rows, fmt="%.6g", delimiter=",", header=",".join(_HISTORY), comments="")
+        np.savetxt(
+            self.history,
+            rows,
+            fmt="%.6g",
+            delimiter=",",
+            header=",".join(_HISTORY),
+            comments="",
+        )
 
     @cached_property
     def vibration_energy(self) -> float:
         """Mean energy of the vibration in the second half of the flight [J]."""
         landing = self.record(self.case.pairs[0][1]).landing
         start = (self.case.flight_start + landing) / 2
-        return vibration_energy(read_motion(self.legs, self.nodes, start, landing - _CLEAR), self.nodes)
+        return vibration_energy(
+            read_motion(self.legs, self.nodes, start, landing - _CLEAR), self.nodes
+        )
 
 
 def study(case: Case, folder: Path, solver: Path) -> Iterator[Row]:
@@ -225,7 +299,9 @@ def study(case: Case, folder: Path, solver: Path) -> Iterator[Row]:
     nodes = read_nodes(folder / "reference" / f"{model.name}_0000.rad")
     reference = Reference(case, legs, nodes, folder / "reference.csv")
     reference.write_history()
-    smaller = compute(replace(model, scale=_SMALLER_SCALE), folder / "smaller_step", [], solver)
+    smaller = compute(
+        replace(model, scale=_SMALLER_SCALE), folder / "smaller_step", [], solver
+    )
     yield reference.compare_scatter(smaller)
     for pair in case.pairs:
         name = f"tr_{1e3 * pair[0]:g}_td_{1e3 * pair[1]:g}"
@@ -239,7 +315,9 @@ def predict(history: Path, tr: float, td: float) -> Prediction:
     return Prediction(**{name: verdict[name] for name in Prediction._fields})
 
 
-def compute(model: Model, folder: Path, windows: list[Pair], solver: Path) -> list[Path]:
+def compute(
+    model: Model, folder: Path, windows: list[Pair], solver: Path
+) -> list[Path]:
     """Run a model unless its folder has a finished run; give its time histories."""
     done = folder / "done"
     if not done.exists():
@@ -258,16 +336,38 @@ _COLUMNS: Final = (
 def cells(name: str, row: Row) -> Iterator[tuple[object, ...]]:
     """Give the lines of a row in the table of results, one for each energy."""
     pair, vibration = row.pair or (None, None), row.vibration or (None, None)
-    shared = (name, *pair, *row.predicted, *vibration, row.mean_energy, row.worth, *row.landing[1:])
+    shared = (
+        name,
+        *pair,
+        *row.predicted,
+        *vibration,
+        row.mean_energy,
+        row.worth,
+        *row.landing[1:],
+    )
     for energy, difference in row.landing.energies.items():
-        yield (*shared, energy, difference.rise, difference.rms, difference.peak, difference.final)
+        yield (
+            *shared,
+            energy,
+            difference.rise,
+            difference.rms,
+            difference.peak,
+            difference.final,
+        )
 
 
 def main() -> None:
     """Write the table of results as csv to stdout."""
-    parser = argparse.ArgumentParser(prog="python -m validation.vibration", description=__doc__)
+    parser = argparse.ArgumentParser(
+        prog="python -m validation.vibration", description=__doc__
+    )
     parser.add_argument("folder", type=Path)
-    parser.add_argument("cases", nargs="*", metavar="CASE", help=f"of {', '.join(CASES)}; by default all")
+    parser.add_argument(
+        "cases",
+        nargs="*",
+        metavar="CASE",
+        help=f"of {', '.join(CASES)}; by default all",
+    )
     given = parser.parse_args()
     solver = os.environ.get("OPENRADIOSS_PATH")
     if not solver:
@@ -278,7 +378,12 @@ def main() -> None:
     for name in given.cases or CASES:
         for row in study(CASES[name], given.folder / name, Path(solver)):
             for line in cells(name, row):
-                table.writerow([f"{value:.6g}" if isinstance(value, float) else value for value in line])
+                table.writerow(
+                    [
+                        f"{value:.6g}" if isinstance(value, float) else value
+                        for value in line
+                    ]
+                )
 
 
 if __name__ == "__main__":

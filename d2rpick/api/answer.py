@@ -63,7 +63,9 @@ class Answer:
         return hash((self.kind, *self.command))
 
     def __repr__(self) -> str:
-        shown = ", ".join(f"{name}={getattr(self, name)!r}" for name in (*self.said, "warnings"))
+        shown = ", ".join(
+            f"{name}={getattr(self, name)!r}" for name in (*self.said, "warnings")
+        )
         return f"{type(self).__name__}({shown})"
 
     @property
@@ -111,7 +113,12 @@ class Paged(Answer):
         drawn: Figure = getattr(figures_choice, f"draw_{self.kind}")(self)
         return drawn
 
-    def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:  # noqa: ARG002
+    def page(
+        self,
+        command: Sequence[str],
+        judging: Sequence[str] = (),  # noqa: ARG002
+        cards: Cards | None = None,  # noqa: ARG002
+    ) -> str:
         """Write the page: ``command`` repeats it, ``judging`` are the options that judge a card by the same history."""
         from d2rpick.report import pages
 
@@ -147,7 +154,9 @@ class RunAnswer(Paged):
     @classmethod
     def about(cls, asked: Asked, found: Any, *times: str, **more: Any) -> Self:
         """Answer by what was found, with what the deck left unknown."""
-        return cls.of(found, cautions=asked.cautions, question=asked, times=times, **more)
+        return cls.of(
+            found, cautions=asked.cautions, question=asked, times=times, **more
+        )
 
     def _context(
         self,
@@ -161,9 +170,17 @@ class RunAnswer(Paged):
         from d2rpick.report.page import PageContext
 
         card = self._card(cards, *chosen) if chosen else None
-        return PageContext(self.question.reference.run, command, judging, card, explorer=self._explorer([explored]))
+        return PageContext(
+            self.question.reference.run,
+            command,
+            judging,
+            card,
+            explorer=self._explorer([explored]),
+        )
 
-    def _card(self, cards: Cards | None, situation: Situation, tr: float) -> SolverInput:
+    def _card(
+        self, cards: Cards | None, situation: Situation, tr: float
+    ) -> SolverInput:
         """Give the card of a tr, or why there is none, with what the deck of the run says of it."""
         from d2rpick.choice.judged_card import SolverInput, input_for
 
@@ -171,14 +188,22 @@ class RunAnswer(Paged):
             suited, _ = (cards or Cards()).by_deck(self.question)
         except DeckError as error:
             return SolverInput("", "part", refusal=str(error))
-        return input_for(self.question.reference, situation, tr, suited.request(self.question))
+        return input_for(
+            self.question.reference, situation, tr, suited.request(self.question)
+        )
 
     def _explorer(self, found: Iterable[TradeOff | None]) -> Any:
         """Give what can be explored on a page, and the command line that asks for each td."""
         from d2rpick.report.page import Explorer
 
         trade_offs = tuple(one for one in found if one)
-        return Explorer(trade_offs, (("d2rpick", "suggest", "--td"), self.question.options)) if trade_offs else None
+        return (
+            Explorer(
+                trade_offs, (("d2rpick", "suggest", "--td"), self.question.options)
+            )
+            if trade_offs
+            else None
+        )
 
 
 def written(path: arguments.Path, page: str) -> Path:
@@ -192,7 +217,9 @@ def written(path: arguments.Path, page: str) -> Path:
     return place
 
 
-def frame_of(rows: Sequence[Mapping[str, Any]], columns: Sequence[str], **attrs: Any) -> pd.DataFrame:
+def frame_of(
+    rows: Sequence[Mapping[str, Any]], columns: Sequence[str], **attrs: Any
+) -> pd.DataFrame:
     """Give a row per mapping; what is not known is NaN, also where nothing of a column is known.
 
     Examples
@@ -203,6 +230,12 @@ def frame_of(rows: Sequence[Mapping[str, Any]], columns: Sequence[str], **attrs:
     import pandas as pd
 
     frame = pd.DataFrame(list(rows), columns=list(columns))
-    frame = frame.astype({name: "float64" for name in frame.columns if len(frame) and frame[name].isna().all()})
+    frame = frame.astype(
+        {
+            name: "float64"
+            for name in frame.columns
+            if len(frame) and frame[name].isna().all()
+        }
+    )
     frame.attrs.update(attrs)
     return frame

@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from d2rpick.vibration.oscillator import Oscillator
 
     Path = str | os.PathLike[str]
-    Deck = Path | Literal[False]  # False: none, also where one lies in the folder of the run
+    Deck = (
+        Path | Literal[False]
+    )  # False: none, also where one lies in the folder of the run
     Parts = str | int | Iterable[str | int]
 
 _LONGEST_SHOWN: Final = 60  # of a wrong value in a message
@@ -70,7 +72,9 @@ def number(name: str, value: object, limits: Number = TIME) -> float:
     ValueError: margin is -1, a number of at least 0 was expected
     """
     if not is_number(value):
-        raise TypeError(f"{name} is {_shown(value)}, a number was expected{without_unit(value)}")
+        raise TypeError(
+            f"{name} is {_shown(value)}, a number was expected{without_unit(value)}"
+        )
     found = float(value)  # type: ignore[arg-type]
     if not math.isfinite(found):
         raise ValueError(f"{name} is {found}, a finite number was expected")
@@ -82,7 +86,11 @@ def number(name: str, value: object, limits: Number = TIME) -> float:
 def is_number(value: object) -> bool:
     """Return True for a number of Python or numpy, also in an array without axes; not for True, text or complex."""
     kind = getattr(getattr(value, "dtype", None), "kind", "")
-    if isinstance(value, bool | str | bytes) or (kind and kind not in "iuf") or getattr(value, "ndim", 0):
+    if (
+        isinstance(value, bool | str | bytes)
+        or (kind and kind not in "iuf")
+        or getattr(value, "ndim", 0)
+    ):
         return False
     return hasattr(value, "__float__")
 
@@ -90,14 +98,20 @@ def is_number(value: object) -> bool:
 def is_whole_number(value: object) -> bool:
     """Return True for a whole number of Python or numpy; not for True, text or a float."""
     return (
-        is_number(value) and hasattr(value, "__index__") and getattr(getattr(value, "dtype", None), "kind", "i") in "iu"
+        is_number(value)
+        and hasattr(value, "__index__")
+        and getattr(getattr(value, "dtype", None), "kind", "i") in "iu"
     )
 
 
 def _shown(value: object) -> str:
     """Write a wrong value in one line, cut where it is long."""
     text = " ".join(repr(value).split())
-    return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}... of type {type(value).__name__}"
+    return (
+        text
+        if len(text) <= _LONGEST_SHOWN
+        else f"{text[:_LONGEST_SHOWN]}... of type {type(value).__name__}"
+    )
 
 
 def flag(name: str, value: object, default: bool) -> bool:
@@ -130,7 +144,9 @@ def pairs(name: str, value: object) -> list[tuple[float, float]]:
     for number_of_pair, pair in enumerate(_each(name, value, "pairs of times")):
         times = window(f"{name}[{number_of_pair}]", pair)
         if times is None:
-            raise TypeError(f"{name}[{number_of_pair}] is None, a pair of times was expected")
+            raise TypeError(
+                f"{name}[{number_of_pair}] is None, a pair of times was expected"
+            )
         found.append(times)
     return found
 
@@ -140,7 +156,11 @@ def without_unit(value: object) -> str:
     from d2rpick.histories.names import in_seconds
 
     seconds = in_seconds(str(value))
-    return "" if seconds is None else f": give a number in the unit of the history, {seconds:g} where it is s"
+    return (
+        ""
+        if seconds is None
+        else f": give a number in the unit of the history, {seconds:g} where it is s"
+    )
 
 
 def optional(name: str, value: object, limits: Number = TIME) -> float | None:
@@ -158,13 +178,19 @@ def window(name: str, value: object) -> tuple[float, float] | None:
     """
     if value is None:
         return None
-    is_pair = hasattr(value, "__len__") and hasattr(value, "__iter__") and getattr(value, "ndim", 1) == 1
+    is_pair = (
+        hasattr(value, "__len__")
+        and hasattr(value, "__iter__")
+        and getattr(value, "ndim", 1) == 1
+    )
     if not is_pair or isinstance(value, str | bytes | Mapping | Set) or len(value) != 2:  # type: ignore[arg-type]
         raise TypeError(f"{name} is {_shown(value)}, a pair of times was expected")
     first, last = list(value)  # type: ignore[call-overload]
     found = number(f"{name}[0]", first), number(f"{name}[1]", last)
     if not found[0] < found[1]:
-        raise ValueError(f"{name} is {found[0]:g} to {found[1]:g}, which is empty; the lower time comes first")
+        raise ValueError(
+            f"{name} is {found[0]:g} to {found[1]:g}, which is empty; the lower time comes first"
+        )
     return found
 
 
@@ -180,11 +206,17 @@ def part_names(name: str, value: Parts | None) -> tuple[str, ...]:
         return ()
     from d2rpick.histories.names import Part
 
-    single = isinstance(value, str | int | Part) or is_whole_number(value)  # a Part holds its number and its title
-    listed = [value] if single else list(_each(name, value, "a number, a title or several"))
+    single = isinstance(value, str | int | Part) or is_whole_number(
+        value
+    )  # a Part holds its number and its title
+    listed = (
+        [value] if single else list(_each(name, value, "a number, a title or several"))
+    )
     for one in listed:
         if not (isinstance(one, str) or is_whole_number(one)):
-            raise TypeError(f"{name} holds {_shown(one)}; numbers and titles of parts were expected")
+            raise TypeError(
+                f"{name} holds {_shown(one)}; numbers and titles of parts were expected"
+            )
     if not listed:
         raise ValueError(f"{name} is empty; give a part, or leave {name} out")
     return tuple(str(one) for one in listed)
@@ -200,7 +232,9 @@ def rule_ids(name: str, value: str | Iterable[str] | None) -> tuple[str, ...]:
     """
     if value is None:
         return ()
-    listed = [value] if isinstance(value, str) else list(_each(name, value, "ids of rules"))
+    listed = (
+        [value] if isinstance(value, str) else list(_each(name, value, "ids of rules"))
+    )
     for one in listed:
         if not isinstance(one, str):
             raise TypeError(f"{name} holds {one!r}; ids of rules were expected")
@@ -229,7 +263,11 @@ def paths(name: str, value: Path | Iterable[Path]) -> tuple[str, ...]:
     >>> paths("source", "run/"), paths("source", ["glstat", "matsum"])
     (('run/',), ('glstat', 'matsum'))
     """
-    listed = [value] if isinstance(value, str | os.PathLike) else list(_each(name, value, "a path or several"))
+    listed = (
+        [value]
+        if isinstance(value, str | os.PathLike)
+        else list(_each(name, value, "a path or several"))
+    )
     for one in listed:
         if not isinstance(one, str | os.PathLike):
             raise TypeError(f"{name} holds {_shown(one)}; paths were expected")
@@ -238,7 +276,9 @@ def paths(name: str, value: Path | Iterable[Path]) -> tuple[str, ...]:
     found = tuple(os.fsdecode(one) for one in listed)
     for one in found:
         if "\0" in one:
-            raise ValueError(f"{name} holds {one!r} with a NUL byte, which no name of a file has")
+            raise ValueError(
+                f"{name} holds {one!r} with a NUL byte, which no name of a file has"
+            )
     return found
 
 
@@ -246,13 +286,21 @@ def check_run(name: str, run: object) -> None:
     """Raise TypeError for what is not a run that was read."""
     from d2rpick.api.tables import is_table
 
-    if not (hasattr(run, "files") and hasattr(run, "overview")):  # its class imports this module
-        found = repr(run) if isinstance(run, str | os.PathLike) else f"of type {type(run).__name__}"
+    if not (
+        hasattr(run, "files") and hasattr(run, "overview")
+    ):  # its class imports this module
+        found = (
+            repr(run)
+            if isinstance(run, str | os.PathLike)
+            else f"of type {type(run).__name__}"
+        )
         made = "from_frame(...)" if is_table(run) else "read(...)"
         raise TypeError(f"{name} is {found}; give what d2rpick.{made} makes of it")
 
 
-def refuse_unknown(name: str, known: Iterable[str], others: Iterable[str] = ()) -> NoReturn:
+def refuse_unknown(
+    name: str, known: Iterable[str], others: Iterable[str] = ()
+) -> NoReturn:
     """Raise the TypeError of an argument that does not exist, with the one of all that may be meant."""
     from difflib import get_close_matches
 
@@ -265,11 +313,15 @@ def chosen(choosing: Choosing) -> dict[str, Any]:
     """Give the fields of a request that say how to choose."""
     known = Choosing.__annotations__
     if unknown := [name for name in choosing if name not in known]:
-        refuse_unknown(unknown[0], known, ("parts", "flying", "deck", "weights", "td_window"))
+        refuse_unknown(
+            unknown[0], known, ("parts", "flying", "deck", "weights", "td_window")
+        )
     given: dict[str, Any] = dict(choosing)
     oscillator = _check_oscillator(given.pop("oscillator", None))
     if (oscillator is None) != (given.get("v0") is None):
-        raise ValueError("oscillator and v0 go together: the one vibrates because of the other")
+        raise ValueError(
+            "oscillator and v0 go together: the one vibrates because of the other"
+        )
     if given.get("tolerance", 0.0) is None:
         del given["tolerance"]
     for name in given.keys() - {"replay", "strict", "keep_vibration", "fit_window"}:
@@ -281,16 +333,24 @@ def chosen(choosing: Choosing) -> dict[str, Any]:
     given["strict"] = flag("strict", given.get("strict"), False)
     given["keep_vibration"] = flag("keep_vibration", given.get("keep_vibration"), False)
     of_oscillator = ("stiffness", "mass", "frame_mass", "alpha")
-    return given | {name: float(getattr(oscillator, name)) for name in of_oscillator if oscillator is not None}
+    return given | {
+        name: float(getattr(oscillator, name))
+        for name in of_oscillator
+        if oscillator is not None
+    }
 
 
 def _check_oscillator(value: object) -> Oscillator | None:
     if value is None:
         return None
-    from d2rpick.vibration.oscillator import Oscillator  # not above: mostly none is given
+    from d2rpick.vibration.oscillator import (
+        Oscillator,
+    )  # not above: mostly none is given
 
     if not isinstance(value, Oscillator):
-        raise TypeError(f"oscillator is {_shown(value)}, a d2rpick.Oscillator was expected")
+        raise TypeError(
+            f"oscillator is {_shown(value)}, a d2rpick.Oscillator was expected"
+        )
     return value
 
 
@@ -303,12 +363,18 @@ def file_or_weights(value: object) -> Any:
     from d2rpick.choice.cost import Weights  # not above: mostly none are given
 
     if not isinstance(value, Weights):
-        raise TypeError(f"weights is {_shown(value)}, d2rpick.Weights or the name of a file was expected")
+        raise TypeError(
+            f"weights is {_shown(value)}, d2rpick.Weights or the name of a file was expected"
+        )
     return value
 
 
 def _each(name: str, value: Any, expected: str) -> Iterable[Any]:
-    if not hasattr(value, "__iter__") or isinstance(value, bytes | Mapping) or getattr(value, "ndim", 1) == 0:
+    if (
+        not hasattr(value, "__iter__")
+        or isinstance(value, bytes | Mapping)
+        or getattr(value, "ndim", 1) == 0
+    ):
         raise TypeError(f"{name} is {_shown(value)}; {expected} were expected")
     found: Iterable[Any] = value
     return found
@@ -343,10 +409,14 @@ def read_windows(text: str, source: str) -> tuple[tuple[float, float], ...]:
         try:
             tr, td = map(float, words)
         except ValueError:
-            raise DeckError(f"{source}:{number}: {line.strip()[:60]!r} was found, 'tr td' was expected") from None
+            raise DeckError(
+                f"{source}:{number}: {line.strip()[:60]!r} was found, 'tr td' was expected"
+            ) from None
         windows.append((tr, td))
     if not windows:
-        raise DeckError(f"{source}: no window was found, a line 'tr td' for each was expected")
+        raise DeckError(
+            f"{source}: no window was found, a line 'tr td' for each was expected"
+        )
     return tuple(windows)
 
 
@@ -354,7 +424,9 @@ def _of_journal(text: str) -> list[tuple[float, float]]:
     """Windows of the rigid legs that a run has kept: a leg takes the place of an earlier one of its number."""
     import json  # not above: start-up
 
-    legs: list[tuple[int, bool, float, float]] = []  # number, whether it is rigid, start, end
+    legs: list[
+        tuple[int, bool, float, float]
+    ] = []  # number, whether it is rigid, start, end
     for line in text.splitlines():
         try:
             record = json.loads(line)
@@ -362,7 +434,14 @@ def _of_journal(text: str) -> list[tuple[float, float]]:
                 del legs[record["legs"] :]
             elif record["event"] == "ended":
                 kind, number, start, until = record["order"][:4]
-                legs.append((int(number), kind in {"probe", "rigid"}, float(start), float(until)))
+                legs.append(
+                    (
+                        int(number),
+                        kind in {"probe", "rigid"},
+                        float(start),
+                        float(until),
+                    )
+                )
         except (ValueError, KeyError, TypeError):
             continue  # cut, or of another kind
     latest = {leg[0]: leg for leg in legs if leg[0] <= legs[-1][0]}
@@ -370,6 +449,8 @@ def _of_journal(text: str) -> list[tuple[float, float]]:
     rigid_before = False
     for _, (_, rigid, start, until) in sorted(latest.items()):
         if rigid:
-            windows.append((windows.pop()[0], until) if rigid_before else (start, until))
+            windows.append(
+                (windows.pop()[0], until) if rigid_before else (start, until)
+            )
         rigid_before = rigid
     return windows

@@ -41,7 +41,9 @@ class Asked(NamedTuple):
     model: CostModel | None = None
     on_card: tuple[str, ...] = ()
     cautions: tuple[Caution, ...] = ()
-    of_this_run: bool = True  # whether the deck, where there is one, may be that of the run
+    of_this_run: bool = (
+        True  # whether the deck, where there is one, may be that of the run
+    )
 
     @property
     def deck(self) -> str | None:
@@ -51,7 +53,9 @@ class Asked(NamedTuple):
     @property
     def options(self) -> tuple[str, ...]:
         """What follows the times in the command line that asks the same."""
-        from d2rpick.report.tables import positional  # not above: most answers repeat no command
+        from d2rpick.report.tables import (
+            positional,
+        )  # not above: most answers repeat no command
 
         return (*self.request.asking(), *positional(self.request.history))
 
@@ -69,7 +73,9 @@ def request_of(
         arguments.check_run("run", run)
     chosen = run.chosen if run else Selection()
     request = Request(
-        deck=None if deck is None or deck is False else arguments.one_path("deck", deck),
+        deck=None
+        if deck is None or deck is False
+        else arguments.one_path("deck", deck),
         no_deck=deck is False,
         run_folder=run.folder if run else None,
         weights=arguments.file_or_weights(weights),
@@ -101,7 +107,9 @@ def on_card_only(request: Request, run: histories.Run) -> bool:
     return bool(request.energy) or not run.parts
 
 
-def ask(run: Run, request: Request, *, card_alone: bool = False, merge: int | None = None) -> Asked:
+def ask(
+    run: Run, request: Request, *, card_alone: bool = False, merge: int | None = None
+) -> Asked:
     """Take the energy that is asked for of a run, with what its deck tells.
 
     Parameters
@@ -143,7 +151,17 @@ def ask(run: Run, request: Request, *, card_alone: bool = False, merge: int | No
 
         settings, cautions = with_deck(settings, reference, model)
         cautions = (*name_deck(request), *cautions)
-    asked = Asked(run, request, reference, selection, settings, model, parts, cautions, of_this_run=not foreign)
+    asked = Asked(
+        run,
+        request,
+        reference,
+        selection,
+        settings,
+        model,
+        parts,
+        cautions,
+        of_this_run=not foreign,
+    )
     return asked if merge is None else _merged(asked, merge)
 
 
@@ -161,10 +179,15 @@ def model_of(request: Request) -> CostModel | None:
     from d2rpick.deck import read_inventory
 
     weights = request.weights
-    return CostModel(read_inventory(request.deck), read_weights(weights) if isinstance(weights, str) else weights)
+    return CostModel(
+        read_inventory(request.deck),
+        read_weights(weights) if isinstance(weights, str) else weights,
+    )
 
 
-def selected(run: histories.Run, selection: Selection, settings: Settings, model: CostModel) -> Selection:
+def selected(
+    run: histories.Run, selection: Selection, settings: Settings, model: CostModel
+) -> Selection:
     """Complete a selection: the parts of the recommended set for that word, and the springs of deck and energies.
 
     Raises
@@ -178,10 +201,14 @@ def selected(run: histories.Run, selection: Selection, settings: Settings, model
 
     if foreign := of_another_model(run, model.inventory):
         if asks_for_recommended(selection.parts, run.parts):
-            raise FormatError(f"{run.name}: no set of parts can be recommended: {foreign.message}, or the parts")
+            raise FormatError(
+                f"{run.name}: no set of parts can be recommended: {foreign.message}, or the parts"
+            )
         return selection
     counts = model.inventory.counts
-    springs = {part.id for part in run.springs} | {part for part, kinds in counts.items() if {*kinds} <= DISCRETE}
+    springs = {part.id for part in run.springs} | {
+        part for part, kinds in counts.items() if {*kinds} <= DISCRETE
+    }
     parts = selection.parts
     if asks_for_recommended(parts, run.parts):
         parts = tuple(map(str, recommended_parts(run, settings, model)))
@@ -192,9 +219,13 @@ def _check_recommended(request: Request, run: histories.Run) -> None:
     """Refuse the word for the recommended set beside other parts, or without a deck."""
     if asks_for_recommended(request.part, run.parts):
         if len(request.part) > 1:
-            raise ArgumentError("`parts` recommended stands for a whole set; leave the other `parts` out")
+            raise ArgumentError(
+                "`parts` recommended stands for a whole set; leave the other `parts` out"
+            )
         if request.deck is None:
-            raise ArgumentError("`parts` recommended needs `deck`, the main deck of the run")
+            raise ArgumentError(
+                "`parts` recommended needs `deck`, the main deck of the run"
+            )
 
 
 def _merged(asked: Asked, merge: int) -> Asked:
@@ -208,6 +239,11 @@ def _merged(asked: Asked, merge: int) -> Asked:
     if len(bodies) > 1:
         apart = listing([name_units(body.parts) for body in bodies], between="; ")
         found = f"--merge {merge} makes one rigid body of what nothing joins: {apart}"
-        cautions = (*cautions, Caution("merged-apart", f"{found}; leave it out to keep them apart"))
+        cautions = (
+            *cautions,
+            Caution("merged-apart", f"{found}; leave it out to keep them apart"),
+        )
     body = merged({part.id for part in parts} | {merge}, bodies)
-    return asked._replace(settings=replace(asked.settings, bodies=(body,)), cautions=cautions)
+    return asked._replace(
+        settings=replace(asked.settings, bodies=(body,)), cautions=cautions
+    )

@@ -16,7 +16,9 @@ OBJECTION: Final = "card-objection"
 UNJOINED: Final = "parts-not-joined"
 
 
-def collect_objections(card: PrintedCard, asked: Asked, parts: int) -> Iterator[Caution]:
+def collect_objections(
+    card: PrintedCard, asked: Asked, parts: int
+) -> Iterator[Caution]:
     """Say what ``check`` has against a deck with the card in it; without a deck, what nobody knows of its parts.
 
     ``parts`` is how many the card switches by their ids.
@@ -24,7 +26,10 @@ def collect_objections(card: PrintedCard, asked: Asked, parts: int) -> Iterator[
     if asked.deck is None:
         if parts > 1:
             message = "no deck of the run was read, so nobody knows whether these parts share nodes"
-            yield Caution(UNJOINED, f"{message}; name the main deck with `deck`, or merge the parts with `merge`")
+            yield Caution(
+                UNJOINED,
+                f"{message}; name the main deck with `deck`, or merge the parts with `merge`",
+            )
         return
     from tempfile import TemporaryDirectory
 
@@ -42,4 +47,7 @@ def collect_objections(card: PrintedCard, asked: Asked, parts: int) -> Iterator[
             if finding.severity is not INFO:
                 place = finding.file.removeprefix(f"{folder}/")
                 message = f"{finding.rule} ({finding.severity}): {finding.message.replace(f'{folder}/', '')}"
-                yield Caution(OBJECTION, f"check of the deck with this card, {place}:{finding.line}: {message}")
+                yield Caution(
+                    OBJECTION,
+                    f"check of the deck with this card, {place}:{finding.line}: {message}",
+                )

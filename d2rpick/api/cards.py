@@ -7,7 +7,18 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypedDict, Unpack
 
-from d2rpick.api.request import OPTIONS, POSITIVE, TIME, UNLIMITED, Number, Option, Request, dashed, option, options_of
+from d2rpick.api.request import (
+    OPTIONS,
+    POSITIVE,
+    TIME,
+    UNLIMITED,
+    Number,
+    Option,
+    Request,
+    dashed,
+    option,
+    options_of,
+)
 from d2rpick.base.errors import ArgumentError, Caution
 from d2rpick.base.tuples import NamedTuple
 
@@ -25,7 +36,9 @@ if TYPE_CHECKING:
 _RANGE: Final = r"(\d{1,10})(?:\s*-\s*(\d{1,10}))?"  # compiled where it is needed
 _MOST_IDS: Final = 100_000
 _IDS: Final = range(1, UNLIMITED)
-_ONLY_JUDGED: Final = "`parts` chooses by whose energy a card for {} is judged; give a `run` with parts"
+_ONLY_JUDGED: Final = (
+    "`parts` chooses by whose energy a card for {} is judged; give a `run` with parts"
+)
 
 
 class CardOptions(TypedDict, total=False):
@@ -66,7 +79,11 @@ def _checked(name: str, value: Any, option: Option) -> Any:
     if option.many:
         return arguments.part_names(name, value)
     if option.pair:
-        is_pair = hasattr(value, "__len__") and hasattr(value, "__iter__") and getattr(value, "ndim", 1) == 1
+        is_pair = (
+            hasattr(value, "__len__")
+            and hasattr(value, "__iter__")
+            and getattr(value, "ndim", 1) == 1
+        )
         if not is_pair or isinstance(value, str | bytes) or len(value) != 2:
             raise TypeError(f"{name} is {value!r}, a pair of numbers was expected")
         return tuple(arguments.whole(name, one, _IDS.start) for one in value)
@@ -77,7 +94,9 @@ def _checked(name: str, value: Any, option: Option) -> Any:
     if not isinstance(value, str):
         raise TypeError(f"{name} is {value!r}, a text was expected")
     if kind == "solver" and value not in solvers():
-        raise ValueError(f"{name} is {value!r}, one of {', '.join(solvers())} was expected")
+        raise ValueError(
+            f"{name} is {value!r}, one of {', '.join(solvers())} was expected"
+        )
     return value
 
 
@@ -93,18 +112,38 @@ class Cards:
     """How a card is printed: the options of every command that prints one."""
 
     solver: str | None = option(
-        "Solver whose input is printed.  [default: of the solver that wrote the history, else ls-dyna]", "solver"
+        "Solver whose input is printed.  [default: of the solver that wrote the history, else ls-dyna]",
+        "solver",
     )
-    merge: int | None = option("LS-DYNA: lead part that all others are merged into (LRB).", _IDS, "ID")
+    merge: int | None = option(
+        "LS-DYNA: lead part that all others are merged into (LRB).", _IDS, "ID"
+    )
     swset: tuple[int, int] | None = option(
-        "LS-DYNA: switch sets of the first window; the next ids follow.  [default: 901 902]", _IDS, "ID ID", pair=True
+        "LS-DYNA: switch sets of the first window; the next ids follow.  [default: 901 902]",
+        _IDS,
+        "ID ID",
+        pair=True,
     )
-    step_cap: float | None = option("Largest time step while rigid (DTMAX, /DTIX).", POSITIVE, "DT")
-    node: tuple[str, ...] = option("Radioss: main nodes of the rigid bodies.", "names", "IDS", many=True)
-    end: float | None = option("Radioss: end of the run.  [default: end of the history]", TIME, "T")
-    name: str | None = option("Radioss: name of the run.  [default: Root]", metavar="NAME")
-    contact: int | None = option("Contact whose force switches (solvers ls-dyna-contact, radioss-contact).", _IDS, "ID")
-    wall: int | None = option("Rigid wall whose force switches (the same solvers).", _IDS, "ID")
+    step_cap: float | None = option(
+        "Largest time step while rigid (DTMAX, /DTIX).", POSITIVE, "DT"
+    )
+    node: tuple[str, ...] = option(
+        "Radioss: main nodes of the rigid bodies.", "names", "IDS", many=True
+    )
+    end: float | None = option(
+        "Radioss: end of the run.  [default: end of the history]", TIME, "T"
+    )
+    name: str | None = option(
+        "Radioss: name of the run.  [default: Root]", metavar="NAME"
+    )
+    contact: int | None = option(
+        "Contact whose force switches (solvers ls-dyna-contact, radioss-contact).",
+        _IDS,
+        "ID",
+    )
+    wall: int | None = option(
+        "Rigid wall whose force switches (the same solvers).", _IDS, "ID"
+    )
     starter: str = ""  # cards that the starter deck lacks
     sensor: int = 901  # first id of sensors that is free
     delete_nodal_bodies: bool = False  # as those of Printing
@@ -119,12 +158,22 @@ class Cards:
         known = options_of(Cards)
         if unknown := [name for name in given if name not in known]:
             arguments.refuse_unknown(unknown[0], known)
-        return cls(**{name: _checked(name, one, known[name]) for name, one in given.items() if one is not None})
+        return cls(
+            **{
+                name: _checked(name, one, known[name])
+                for name, one in given.items()
+                if one is not None
+            }
+        )
 
     @property
     def given(self) -> list[str]:
         """Names of the options that were given, the solver aside."""
-        return [name for name in options_of(Cards) if name != "solver" and getattr(self, name) not in (None, ())]
+        return [
+            name
+            for name in options_of(Cards)
+            if name != "solver" and getattr(self, name) not in (None, ())
+        ]
 
     def printing(self, parts: Sequence[int] = ()) -> Printing:
         """Say what a card says besides its times and its solver."""
@@ -151,7 +200,11 @@ class Cards:
         for name in self.given:
             if name not in places[solver]:
                 owner = next(one for one, takes in places.items() if name in takes)
-                hint = "" if self.solver else f"; without `solver` the card is one for {SOLVERS[solver].title}"
+                hint = (
+                    ""
+                    if self.solver
+                    else f"; without `solver` the card is one for {SOLVERS[solver].title}"
+                )
                 raise ArgumentError(f"`{name}` is an option of `solver` {owner}{hint}")
 
     def by_deck(self, asked: Asked) -> tuple[Cards, tuple[str, ...]]:
@@ -165,7 +218,10 @@ class Cards:
         DeckError
             If the deck cannot be read, or rigid bodies of it cannot switch the parts.
         """
-        deck, parts = asked.deck, [part.id for part in asked.reference.history.parts or ()]
+        deck, parts = (
+            asked.deck,
+            [part.id for part in asked.reference.history.parts or ()],
+        )
         if deck is None:
             return self, ()
         from d2rpick.deck.suiting import find_suiting
@@ -191,14 +247,18 @@ class Cards:
         from d2rpick.deck.radioss_bodies import bodies_for
 
         bodies = bodies_for(deck, parts)
-        cards = replace(cards, node=tuple(map(str, bodies.nodes)), replaced=bodies.replaced)
+        cards = replace(
+            cards, node=tuple(map(str, bodies.nodes)), replaced=bodies.replaced
+        )
         return replace(cards, starter=bodies.cards, sensor=bodies.sensor), bodies.notes
 
     def request(self, asked: Asked) -> CardRequest:
         """Say how the card of a run is printed."""
         from d2rpick.choice.judged_card import CardRequest
 
-        request = CardRequest(self.solver, self.printing(numbers("--part", asked.on_card)))
+        request = CardRequest(
+            self.solver, self.printing(numbers("--part", asked.on_card))
+        )
         self.check_solver(request.of(asked.reference.history)[0])
         return request
 
@@ -209,7 +269,10 @@ SETTINGS: Final = (*map(dashed, (*OPTIONS, *options_of(Cards))), "fail-on")
 
 def needed(solver: Module) -> str:
     """Say which argument names whom the card of ``solver`` switches."""
-    what = {"part": "`parts`, the parts to switch", "node": "`node`, the main nodes of the rigid bodies"}
+    what = {
+        "part": "`parts`, the parts to switch",
+        "node": "`node`, the main nodes of the rigid bodies",
+    }
     return f"a card for {solver.title} needs {what[solver.switches]}"
 
 
@@ -219,11 +282,17 @@ def numbers(name: str, texts: Sequence[str]) -> list[int]:
     for piece in (piece.strip() for text in texts for piece in text.split(",")):
         found = re.fullmatch(_RANGE, piece, re.ASCII)
         if not found:
-            hint = "; titles need a --history that has parts" if name == "--part" else ""
-            raise ArgumentError(f"{name}: {piece!r} is not a number (7) or range (10-19){hint}")
+            hint = (
+                "; titles need a --history that has parts" if name == "--part" else ""
+            )
+            raise ArgumentError(
+                f"{name}: {piece!r} is not a number (7) or range (10-19){hint}"
+            )
         low, high = int(found[1]), int(found[2] or found[1])
         if not low <= high < low + _MOST_IDS:
-            raise ArgumentError(f"{name}: {piece!r} is not a range of 1 to {_MOST_IDS} numbers")
+            raise ArgumentError(
+                f"{name}: {piece!r} is not a range of 1 to {_MOST_IDS} numbers"
+            )
         ids += range(low, high + 1)
     return ids
 
@@ -276,20 +345,28 @@ def judged(
         raise ArgumentError(needed(SOLVERS[solver]))
     card, verdicts = found
     card = replace(card, notes=(*notes, *card.notes))
-    apart = 0 if printing.merge or SOLVERS[solver].switches != "part" else len(printing.part)
+    apart = (
+        0
+        if printing.merge or SOLVERS[solver].switches != "part"
+        else len(printing.part)
+    )
     return JudgedCard(card, verdicts, tuple(collect_objections(card, asked, apart)))
 
 
 def all_cautions(card: JudgedCard) -> tuple[Caution, ...]:
     """Cautions of a card and of its verdicts, each once, and the verdicts themselves where they are objections."""
-    of_verdicts = (caution for verdict in card.verdicts for caution in _cautions(verdict))
+    of_verdicts = (
+        caution for verdict in card.verdicts for caution in _cautions(verdict)
+    )
     return tuple(dict.fromkeys((*of_verdicts, *card.cautions)))
 
 
 def _cautions(verdict: Verdict) -> Iterator[Caution]:
     yield from verdict.cautions
     if not verdict.verified:
-        yield Caution("not-verified", f"the times as printed: {'; '.join(verdict.reasons)}")
+        yield Caution(
+            "not-verified", f"the times as printed: {'; '.join(verdict.reasons)}"
+        )
 
 
 def card(
@@ -335,11 +412,22 @@ def card(
 
     times = arguments.pairs("windows", windows)
     given: dict[str, Any] = dict(options)
-    judging: Any = {name: given.pop(name) for name in ("after", "landing", "margin", "tolerance") if name in given}
-    return card_of(times, run, request_of(run, parts, None, None, None, judging), Cards.of(given))  # type: ignore[arg-type]
+    judging: Any = {
+        name: given.pop(name)
+        for name in ("after", "landing", "margin", "tolerance")
+        if name in given
+    }
+    return card_of(
+        times,
+        run,
+        request_of(run, parts, None, None, None, judging),
+        Cards.of(given),  # type: ignore[arg-type]
+    )
 
 
-def card_of(windows: Sequence[Times], run: Run | None, request: Request, cards: Cards) -> JudgedCard:
+def card_of(
+    windows: Sequence[Times], run: Run | None, request: Request, cards: Cards
+) -> JudgedCard:
     """Print the card of windows, judged as printed where there is a run."""
     from d2rpick.deck.printing import DEFAULT, SOLVERS, cards as print_cards
 
@@ -368,5 +456,7 @@ def _alone(request: Request, cards: Cards, solver: str) -> Printing:
     if request.part and module.switches != "part":
         raise ArgumentError(_ONLY_JUDGED.format(module.title))
     if "end" in module.takes and cards.end is None:
-        raise ArgumentError(f"a card for {module.title} needs `end`, the end of the run, or a `run`")
+        raise ArgumentError(
+            f"a card for {module.title} needs `end`, the end of the run, or a `run`"
+        )
     return cards.printing(numbers("--part", request.part))

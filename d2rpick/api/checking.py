@@ -51,7 +51,9 @@ class Findings(Answer, Checks):
     @property
     def passed(self) -> bool:
         """Whether all decks were checked, and nothing weighs as much as ``fail_on``."""
-        return not self.failed and all(one.severity.rank > self.fail_on.rank for one in self.findings)
+        return not self.failed and all(
+            one.severity.rank > self.fail_on.rank for one in self.findings
+        )
 
     @property
     def decks(self) -> tuple[str, ...]:
@@ -78,7 +80,9 @@ class Findings(Answer, Checks):
         >>> d2.check("sample_data/switching.k", history=history).to_frame()["rule"].tolist()
         ['D2R202', 'D2R203']
         """
-        return frame_of(self.to_dict()["findings"], FINDING.keys, decks=list(self.decks))
+        return frame_of(
+            self.to_dict()["findings"], FINDING.keys, decks=list(self.decks)
+        )
 
 
 def check(
@@ -122,14 +126,23 @@ def check(
     >>> [(window.part, window.td) for window in found.windows]
     [(11, 0.0687534), (12, 0.064)]
     """
-    from d2rpick.api.asked import request_of  # not above: without a history nothing is computed
+    from d2rpick.api.asked import (
+        request_of,
+    )  # not above: without a history nothing is computed
 
     names = arguments.paths("decks", decks)
     if history is not None:
         arguments.check_run("history", history)
     request = request_of(history, None, None, None, None, choosing)
-    rules = Configuration(arguments.rule_ids("select", select), arguments.rule_ids("ignore", ignore))
-    named = [text for name in ("select", "ignore") for one in getattr(rules, name) for text in (f"--{name}", one)]
+    rules = Configuration(
+        arguments.rule_ids("select", select), arguments.rule_ids("ignore", ignore)
+    )
+    named = [
+        text
+        for name in ("select", "ignore")
+        for one in getattr(rules, name)
+        for text in (f"--{name}", one)
+    ]
     files = [text for name in request.history for text in ("--history", name)]
     command = ("check", *files, *request.asking(), *named, *positional(names))
     found = findings_of(names, history, request, *rules[:2], command=command)
@@ -165,7 +178,10 @@ def findings_of(
     return Findings(
         results=results,
         failed=tuple(one for one in found if isinstance(one, Unreadable)),
-        cautions=(*(judge.cautions if judge else ()), *(Caution("unknown-rule", remark) for remark in remarks)),
+        cautions=(
+            *(judge.cautions if judge else ()),
+            *(Caution("unknown-rule", remark) for remark in remarks),
+        ),
         history=run.sources if run else None,
         notes=(*(judge.notes if judge else ()), *unused_settings),
         fail_on=Severity(fail_on),
@@ -175,17 +191,30 @@ def findings_of(
 
 def check_written(deck: str, judge: HistoryJudge) -> Findings:
     """Check a deck that was written here by the configuration nearest to it."""
-    checked = check_deck(deck, configuration_for(deck, Configuration(), SETTINGS), judge)
-    return Findings(results=(checked,), cautions=tuple(judge.cautions), history=judge.run.sources)
+    checked = check_deck(
+        deck, configuration_for(deck, Configuration(), SETTINGS), judge
+    )
+    return Findings(
+        results=(checked,), cautions=tuple(judge.cautions), history=judge.run.sources
+    )
 
 
-def _each(named: Sequence[str], rules: Configuration, judge: HistoryJudge | None) -> Iterator[Checked | Unreadable]:
+def _each(
+    named: Sequence[str], rules: Configuration, judge: HistoryJudge | None
+) -> Iterator[Checked | Unreadable]:
     """Check each deck once, by one of its spellings, a run by the first of its files; a folder stands for its decks."""
     seen: set[str] = set()
     real_folder = cache(os.path.realpath)  # which asks the system for each folder above
-    configured = cache(lambda folder: configuration_for(os.path.join(folder, ""), rules, SETTINGS))  # noqa: PTH118
+    configured = cache(
+        lambda folder: configuration_for(os.path.join(folder, ""), rules, SETTINGS)  # noqa: PTH118
+    )
     found_by_name = {name: _decks(name) for name in dict.fromkeys(named)}
-    listed = [deck for decks in found_by_name.values() if not isinstance(decks, DeckError) for deck in decks]
+    listed = [
+        deck
+        for decks in found_by_name.values()
+        if not isinstance(decks, DeckError)
+        for deck in decks
+    ]
     restarts = _restarts(listed)
     for name, decks in found_by_name.items():
         if isinstance(decks, DeckError):
@@ -193,10 +222,18 @@ def _each(named: Sequence[str], rules: Configuration, judge: HistoryJudge | None
             continue
         for deck in decks:
             folder, file = os.path.split(deck)
-            real = os.path.realpath(deck) if os.path.islink(deck) else os.path.join(real_folder(folder), file)  # noqa: PTH114, PTH118
+            real = (
+                os.path.realpath(deck)
+                if os.path.islink(deck)  # noqa: PTH114
+                else os.path.join(real_folder(folder), file)  # noqa: PTH118
+            )
             if real not in seen and not any(deck in legs for legs in restarts.values()):
                 found = _found(deck, configured, judge, folder, restarts.get(deck, ()))
-                others = [] if isinstance(found, Checked) and found.solver == LS_DYNA else run_files(deck)
+                others = (
+                    []
+                    if isinstance(found, Checked) and found.solver == LS_DYNA
+                    else run_files(deck)
+                )
                 seen.update([real, *map(os.path.realpath, others)])
                 yield found
 
@@ -215,7 +252,11 @@ def _restarts(decks: Sequence[str]) -> dict[str, list[str]]:
     legs: dict[str, list[str]] = {}
     for restart in small:
         folder = os.path.dirname(os.path.abspath(restart))  # noqa: PTH100, PTH120
-        beside = [deck for deck in decks if os.path.dirname(os.path.abspath(deck)) == folder and deck not in small]  # noqa: PTH100, PTH120
+        beside = [
+            deck
+            for deck in decks
+            if os.path.dirname(os.path.abspath(deck)) == folder and deck not in small  # noqa: PTH100, PTH120
+        ]
         if len(beside) == 1 and not run_files(beside[0]):
             legs.setdefault(beside[0], []).append(restart)
     return legs
@@ -239,6 +280,8 @@ def _found(
         found = check_deck(name, configuration, judge, content, restarts)
         return found._replace(files=(source, *found.files), notes=configuration.notes)
     except Exception as error:
-        if isinstance(error, D2RPickError) and not isinstance(error, ConfigurationError | DeckError):
+        if isinstance(error, D2RPickError) and not isinstance(
+            error, ConfigurationError | DeckError
+        ):
             raise  # about the history, by which all are judged
         return Unreadable(name, error, (source,))

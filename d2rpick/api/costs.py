@@ -52,13 +52,17 @@ class PartTable(Paged, sets_of_parts.Parts):
         """
         from d2rpick.report.parts import PART
 
-        return frame_of(list(map(PART.plain, self.rows)), PART.keys, source=list(self.run.sources))
+        return frame_of(
+            list(map(PART.plain, self.rows)), PART.keys, source=list(self.run.sources)
+        )
 
     def sets_frame(self) -> pd.DataFrame:
         """Give a row per set; the columns are the keys of ``sets`` in the JSON."""
         from d2rpick.report.parts import SET
 
-        return frame_of(list(map(SET.plain, self.sets)), SET.keys, source=list(self.run.sources))
+        return frame_of(
+            list(map(SET.plain, self.sets)), SET.keys, source=list(self.run.sources)
+        )
 
     def plot(self) -> Figure:
         """Draw the energies of the parts that have most, and the flights."""
@@ -113,7 +117,9 @@ def parts(
     ['box', 'step']
     """
     request = request_of(run, given, None, deck, weights, choosing)
-    return tabled(run, request, arguments.optional("tr", tr), arguments.optional("td", td))
+    return tabled(
+        run, request, arguments.optional("tr", tr), arguments.optional("td", td)
+    )
 
 
 def tabled(run: Run, request: Request, tr: float | None, td: float | None) -> PartTable:
@@ -121,8 +127,15 @@ def tabled(run: Run, request: Request, tr: float | None, td: float | None) -> Pa
     times = check_times(tr, td)
     model, beside = model_of(request), [request.deck] if request.deck else []
     ids = sets_of_parts.given_parts(run.files, request.part)
-    found = sets_of_parts.parts_of(run.files, request.settings, model, given=ids, times=times, beside=beside)
-    window = [text for name, time in (("tr", tr), ("td", td)) if time is not None for text in (f"--{name}", repr(time))]
+    found = sets_of_parts.parts_of(
+        run.files, request.settings, model, given=ids, times=times, beside=beside
+    )
+    window = [
+        text
+        for name, time in (("tr", tr), ("td", td))
+        if time is not None
+        for text in (f"--{name}", repr(time))
+    ]
     command = ("parts", *window, *request.asking(), *positional(request.history))
     return PartTable.of(found, run=run, command=command, cautions=name_deck(request))
 
@@ -197,4 +210,6 @@ def calibrate(runs: arguments.Path | Iterable[arguments.Path]) -> Calibration:
     names = arguments.paths("runs", runs)
     observations, cautions = calibration.observations_of_runs(names)
     command = ("calibrate", *positional(names))
-    return Calibration.of(calibration.calibrate(observations), cautions=cautions, command=command)
+    return Calibration.of(
+        calibration.calibrate(observations), cautions=cautions, command=command
+    )

@@ -43,7 +43,12 @@ class Drive(Paged, Driven):
     kind = "drive"
     said = ("windows", "saved")
 
-    def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:  # noqa: ARG002
+    def page(
+        self,
+        command: Sequence[str],
+        judging: Sequence[str] = (),  # noqa: ARG002
+        cards: Cards | None = None,  # noqa: ARG002
+    ) -> str:
         """Write the page."""
         from d2rpick.report.pages import drive_page
 
@@ -82,12 +87,18 @@ class Driving:
         shortest = _SHORTEST * self.deck.second if self.deck.second else 0.0
         share = CostModel(self.inventory).saved(self.deck.parts).value
         self.limits = Limits(
-            self.deck.end, self.deck.interval, shortest, margin, _UNKNOWN if share is None else 1 - share
+            self.deck.end,
+            self.deck.interval,
+            shortest,
+            margin,
+            _UNKNOWN if share is None else 1 - share,
         )
         check_driven(deck, self.inventory, self.deck.parts, self.limits, wait)
         self.observer = Observer(self.deck.parts, self.inventory, wait, known)
         self.solver = Solver(folder, self.deck.name, threads)
-        self.cautions: tuple[Caution, ...] = tuple(doubts_of_solver(self.deck.parts, self.inventory))
+        self.cautions: tuple[Caution, ...] = tuple(
+            doubts_of_solver(self.deck.parts, self.inventory)
+        )
 
     @contextmanager
     def driver(self, *, resume: bool) -> Iterator[Driver]:
@@ -98,28 +109,50 @@ class Driving:
         """
         folder = self.folder
         if missing := self.commands.missing():
-            raise ConfigurationError(f"{missing}: no such program; correct the command of --starter or --engine")
+            raise ConfigurationError(
+                f"{missing}: no such program; correct the command of --starter or --engine"
+            )
         folder.mkdir(parents=True, exist_ok=True)
         with alone(folder):
             journal = Journal(folder / JOURNAL)
             digest = hashlib.sha256(b"\0".join(self.deck.files.values())).hexdigest()
             begun, computed = journal.all("begun"), journal.all("ended")
             if computed and not resume:
-                raise D2RPickError(f"{folder}: this run has begun; --resume goes on with it, or choose another folder")
+                raise D2RPickError(
+                    f"{folder}: this run has begun; --resume goes on with it, or choose another folder"
+                )
             if computed and begun[0]["deck"] != digest:
-                raise D2RPickError(f"{folder}: begun with another deck than {self.name} is now; name that one")
-            if not begun and any(not one.name.startswith(".") for one in folder.iterdir()):
-                raise D2RPickError(f"{folder}: the folder is not empty; choose another one")
-            if not computed:  # a deck, or a command, that has been corrected may be another one
+                raise D2RPickError(
+                    f"{folder}: begun with another deck than {self.name} is now; name that one"
+                )
+            if not begun and any(
+                not one.name.startswith(".") for one in folder.iterdir()
+            ):
+                raise D2RPickError(
+                    f"{folder}: the folder is not empty; choose another one"
+                )
+            if (
+                not computed
+            ):  # a deck, or a command, that has been corrected may be another one
                 journal.path.unlink(missing_ok=True)
                 journal = Journal(journal.path)
                 journal.add("begun", deck=digest)
             try:
-                yield Driver(self.deck, self.solver, journal, self.commands, self.limits, self.observer, self._told)
+                yield Driver(
+                    self.deck,
+                    self.solver,
+                    journal,
+                    self.commands,
+                    self.limits,
+                    self.observer,
+                    self._told,
+                )
             except OSError as error:
                 if error.errno not in (errno.ENOSPC, errno.EDQUOT):
                     raise
-                raise D2RPickError(f"{folder}: {error.strerror}; make room, then --resume") from None
+                raise D2RPickError(
+                    f"{folder}: {error.strerror}; make room, then --resume"
+                ) from None
 
     def answer(self, driver: Driver, command: Sequence[str]) -> Drive:
         """Say what has come of the run so far."""
@@ -141,13 +174,20 @@ class Driving:
     def _by_model(self, legs: Sequence[Leg]) -> float | None:
         share = CostModel(self.inventory).saved(self.deck.parts).value
         steps = [
-            [one.length / one.cycles for one in legs if one.cycles and one.length > 0 and one.order.rigid is rigid]
+            [
+                one.length / one.cycles
+                for one in legs
+                if one.cycles and one.length > 0 and one.order.rigid is rigid
+            ]
             for rigid in (False, True)
         ]
         if share is None or not all(steps):
             return None
         ratio = max(steps[1]) / min(steps[0])
-        took = sum(one.length * ((1 - share) / ratio if one.order.rigid else 1.0) for one in legs)
+        took = sum(
+            one.length * ((1 - share) / ratio if one.order.rigid else 1.0)
+            for one in legs
+        )
         return 1 - took / self.deck.end
 
 
@@ -156,5 +196,9 @@ def _by_time(legs: Sequence[Leg], end: float) -> float | None:
     if any(one.cpu is None for one in legs):
         return None
     deformable = [one for one in legs if not one.order.rigid]
-    whole = sum(one.cpu or 0.0 for one in deformable) / sum(one.length for one in deformable) * end
+    whole = (
+        sum(one.cpu or 0.0 for one in deformable)
+        / sum(one.length for one in deformable)
+        * end
+    )
     return 1 - sum(one.cpu or 0.0 for one in legs) / whole if whole else None

@@ -5,7 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from d2rpick.api.request import NOT_NEGATIVE, OPTIONS, POSITIVE, TIME, UNLIMITED, Request, dashed, option
+from d2rpick.api.request import (
+    NOT_NEGATIVE,
+    OPTIONS,
+    POSITIVE,
+    TIME,
+    UNLIMITED,
+    Request,
+    dashed,
+    option,
+)
 from d2rpick.base.errors import ArgumentError, Caution
 
 if TYPE_CHECKING:
@@ -17,7 +26,12 @@ if TYPE_CHECKING:
     from d2rpick.vibration.oscillator import Oscillator, Replay, State, Trajectory
 
 MOST_REPLAYED = 10_000_000  # their text takes some gigabytes
-HISTORIES = ("csv", "hdf5", "glstat", "matsum")  # of d2rpick.report.history_files, which --help does without
+HISTORIES = (
+    "csv",
+    "hdf5",
+    "glstat",
+    "matsum",
+)  # of d2rpick.report.history_files, which --help does without
 
 
 def _same(name: str, **changes: Any) -> Any:
@@ -35,32 +49,56 @@ class Motion:
     beta: float | None = _same("beta")
     alpha: float = _same("alpha")
     v0: float | None = _same("v0", help="Velocity of the frame at time 0.")
-    z0: float | None = option("Displacement of the frame at time 0.  [default: 0]", TIME)
-    y0: float | None = option("Displacement of the suspended mass at time 0.  [default: 0]", TIME)
-    vz0: float | None = option(
-        "Velocity of the frame at time 0; the same as --v0.  [default: 0]", TIME, instead_of=("v0",)
+    z0: float | None = option(
+        "Displacement of the frame at time 0.  [default: 0]", TIME
     )
-    vy0: float | None = option("Velocity of the suspended mass at time 0.  [default: 0]", TIME)
-    tr: float | None = option("Switch to rigid at this time; with --td.", NOT_NEGATIVE, "T")
-    td: float | None = option("Switch back to deformable at this time.", NOT_NEGATIVE, "T")
+    y0: float | None = option(
+        "Displacement of the suspended mass at time 0.  [default: 0]", TIME
+    )
+    vz0: float | None = option(
+        "Velocity of the frame at time 0; the same as --v0.  [default: 0]",
+        TIME,
+        instead_of=("v0",),
+    )
+    vy0: float | None = option(
+        "Velocity of the suspended mass at time 0.  [default: 0]", TIME
+    )
+    tr: float | None = option(
+        "Switch to rigid at this time; with --td.", NOT_NEGATIVE, "T"
+    )
+    td: float | None = option(
+        "Switch back to deformable at this time.", NOT_NEGATIVE, "T"
+    )
     t_end: float = option("Last time.", POSITIVE, "T")
     dt: float = option("Output interval.", POSITIVE, "T")
-    write_as: str | None = option("Format of the result.  [default: by the name of -o, else csv]", HISTORIES)
+    write_as: str | None = option(
+        "Format of the result.  [default: by the name of -o, else csv]", HISTORIES
+    )
 
     def __post_init__(self) -> None:
         """Refuse what makes no sense together."""
-        given = [name for name in ("z0", "y0", "v0", "vz0", "vy0") if getattr(self, name) is not None]
+        given = [
+            name
+            for name in ("z0", "y0", "v0", "vz0", "vy0")
+            if getattr(self, name) is not None
+        ]
         if {"v0", "vz0"} <= {*given}:
-            raise ArgumentError("--v0 and --vz0 exclude each other: both are the velocity of the frame at time 0")
+            raise ArgumentError(
+                "--v0 and --vz0 exclude each other: both are the velocity of the frame at time 0"
+            )
         if not given:
-            raise ArgumentError("the motion needs a start: --v0, or some of --z0, --y0, --vz0 and --vy0")
+            raise ArgumentError(
+                "the motion needs a start: --v0, or some of --z0, --y0, --vz0 and --vy0"
+            )
         _ = self.oscillator
         if (self.tr is None) != (self.td is None):
             raise ArgumentError("--tr and --td need each other")
         if self.tr is not None and self.td is not None and not self.tr < self.td:
             raise ArgumentError(f"--tr {self.tr:g} is not before --td {self.td:g}")
         if self.t_end / self.dt > MOST_REPLAYED:
-            raise ArgumentError(f"--t-end {self.t_end:g} holds more than {MOST_REPLAYED} intervals of --dt {self.dt:g}")
+            raise ArgumentError(
+                f"--t-end {self.t_end:g} holds more than {MOST_REPLAYED} intervals of --dt {self.dt:g}"
+            )
 
     @property
     def start(self) -> State:
@@ -73,7 +111,10 @@ class Motion:
     @property
     def oscillator(self) -> Oscillator:
         """The oscillator that moves; ArgumentError for half of one."""
-        named = {name: getattr(self, name) for name in ("stiffness", "mass", "frame_mass", "beta", "alpha")}
+        named = {
+            name: getattr(self, name)
+            for name in ("stiffness", "mass", "frame_mass", "beta", "alpha")
+        }
         oscillator = Request(**named, v0=0.0).oscillator
         assert oscillator is not None  # its options are required
         return oscillator
@@ -89,7 +130,16 @@ class Motion:
 
 
 MOST_STATES = 1_000_000
-PARAMETERS = ("speed", "stiffness", "yield_strain", "damping", "mesh", "drop", "tilt", "ground_stiffness")
+PARAMETERS = (
+    "speed",
+    "stiffness",
+    "yield_strain",
+    "damping",
+    "mesh",
+    "drop",
+    "tilt",
+    "ground_stiffness",
+)
 TD = 0.37  # of the published study, 10 ms before the ground comes
 TILT = 30.0  # of a box that falls: on an edge, so that it tumbles
 T_END = {False: 0.42, True: 1.2}  # with a drop: some bounces
@@ -104,32 +154,61 @@ class Box:
         "Switch the box to rigid at this time; with --td, as pairs in order where there are several windows.",
         *(NOT_NEGATIVE, "T"), many=True,
     )  # fmt: skip
-    td: tuple[float, ...] = option("Switch it back.  [with --scan: 0.37]", NOT_NEGATIVE, "T", many=True)
+    td: tuple[float, ...] = option(
+        "Switch it back.  [with --scan: 0.37]", NOT_NEGATIVE, "T", many=True
+    )
     drop: float | None = option(
         "Let the box fall on the ground from this height of its lowest point, m, instead of tripping it on the sled.",
         *(NOT_NEGATIVE, "HEIGHT"),
     )
-    tilt: float | None = option("Of the box that falls.  [default: 30]", NOT_NEGATIVE, "DEG")
-    ground_stiffness: float | None = option("Of the ground at a point, N/m.  [default: 5e5]", POSITIVE)
-    scan: bool = option("Compute many tr, and hold each run against the one without switching.", "flag", default=False)
-    jobs: int | None = option("Processes of a scan.  [default: one for each core]", range(1, UNLIMITED))
-    t_end: float | None = option("Last time.  [default: 0.42, with --drop 1.2]", POSITIVE, "T")
+    tilt: float | None = option(
+        "Of the box that falls.  [default: 30]", NOT_NEGATIVE, "DEG"
+    )
+    ground_stiffness: float | None = option(
+        "Of the ground at a point, N/m.  [default: 5e5]", POSITIVE
+    )
+    scan: bool = option(
+        "Compute many tr, and hold each run against the one without switching.",
+        "flag",
+        default=False,
+    )
+    jobs: int | None = option(
+        "Processes of a scan.  [default: one for each core]", range(1, UNLIMITED)
+    )
+    t_end: float | None = option(
+        "Last time.  [default: 0.42, with --drop 1.2]", POSITIVE, "T"
+    )
     dt: float = option("Output interval.", POSITIVE, "T", default=1e-4)
     speed: float | None = option(
-        "Of the sled at the start, m/s; of a box that falls, along x.  [default: 7, with --drop 0]", NOT_NEGATIVE
+        "Of the sled at the start, m/s; of a box that falls, along x.  [default: 7, with --drop 0]",
+        NOT_NEGATIVE,
     )
-    stiffness: float | None = option("Of the bars of the box, E A in N.  [default: 4.5e6]", POSITIVE)
-    yield_strain: float | None = option("Of the bars of the box.  [default: 4.5e-3]", POSITIVE)
-    damping: float | None = option("Rate of the mass damping, 1/s.  [default: 0.2]", NOT_NEGATIVE)
-    mesh: int | None = option("Cells along each side of the box.  [default: 16]", range(4, 201))
-    write_as: str | None = option("Format of a history.  [default: by the name of -o, else csv]", HISTORIES)
+    stiffness: float | None = option(
+        "Of the bars of the box, E A in N.  [default: 4.5e6]", POSITIVE
+    )
+    yield_strain: float | None = option(
+        "Of the bars of the box.  [default: 4.5e-3]", POSITIVE
+    )
+    damping: float | None = option(
+        "Rate of the mass damping, 1/s.  [default: 0.2]", NOT_NEGATIVE
+    )
+    mesh: int | None = option(
+        "Cells along each side of the box.  [default: 16]", range(4, 201)
+    )
+    write_as: str | None = option(
+        "Format of a history.  [default: by the name of -o, else csv]", HISTORIES
+    )
 
     def __post_init__(self) -> None:
         """Refuse what makes no sense together."""
         if self.scan:
-            lost = [name for name in ("tr", "write_as") if getattr(self, name)] + ["drop"] * (self.drop is not None)
+            lost = [name for name in ("tr", "write_as") if getattr(self, name)] + [
+                "drop"
+            ] * (self.drop is not None)
             if lost:
-                raise ArgumentError(f"--scan and --{dashed(lost[0])} exclude each other")
+                raise ArgumentError(
+                    f"--scan and --{dashed(lost[0])} exclude each other"
+                )
             if len(self.td) > 1:
                 raise ArgumentError("--scan takes one --td")
         elif self.jobs:
@@ -137,9 +216,13 @@ class Box:
         else:
             _check_windows(self.tr, self.td, self.end)
         if self.tilt is not None and self.drop is None:
-            raise ArgumentError("--tilt belongs to --drop; the floor of the sled keeps its own")
+            raise ArgumentError(
+                "--tilt belongs to --drop; the floor of the sled keeps its own"
+            )
         if self.end / self.dt > MOST_STATES:
-            raise ArgumentError(f"--t-end {self.end:g} holds more than {MOST_STATES} intervals of --dt {self.dt:g}")
+            raise ArgumentError(
+                f"--t-end {self.end:g} holds more than {MOST_STATES} intervals of --dt {self.dt:g}"
+            )
 
     @property
     def end(self) -> float:
@@ -151,8 +234,18 @@ class Box:
         """The model that is meant."""
         from d2rpick.models.box_model import Parameters
 
-        given = {name: getattr(self, name) for name in PARAMETERS if getattr(self, name) is not None}
-        return Parameters(**({"speed": 0.0, "tilt": TILT, **given} if self.drop is not None else given))
+        given = {
+            name: getattr(self, name)
+            for name in PARAMETERS
+            if getattr(self, name) is not None
+        }
+        return Parameters(
+            **(
+                {"speed": 0.0, "tilt": TILT, **given}
+                if self.drop is not None
+                else given
+            )
+        )
 
     @property
     def windows(self) -> tuple[RigidWindow, ...]:
@@ -168,18 +261,26 @@ class Box:
         return simulate(self.parameters, self.end, *rigid, interval=self.dt)
 
 
-def _check_windows(starts: Sequence[float], ends: Sequence[float], t_end: float) -> None:
+def _check_windows(
+    starts: Sequence[float], ends: Sequence[float], t_end: float
+) -> None:
     """ArgumentError unless the times are pairs in order, within the run."""
     if len(starts) != len(ends):
-        raise ArgumentError("--tr and --td need each other, as many of the one as of the other")
+        raise ArgumentError(
+            "--tr and --td need each other, as many of the one as of the other"
+        )
     before = None
     for tr, td in zip(starts, ends, strict=True):
         if not tr < td:
             raise ArgumentError(f"--tr {tr:g} is not before --td {td:g}")
         if before is not None and not before < tr:
-            raise ArgumentError(f"--tr {tr:g} is not after --td {before:g} of the window before it")
+            raise ArgumentError(
+                f"--tr {tr:g} is not after --td {before:g} of the window before it"
+            )
         if td > t_end:
-            raise ArgumentError(f"--td {td:g} lies after the end of the run, --t-end {t_end:g}")
+            raise ArgumentError(
+                f"--td {td:g} lies after the end of the run, --t-end {t_end:g}"
+            )
         before = td
 
 
@@ -199,7 +300,11 @@ class Scanning:
         times = scan_times(self.reference.released or self.td / 3, self.td)
         self.answer = suggest(history_of(self.reference), self.td, Settings())
         self.cautions = (*unbalanced(self.reference), *self.answer.cautions)
-        self.times = sorted({*times, self.answer.recommended.tr}) if self.answer.recommended else times
+        self.times = (
+            sorted({*times, self.answer.recommended.tr})
+            if self.answer.recommended
+            else times
+        )
 
     def run(self, told: Callable[[int], None]) -> Scan:
         """Compute the runs; ``told`` is called with the number of those that are there."""
@@ -208,7 +313,9 @@ class Scanning:
 
         told(0)
         outcomes = []
-        for outcome in scan(self.box.parameters, self.reference, self.times, self.td, self.box.jobs):
+        for outcome in scan(
+            self.box.parameters, self.reference, self.times, self.td, self.box.jobs
+        ):
             outcomes.append(outcome)
             told(len(outcomes))
         return Scan(self.reference, outcomes, self.answer, self.cautions)
@@ -220,4 +327,9 @@ def unbalanced(record: Record) -> tuple[Caution, ...]:
     if off <= BALANCED:
         return ()
     found = f"the energy is balanced within {off:.2g} of the largest total, {BALANCED} was expected"
-    return (Caution("energy-balance", f"{found}; these parameters are beyond what the model can do"),)
+    return (
+        Caution(
+            "energy-balance",
+            f"{found}; these parameters are beyond what the model can do",
+        ),
+    )

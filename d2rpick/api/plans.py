@@ -58,15 +58,26 @@ class Exploration(RunAnswer, trade_off.TradeOff):
         """
         from d2rpick.report.trade_off import COLUMNS
 
-        return frame_of(self.to_dict()["offers"], COLUMNS, source=list(self.situation.history.source))
+        return frame_of(
+            self.to_dict()["offers"],
+            COLUMNS,
+            source=list(self.situation.history.source),
+        )
 
-    def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:
+    def page(
+        self,
+        command: Sequence[str],
+        judging: Sequence[str] = (),
+        cards: Cards | None = None,
+    ) -> str:
         """Write the page, with the card of the recommended pair."""
         from d2rpick.report.pages import trade_off_page
 
         found = self.suggestion
         chosen = (found.situation, found.recommended.tr) if found.recommended else None
-        return trade_off_page(self, self._context(command, judging, cards, chosen, self))
+        return trade_off_page(
+            self, self._context(command, judging, cards, chosen, self)
+        )
 
 
 def explore(
@@ -115,16 +126,23 @@ def explore(
     >>> round(found.step.td - found.start.td, 4)
     0.0048
     """
-    wanted, window = arguments.optional("td", td), arguments.window("td_window", td_window)
+    wanted, window = (
+        arguments.optional("td", td),
+        arguments.window("td_window", td_window),
+    )
     count = arguments.whole("steps", _STEPS if steps is None else steps, 1)
     asked = ask(run, request_of(run, parts, flying, deck, weights, choosing))
     return explored(asked, wanted, window, count)
 
 
-def explored(asked: Asked, td: float | None, td_window: tuple[float, float] | None, steps: int) -> Exploration:
+def explored(
+    asked: Asked, td: float | None, td_window: tuple[float, float] | None, steps: int
+) -> Exploration:
     """Find what each td in a window costs, or in the longest flight."""
     check_window("td_window", td_window)
-    found = trade_off.explore_of(asked.reference, asked.settings, td_window, td=td, steps=steps)
+    found = trade_off.explore_of(
+        asked.reference, asked.settings, td_window, td=td, steps=steps
+    )
     times = [] if td is None else ["--td", repr(td)]
     times += ["--td-window", *map(repr, td_window)] if td_window else []
     return Exploration.about(asked, found, *times, "--steps", str(steps))
@@ -153,11 +171,17 @@ class Plan(RunAnswer, planning.Plan):
         """
         from d2rpick.report.plan import WINDOW
 
-        return frame_of(self.to_dict()["windows"], WINDOW.keys, source=list(self.history.source))
+        return frame_of(
+            self.to_dict()["windows"], WINDOW.keys, source=list(self.history.source)
+        )
 
-    def card(self, *, every: bool | None = False, **options: Unpack[CardOptions]) -> JudgedCard | None:
+    def card(
+        self, *, every: bool | None = False, **options: Unpack[CardOptions]
+    ) -> JudgedCard | None:
         """Print the card of the next run, judged as printed, with ``every`` new window or those that are supported."""
-        return self.printed(Cards.of(options), every=arguments.flag("every", every, False))
+        return self.printed(
+            Cards.of(options), every=arguments.flag("every", every, False)
+        )
 
     def printed(self, cards: Cards, *, every: bool = False) -> JudgedCard | None:
         """Print the card of the next run, its new windows judged; None where none is new."""
@@ -165,13 +189,26 @@ class Plan(RunAnswer, planning.Plan):
         asked = asked._replace(reference=asked.reference._replace(history=self.history))
         return judged(asked, cards, new, done=self.done) if new else None
 
-    def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:  # noqa: ARG002
+    def page(
+        self,
+        command: Sequence[str],
+        judging: Sequence[str] = (),  # noqa: ARG002
+        cards: Cards | None = None,
+    ) -> str:
         """Write the page, with the cards of the next run."""
         from d2rpick.report.pages import plan_page
 
         card = self._card_of_windows(cards or Cards())
-        explorer = self._explorer(trade_off.explored_flights(self.question.reference, self))
-        return plan_page(self, self.question.reference.run, command, card.card.text if card else None, explorer)
+        explorer = self._explorer(
+            trade_off.explored_flights(self.question.reference, self)
+        )
+        return plan_page(
+            self,
+            self.question.reference.run,
+            command,
+            card.card.text if card else None,
+            explorer,
+        )
 
     def _card_of_windows(self, cards: Cards) -> JudgedCard | None:
         """Give the card of the next run; None if nobody says whom it switches, or the bodies of the deck cannot."""
@@ -179,7 +216,11 @@ class Plan(RunAnswer, planning.Plan):
             suited, _ = cards.by_deck(self.question)
         except DeckError:
             return None
-        return self.printed(cards) if suited.request(self.question).whom(self.history) else None
+        return (
+            self.printed(cards)
+            if suited.request(self.question).whom(self.history)
+            else None
+        )
 
 
 def plan(
@@ -236,24 +277,44 @@ def plan(
     return planned(asked, shortest, windows, before)
 
 
-def planned(asked: Asked, min_rigid: float | None, done: Sequence[Times], before: Run | None) -> Plan:
+def planned(
+    asked: Asked, min_rigid: float | None, done: Sequence[Times], before: Run | None
+) -> Plan:
     """Plan the rigid windows of a run, or those after the windows that are ``done``."""
     if before is not None and not done:
-        raise ArgumentError("`before` compares the landings of a switched run; name its windows with `done`")
+        raise ArgumentError(
+            "`before` compares the landings of a switched run; name its windows with `done`"
+        )
     windows: Sequence[Times] = ()
     if done:
-        from d2rpick.deck.printed_card import check_windows  # a plan alone does without decks
+        from d2rpick.deck.printed_card import (
+            check_windows,
+        )  # a plan alone does without decks
 
         windows = check_windows(done)
     earlier = asked.reference.like(before.files, asked.selection) if before else None
-    found = planning.plan_of(asked.reference, asked.settings, min_rigid=min_rigid, done=windows, before=earlier)
+    found = planning.plan_of(
+        asked.reference,
+        asked.settings,
+        min_rigid=min_rigid,
+        done=windows,
+        before=earlier,
+    )
     times = [] if min_rigid is None else ["--min-rigid", repr(min_rigid)]
-    times += ["--done", "-"] if windows else []  # on its standard input, a line for each
-    times += [text for name in (before.sources if before else ()) for text in ("--before", name)]
+    times += (
+        ["--done", "-"] if windows else []
+    )  # on its standard input, a line for each
+    times += [
+        text
+        for name in (before.sources if before else ())
+        for text in ("--before", name)
+    ]
     return Plan.about(asked, found, *times)
 
 
-def written(plan: Plan, card: JudgedCard, folder: str, *, overwrite: bool) -> tuple[list[str], Findings]:
+def written(
+    plan: Plan, card: JudgedCard, folder: str, *, overwrite: bool
+) -> tuple[list[str], Findings]:
     """Write a copy of the deck of a plan with a card of it, and check the copy by the history.
 
     Gives the names of the files, the main one first, and what is found in it.
@@ -264,5 +325,7 @@ def written(plan: Plan, card: JudgedCard, folder: str, *, overwrite: bool) -> tu
 
     asked, done = plan.question, card.card.windows[: len(plan.done)]  # as printed
     names = write_deck(asked.request.deck or "", card.card, folder, overwrite=overwrite)
-    judge = HistoryJudge(asked.reference.run, asked.request.selection(parts=False), plan.settings, done)
+    judge = HistoryJudge(
+        asked.reference.run, asked.request.selection(parts=False), plan.settings, done
+    )
     return names, check_written(names[0], judge)

@@ -38,9 +38,16 @@ class Number(NamedTuple):
         return f"of at most {self.high:g}" if value > self.high else ""
 
 
-TIME, POSITIVE, NOT_NEGATIVE, FRACTION = Number(), Number(0.0, above=True), Number(0.0), Number(0.0, 1.0)
+TIME, POSITIVE, NOT_NEGATIVE, FRACTION = (
+    Number(),
+    Number(0.0, above=True),
+    Number(0.0),
+    Number(0.0, 1.0),
+)
 MIN_MEAN_ENERGY: Final = 0.7  # of the reference's; in computed runs that were switched well it was 0.77 and more
-AT_LEAST_ONE: Final = Number(1.0)  # elements that are rigid no longer limit the step: it cannot become smaller
+AT_LEAST_ONE: Final = Number(
+    1.0
+)  # elements that are rigid no longer limit the step: it cannot become smaller
 UNLIMITED: Final = 2**63  # the end of a range of whole numbers that has none
 
 
@@ -60,10 +67,19 @@ class Option(NamedTuple):
     short: tuple[str, ...] = ()
 
 
-def option(text: str, kind: Any = "text", metavar: str | None = None, *, default: Any = None, **more: Any) -> Any:
+def option(
+    text: str,
+    kind: Any = "text",
+    metavar: str | None = None,
+    *,
+    default: Any = None,
+    **more: Any,
+) -> Any:
     """Describe the field of a table of options; what can be repeated is an empty tuple where it is not given."""
     default = () if more.get("many") else default
-    return field(default=default, metadata={"option": Option(text, kind, metavar, **more)})
+    return field(
+        default=default, metadata={"option": Option(text, kind, metavar, **more)}
+    )
 
 
 def _of_oscillator(text: str, kind: Number = POSITIVE, *others: str) -> Any:
@@ -73,15 +89,37 @@ def _of_oscillator(text: str, kind: Number = POSITIVE, *others: str) -> Any:
 @cache
 def options_of(table: Any) -> dict[str, Option]:
     """Give the options of a table by the names of their fields."""
-    return {one.name: one.metadata["option"] for one in fields(table) if "option" in one.metadata}
+    return {
+        one.name: one.metadata["option"]
+        for one in fields(table)
+        if "option" in one.metadata
+    }
 
 
 # Groups of options: how to read a history, how to judge by it, and how to judge a tr.
 READING: Final = ("input_format", "time", "energy", "part", "flying", "channel")
-JUDGING: Final = ("input_format", "time", "energy", "flying", "channel", "after", "landing", "margin", "tolerance")
+JUDGING: Final = (
+    "input_format",
+    "time",
+    "energy",
+    "flying",
+    "channel",
+    "after",
+    "landing",
+    "margin",
+    "tolerance",
+)
 OSCILLATOR: Final = ("stiffness", "mass", "frame_mass", "beta", "alpha", "v0")
 LIMITS: Final = (
-    *("after", "landing", "margin", "tolerance", "max_kinetic_share", "max_residual", *OSCILLATOR),
+    *(
+        "after",
+        "landing",
+        "margin",
+        "tolerance",
+        "max_kinetic_share",
+        "max_residual",
+        *OSCILLATOR,
+    ),
     *("fit_window", "no_verify", "strict", "keep_vibration"),
 )
 CHOOSING: Final = (*LIMITS, "cost_share", "step_ratio")
@@ -98,7 +136,9 @@ class Request:
     ``given`` names the options that were given, where values that are the default count as well.
     """
 
-    deck: str | None = option("Main deck of the run.", "file", "DECK", instead_of=("no_deck",))
+    deck: str | None = option(
+        "Main deck of the run.", "file", "DECK", instead_of=("no_deck",)
+    )
     no_deck: bool = option(
         "Use no deck.  [default: if HISTORY is the folder of a run, the main deck in it]",
         *("flag",), default=False, instead_of=("deck",),
@@ -115,7 +155,9 @@ class Request:
         f"Format of the history: auto, which recognises it by content, or {', '.join(READERS)}.",
         *(("auto", *READERS), "FORMAT"), default="auto", short=("-F",),
     )  # fmt: skip
-    time: str | None = option("Time column, by name, number or HDF5 path.", metavar="NAME|NUMBER")
+    time: str | None = option(
+        "Time column, by name, number or HDF5 path.", metavar="NAME|NUMBER"
+    )
     energy: tuple[str, ...] = option(
         "Energy column, label or HDF5 path; repeat it to add several.",
         *("channels", "NAME|NUMBER"), many=True, instead_of=("part",),
@@ -124,14 +166,20 @@ class Request:
         "Parts to switch: number (3,7), range (10-19), title, `flying` or `all`; energies are added.",
         *("parts", "IDS"), many=True, instead_of=("energy",),
     )  # fmt: skip
-    flying: tuple[str, ...] = option("Parts that fly together with the switched parts.", "parts", "IDS", many=True)
+    flying: tuple[str, ...] = option(
+        "Parts that fly together with the switched parts.", "parts", "IDS", many=True
+    )
     channel: tuple[str, ...] = option(
         "Channel of another quantity, where its name is unusual: kinetic_energy=E2, x_momentum=7; repeatable.",
         *("names", "QUANTITY=NAME"), many=True,
     )  # fmt: skip
-    after: float | None = option("End of the load.  [default: found from the record]", TIME, "T")
+    after: float | None = option(
+        "End of the load.  [default: found from the record]", TIME, "T"
+    )
     landing: float | None = option(
-        "Next contact after the flight; td keeps the margin before it.  [default: found from the record]", TIME, "T"
+        "Next contact after the flight; td keeps the margin before it.  [default: found from the record]",
+        TIME,
+        "T",
     )
     margin: float | None = option(
         "Time to keep clear after the load and before the next contact.  [default: 0; where td is chosen, or before "
@@ -139,35 +187,60 @@ class Request:
         *(NOT_NEGATIVE, "T"),
     )
     tolerance: float = option(
-        "Limit on the lock-in error, or on the level error where no oscillator is known.", FRACTION, "L", default=0.2
+        "Limit on the lock-in error, or on the level error where no oscillator is known.",
+        FRACTION,
+        "L",
+        default=0.2,
     )
-    max_kinetic_share: float | None = option("Reject a td with a larger kinetic share.", NOT_NEGATIVE, "K")
-    max_residual: float | None = option("Reject a pair with a larger residual.", NOT_NEGATIVE, "R")
+    max_kinetic_share: float | None = option(
+        "Reject a td with a larger kinetic share.", NOT_NEGATIVE, "K"
+    )
+    max_residual: float | None = option(
+        "Reject a pair with a larger residual.", NOT_NEGATIVE, "R"
+    )
     stiffness: float | None = _of_oscillator("Spring k.")
     mass: float | None = _of_oscillator("Suspended mass M.")
-    frame_mass: float | None = _of_oscillator("Frame mass m (or give --beta).", POSITIVE, "beta")
-    beta: float | None = _of_oscillator("Mass ratio M/m (instead of --frame-mass).", POSITIVE, "frame_mass")
-    alpha: float | None = _of_oscillator("Rate of damping proportional to mass.", NOT_NEGATIVE)
-    v0: float | None = _of_oscillator("Velocity of the frame at time 0; all else at rest.", TIME, "vz0")
+    frame_mass: float | None = _of_oscillator(
+        "Frame mass m (or give --beta).", POSITIVE, "beta"
+    )
+    beta: float | None = _of_oscillator(
+        "Mass ratio M/m (instead of --frame-mass).", POSITIVE, "frame_mass"
+    )
+    alpha: float | None = _of_oscillator(
+        "Rate of damping proportional to mass.", NOT_NEGATIVE
+    )
+    v0: float | None = _of_oscillator(
+        "Velocity of the frame at time 0; all else at rest.", TIME, "vz0"
+    )
     fit_window: tuple[float, float] | None = option(
-        "Identify the oscillator only here.", TIME, "LO HI", pair=True, instead_of=("stiffness", "no_verify")
+        "Identify the oscillator only here.",
+        TIME,
+        "LO HI",
+        pair=True,
+        instead_of=("stiffness", "no_verify"),
     )
     no_verify: bool = option(
         "Judge by the energy level alone, without an oscillator.",
         *("flag",), default=False, instead_of=("stiffness", "fit_window"),
     )  # fmt: skip
     strict: bool = option(
-        "Recommend nothing where the energy alone shows when the load is over.", "flag", default=False
+        "Recommend nothing where the energy alone shows when the load is over.",
+        "flag",
+        default=False,
     )
     keep_vibration: bool = option(
-        "Grade the vibration by itself, however little its error is worth in the next contact.", "flag", default=False
+        "Grade the vibration by itself, however little its error is worth in the next contact.",
+        "flag",
+        default=False,
     )
     cost_share: float | None = option(
         "Share of the cost of a time step spent on the elements of the switched parts; gives the run time.",
         *(FRACTION, "C"),
     )
     step_ratio: float | None = option(
-        "Time step while rigid over that before, 1 or more.  [default: 1]", AT_LEAST_ONE, "N"
+        "Time step while rigid over that before, 1 or more.  [default: 1]",
+        AT_LEAST_ONE,
+        "N",
     )
     run_folder: str | None = None  # that of a run whose files are named in `history`
     deck_in_folder: bool = False  # whether `deck` was found in the folder of the run
@@ -179,13 +252,23 @@ class Request:
             raise ArgumentError("`deck` and `no_deck` exclude each other")
         if self.folder is None:
             self.check_deck()
-        ways = {"an oscillator": self._oscillator_given, "`fit_window`": self.fit_window, "`replay`": self.no_verify}
+        ways = {
+            "an oscillator": self._oscillator_given,
+            "`fit_window`": self.fit_window,
+            "`replay`": self.no_verify,
+        }
         chosen = [name for name, value in ways.items() if value]
         if len(chosen) > 1:
             raise ArgumentError(f"{chosen[0]} and {chosen[1]} exclude each other")
         check_window("fit_window", self.fit_window)
-        if self.after is not None and self.landing is not None and not self.after < self.landing:
-            raise ArgumentError(f"`landing` {self.landing:g} is not after `after` {self.after:g}, the end of the load")
+        if (
+            self.after is not None
+            and self.landing is not None
+            and not self.after < self.landing
+        ):
+            raise ArgumentError(
+                f"`landing` {self.landing:g} is not after `after` {self.after:g}, the end of the load"
+            )
 
     @property
     def folder(self) -> str | None:
@@ -200,17 +283,29 @@ class Request:
     def check_deck(self) -> None:
         """Refuse what needs a deck if there is none."""
         if self.step_ratio is not None and self.cost_share is None and not self.deck:
-            raise ArgumentError("`step_ratio` needs `cost_share` or `deck` too: the run time needs both")
+            raise ArgumentError(
+                "`step_ratio` needs `cost_share` or `deck` too: the run time needs both"
+            )
         if self.weights is not None and self.deck is None:
-            raise ArgumentError("`weights` needs `deck`, the deck whose elements are weighted")
+            raise ArgumentError(
+                "`weights` needs `deck`, the deck whose elements are weighted"
+            )
 
     @property
     def _oscillator_given(self) -> bool:
         """Whether an oscillator is given; ArgumentError for half of one."""
         names = ("stiffness", "mass", "alpha", "v0")
-        given = [name for name in (*names, "frame_mass", "beta") if getattr(self, name) is not None]
-        if given and (missing := [name for name in names if getattr(self, name) is None]):
-            raise ArgumentError(f"`{given[0]}` needs `{missing[0]}` too: give all parameters of the oscillator")
+        given = [
+            name
+            for name in (*names, "frame_mass", "beta")
+            if getattr(self, name) is not None
+        ]
+        if given and (
+            missing := [name for name in names if getattr(self, name) is None]
+        ):
+            raise ArgumentError(
+                f"`{given[0]}` needs `{missing[0]}` too: give all parameters of the oscillator"
+            )
         if given and (self.frame_mass is None) == (self.beta is None):
             raise ArgumentError("the oscillator needs either `frame_mass` or `beta`")
         return bool(given)
@@ -222,7 +317,12 @@ class Request:
             return None
         from d2rpick.vibration.oscillator import Oscillator
 
-        return Oscillator(self.stiffness, self.mass, self.frame_mass or self.mass / (self.beta or 1.0), self.alpha)
+        return Oscillator(
+            self.stiffness,
+            self.mass,
+            self.frame_mass or self.mass / (self.beta or 1.0),
+            self.alpha,
+        )
 
     @property
     def settings(self) -> Settings:
@@ -231,25 +331,47 @@ class Request:
 
         mode, oscillator = None, self.oscillator
         if oscillator is not None and self.v0 is not None:
-            from d2rpick.vibration.oscillator import to_mode  # not above: mostly none is given
+            from d2rpick.vibration.oscillator import (
+                to_mode,
+            )  # not above: mostly none is given
 
             mode = to_mode(oscillator, self.v0)
-        same = {one.name: getattr(self, one.name) for one in fields(Settings) if one.name in OPTIONS}
-        return Settings(**{**same, "step_ratio": self.step_ratio or 1.0}, oscillator=mode, replay=not self.no_verify)
+        same = {
+            one.name: getattr(self, one.name)
+            for one in fields(Settings)
+            if one.name in OPTIONS
+        }
+        return Settings(
+            **{**same, "step_ratio": self.step_ratio or 1.0},
+            oscillator=mode,
+            replay=not self.no_verify,
+        )
 
     def selection(self, *, parts: bool = True) -> Selection:
         """What of a run is meant, without ``parts`` the columns alone; ArgumentError for energies in two ways."""
         from d2rpick.histories.names import Selection
 
         if parts and self.energy and self.part:
-            raise ArgumentError("`energy` and `parts` exclude each other: give columns or parts")
+            raise ArgumentError(
+                "`energy` and `parts` exclude each other: give columns or parts"
+            )
         part = self.part if parts else ()
-        return Selection(self.time, self.energy, part, self.flying, channels_of(self.channel))
+        return Selection(
+            self.time, self.energy, part, self.flying, channels_of(self.channel)
+        )
 
     def asking(self, names: Collection[str] | None = None) -> tuple[str, ...]:
         """Give the options that were given, or those of ``names``, as they are typed behind a td."""
-        chosen = self._given() if names is None else [name for name in self._given() if name in names]
-        return tuple(text for name in chosen for text in typed(name, getattr(self, name), many=OPTIONS[name].many))
+        chosen = (
+            self._given()
+            if names is None
+            else [name for name in self._given() if name in names]
+        )
+        return tuple(
+            text
+            for name in chosen
+            for text in typed(name, getattr(self, name), many=OPTIONS[name].many)
+        )
 
     def judging(self) -> tuple[str, ...]:
         """Give the options of ``card`` and ``check`` that judge by the same history."""
@@ -258,12 +380,22 @@ class Request:
 
     def without_history(self) -> None:
         """Refuse to be told how to judge, but not by what."""
-        if lost := [name for name in self._given() if name in {*JUDGING, *CHOOSING, "deck", "no_deck"}]:
-            raise ArgumentError(f"`{lost[0]}` needs an energy history; give one with `history`")
+        if lost := [
+            name
+            for name in self._given()
+            if name in {*JUDGING, *CHOOSING, "deck", "no_deck"}
+        ]:
+            raise ArgumentError(
+                f"`{lost[0]}` needs an energy history; give one with `history`"
+            )
 
     def _given(self) -> Iterator[str]:
         for one in fields(self):
-            given = getattr(self, one.name) != one.default if self.given is None else one.name in self.given
+            given = (
+                getattr(self, one.name) != one.default
+                if self.given is None
+                else one.name in self.given
+            )
             if given and one.name not in _NOT_TYPED:
                 yield one.name
 
@@ -275,7 +407,10 @@ def typed(name: str, value: Any, *, many: bool) -> Iterator[str]:
         return
     for one in value if many else [value]:
         words = one if isinstance(one, tuple) else (one,)
-        yield from (f"--{dashed(name)}", *(word if isinstance(word, str) else _word(word) for word in words))
+        yield from (
+            f"--{dashed(name)}",
+            *(word if isinstance(word, str) else _word(word) for word in words),
+        )
 
 
 def _word(value: Any) -> str:
@@ -291,7 +426,9 @@ def channels_of(given: Collection[str]) -> tuple[tuple[str, str], ...]:
     for quantity, name in pairs:
         if quantity not in QUANTITIES or not name:
             known = ", ".join(QUANTITIES)
-            raise ArgumentError(f"`channels` {quantity}={name}: QUANTITY=NAME was expected, with one of {known}")
+            raise ArgumentError(
+                f"`channels` {quantity}={name}: QUANTITY=NAME was expected, with one of {known}"
+            )
     if len({quantity for quantity, _ in pairs}) < len(pairs):
         raise ArgumentError("`channels` names a quantity twice; name each once")
     return tuple(pairs)
@@ -300,10 +437,14 @@ def channels_of(given: Collection[str]) -> tuple[tuple[str, str], ...]:
 def check_window(name: str, window: tuple[float, float] | None) -> None:
     """Refuse a window of time that is empty."""
     if window and not window[0] < window[1]:
-        raise ArgumentError(f"`{name}` {window[0]:g} {window[1]:g} is empty; give the lower time first")
+        raise ArgumentError(
+            f"`{name}` {window[0]:g} {window[1]:g} is empty; give the lower time first"
+        )
 
 
-def time_or_window(td: float | None, window: tuple[float, float] | None) -> float | tuple[float, float] | None:
+def time_or_window(
+    td: float | None, window: tuple[float, float] | None
+) -> float | tuple[float, float] | None:
     """Give what is asked for, a td or a window for it; ArgumentError for both."""
     if td is not None and window is not None:
         raise ArgumentError("`td` and `td_window` exclude each other")

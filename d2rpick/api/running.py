@@ -80,10 +80,21 @@ def first(
     from d2rpick.running.first import first_card
 
     names = arguments.part_names("parts", parts)
-    times = arguments.optional("wait", wait, NOT_NEGATIVE), arguments.optional("after", after, NOT_NEGATIVE)
-    main, folder = arguments.one_path("deck", deck), arguments.one_path("output_dir", output_dir)
+    times = (
+        arguments.optional("wait", wait, NOT_NEGATIVE),
+        arguments.optional("after", after, NOT_NEGATIVE),
+    )
+    main, folder = (
+        arguments.one_path("deck", deck),
+        arguments.one_path("output_dir", output_dir),
+    )
     found = first_card(main, numbers("parts", names), *times)
-    files = write_deck(main, found.card, folder, overwrite=arguments.flag("overwrite", overwrite, False))
+    files = write_deck(
+        main,
+        found.card,
+        folder,
+        overwrite=arguments.flag("overwrite", overwrite, False),
+    )
     return FirstRun(tuple(files), found.wait.time, found.wait.reason, found.notes)
 
 
@@ -134,5 +145,10 @@ def follow(
         from d2rpick.deck import read_inventory  # not above: few name a deck
 
         inventory = read_inventory(arguments.one_path("deck", deck))
-    time, seconds = arguments.optional("wait", wait), arguments.optional("lasting", lasting)
-    return watch.follow([arguments.one_path("run", run)], selection, time, inventory, lasting=seconds)
+    time, seconds = (
+        arguments.optional("wait", wait),
+        arguments.optional("lasting", lasting),
+    )
+    return watch.follow(
+        [arguments.one_path("run", run)], selection, time, inventory, lasting=seconds
+    )

@@ -78,7 +78,9 @@ class Run:
     @property
     def channels(self) -> tuple[str, ...]:
         """Names of the histories of the whole model."""
-        return tuple(dict.fromkeys(name for one in self.files.databases for name in one.channels))
+        return tuple(
+            dict.fromkeys(name for one in self.files.databases for name in one.channels)
+        )
 
     @property
     def parts(self) -> tuple[Part, ...]:
@@ -99,7 +101,9 @@ class Run:
         from d2rpick.choice.overview import survey
 
         named = arguments.one_path("deck", deck) if deck else None
-        return survey(self.files, self.chosen, self._deck_in_folder if deck is None else named)
+        return survey(
+            self.files, self.chosen, self._deck_in_folder if deck is None else named
+        )
 
     @property
     def _deck_in_folder(self) -> str | None:
@@ -144,12 +148,16 @@ class Run:
 
         every = isinstance(parts, str) and parts == "all"
         names = ("0-4294967295",) if every else arguments.part_names("parts", parts)
-        history = self.files.history(self.chosen._replace(energy=(), parts=names) if names else self.chosen)
+        history = self.files.history(
+            self.chosen._replace(energy=(), parts=names) if names else self.chosen
+        )
         if history.parts is None:
             columns: dict[Any, Any] = {"internal_energy": history.energy}
         else:
             energies = self.files.part_energies(history.parts)
-            columns = {part.name: energies[:, at] for at, part in enumerate(history.parts)}
+            columns = {
+                part.name: energies[:, at] for at, part in enumerate(history.parts)
+            }
             # parts and the energy of their sum stand at the same times
         frame = pd.DataFrame(columns, index=pd.Index(history.time, name="time"))
         frame.attrs = {
@@ -202,9 +210,13 @@ def read(
     ('z', 'y', 'vz', 'vy', 'internal_energy', 'kinetic_energy')
     """
     if is_table(source):
-        raise TypeError(f"source is a table of type {type(source).__name__}; give it to d2rpick.from_frame(...)")
+        raise TypeError(
+            f"source is a table of type {type(source).__name__}; give it to d2rpick.from_frame(...)"
+        )
     if hasattr(source, "read"):
-        return _opened([_in_memory(source)], selection_of(time, energy, channels), input_format)
+        return _opened(
+            [_in_memory(source)], selection_of(time, energy, channels), input_format
+        )
     names = arguments.paths("source", source)
     from d2rpick.histories.opening import open_run
 
@@ -279,9 +291,17 @@ def _timed(frame: pd.DataFrame, time: str | None) -> pd.DataFrame:
 
     index = frame.index
     known = list(map(str, frame.columns))
-    if time in known or (time is not None and time.isdecimal()) or any(map(is_time, known)):
+    if (
+        time in known
+        or (time is not None and time.isdecimal())
+        or any(map(is_time, known))
+    ):
         return frame
-    if index.inferred_type.startswith("timedelta") or time == index.name is not None or is_time(str(index.name)):
+    if (
+        index.inferred_type.startswith("timedelta")
+        or time == index.name is not None
+        or is_time(str(index.name))
+    ):
         return frame.reset_index(names=time or "time")
     named = "no name" if index.name is None else f"the name {index.name!r}"
     raise ValueError(
@@ -300,7 +320,9 @@ def _in_memory(file: Any) -> Source:
 
     data = file.read()
     if not isinstance(data, bytes):
-        raise TypeError("source is a file opened as text, one opened as binary was expected: open(name, 'rb')")
+        raise TypeError(
+            "source is a file opened as text, one opened as binary was expected: open(name, 'rb')"
+        )
     return Source(str(getattr(file, "name", "file")), data)
 
 
@@ -320,7 +342,9 @@ def known_format(input_format: str | None) -> str:
     if not isinstance(input_format, str):
         raise TypeError(f"input_format is {input_format!r}, a text was expected")
     if input_format not in ("auto", *READERS):
-        raise ValueError(f"input_format is {input_format!r}, one of auto, {', '.join(READERS)} was expected")
+        raise ValueError(
+            f"input_format is {input_format!r}, one of auto, {', '.join(READERS)} was expected"
+        )
     return input_format
 
 
@@ -332,16 +356,35 @@ def selection_of(
     """Give the columns that are meant; TypeError for what is no name or number, ValueError for an unknown quantity."""
     from d2rpick.histories.names import QUANTITIES, Selection
 
-    single = energy is None or isinstance(energy, str) or not hasattr(energy, "__iter__") or arguments.is_number(energy)
+    single = (
+        energy is None
+        or isinstance(energy, str)
+        or not hasattr(energy, "__iter__")
+        or arguments.is_number(energy)
+    )
     listed: list[Any] = ([] if energy is None else [energy]) if single else list(energy)  # type: ignore[arg-type]
     if channels is not None and not isinstance(channels, Mapping):
-        raise TypeError(f"channels is {channels!r}, a mapping of quantities to columns was expected")
+        raise TypeError(
+            f"channels is {channels!r}, a mapping of quantities to columns was expected"
+        )
     named = dict(channels or {})
-    for name, value in [("time", time), *(("energy", one) for one in listed), *named.items()]:
-        if value is not None and not isinstance(value, str) and not arguments.is_whole_number(value):
-            raise TypeError(f"{name} is {value!r}, the name or number of a column was expected")
+    for name, value in [
+        ("time", time),
+        *(("energy", one) for one in listed),
+        *named.items(),
+    ]:
+        if (
+            value is not None
+            and not isinstance(value, str)
+            and not arguments.is_whole_number(value)
+        ):
+            raise TypeError(
+                f"{name} is {value!r}, the name or number of a column was expected"
+            )
     if unknown := [name for name in named if name not in QUANTITIES]:
-        raise ValueError(f"channels names {unknown[0]!r}, one of {', '.join(QUANTITIES)} was expected")
+        raise ValueError(
+            f"channels names {unknown[0]!r}, one of {', '.join(QUANTITIES)} was expected"
+        )
     return Selection(
         time=None if time is None else str(time),
         energy=tuple(str(one) for one in listed),
@@ -349,7 +392,9 @@ def selection_of(
     )
 
 
-def extracted(run: histories.Run, selection: Selection) -> tuple[dict[str, Samples], tuple[str, ...]]:
+def extracted(
+    run: histories.Run, selection: Selection
+) -> tuple[dict[str, Samples], tuple[str, ...]]:
     """Give the columns of what is selected of a run, with all that is known at its times, and the notes on it.
 
     ``time`` and ``internal_energy``, with several parts ``part_<id>`` for each, then quantities of the whole model and
@@ -362,8 +407,13 @@ def extracted(run: histories.Run, selection: Selection) -> tuple[dict[str, Sampl
     table = {"time": history.time, "internal_energy": history.energy}
     if history.parts and len(history.parts) > 1:
         energies = run.part_energies(history.parts)
-        table |= {f"part_{part.id}": column for part, column in zip(history.parts, energies.T, strict=True)}
-    return table | run.quantities(history.time) | _of_model(history) | momentum_of_flight(history), history.notes
+        table |= {
+            f"part_{part.id}": column
+            for part, column in zip(history.parts, energies.T, strict=True)
+        }
+    return table | run.quantities(history.time) | _of_model(
+        history
+    ) | momentum_of_flight(history), history.notes
 
 
 def _of_model(history: History) -> dict[str, Samples]:
@@ -376,5 +426,8 @@ def _of_model(history: History) -> dict[str, Samples]:
     balance = history.balance
     if balance is None or not np.array_equal(balance.time, history.time):
         return {}
-    terms = {"kinetic_energy": balance.kinetic, "total_internal_energy": balance.internal if history.parts else None}
+    terms = {
+        "kinetic_energy": balance.kinetic,
+        "total_internal_energy": balance.internal if history.parts else None,
+    }
     return {name: term for name, term in terms.items() if term is not None}

@@ -108,9 +108,13 @@ def study(
     """
     from d2rpick.api.runs import known_format, selection_of
 
-    asked = time_or_window(arguments.optional("td", td), arguments.window("td_window", td_window))
+    asked = time_or_window(
+        arguments.optional("td", td), arguments.window("td_window", td_window)
+    )
     processes = arguments.whole("jobs", 1 if jobs is None else jobs, 1)
-    names = find_runs(arguments.paths("runs", [runs] if isinstance(runs, str) else runs))
+    names = find_runs(
+        arguments.paths("runs", [runs] if isinstance(runs, str) else runs)
+    )
     request = request_of(None, parts, flying, None, None, choosing)
     chosen = selection_of(time, energy, channels)
     request = replace(
@@ -139,12 +143,18 @@ def _once(names: Iterable[str]) -> list[str]:
     return sorted({os.path.realpath(name): name for name in shortest_first}.values())
 
 
-def question_of(request: Request, td: float | tuple[float, float] | None, *, curve: bool) -> Question:
+def question_of(
+    request: Request, td: float | tuple[float, float] | None, *, curve: bool
+) -> Question:
     """Say what every run is asked; with its ``curve`` where the energies of all are drawn."""
-    return Question(td, request.settings, request.selection(), request.input_format, curve=curve)
+    return Question(
+        td, request.settings, request.selection(), request.input_format, curve=curve
+    )
 
 
-def summary(request: Request, question: Question, names: Sequence[str], rows: Sequence[StudyRow]) -> Study:
+def summary(
+    request: Request, question: Question, names: Sequence[str], rows: Sequence[StudyRow]
+) -> Study:
     """Hold the rows of all runs against each other."""
     td = question.td
     times: tuple[str, ...] = () if td is None else ("--td", repr(td))
@@ -152,7 +162,10 @@ def summary(request: Request, question: Question, names: Sequence[str], rows: Se
         times = ("--td-window", *map(repr, td))
     # of the run time neither the study nor its command says anything
     options = replace(request, cost_share=None, step_ratio=None).asking()
-    return Study.of(core.summarise(td, rows), command=("study", *times, *options, *positional(names)))
+    return Study.of(
+        core.summarise(td, rows),
+        command=("study", *times, *options, *positional(names)),
+    )
 
 
 def rows_of(
@@ -183,11 +196,17 @@ def rows_of(
     known = dict(ledger.known) if ledger else {}
     new = [number for number in range(len(sources)) if number not in known]
     done, following = len(known), 0
-    names = [abspath(sources[number]) if absolute else sources[number] for number in new]  # noqa: PTH100
+    names = [sources[number] for number in new]
+    if absolute:
+        names = [abspath(name) for name in names]  # noqa: PTH100
     for answer in chain((None,), farm.answers(partial(core.ask, question), names)):
         if answer:
             number = new[answer.number]
-            row = core.failed(sources[number], answer.error) if answer.error else answer.result
+            row = (
+                core.failed(sources[number], answer.error)
+                if answer.error
+                else answer.result
+            )
             known[number] = replace(row, source=sources[number])
             done += 1
             if ledger:
@@ -244,22 +263,32 @@ class Ledger:
         self._known: set[tuple[str, ...]] = set()
         new = not Path(name).exists()
         if not new and not Path(name).is_file():
-            raise FormatError(f"{name}: cannot be written (not a regular file); give another file")
+            raise FormatError(
+                f"{name}: cannot be written (not a regular file); give another file"
+            )
         try:
-            with Path(name).open("a+b") as file:  # sure to be writable before the work begins
+            with Path(name).open(
+                "a+b"
+            ) as file:  # sure to be writable before the work begins
                 file.seek(0)
                 content = file.read()
             if new:  # the first row makes it
                 Path(name).unlink()
         except OSError as error:
-            raise FormatError(f"{name}: cannot be written ({error.strerror or error}); give another file") from None
+            raise FormatError(
+                f"{name}: cannot be written ({error.strerror or error}); give another file"
+            ) from None
         if content[: len(_FIRST)] != _FIRST[: len(content)]:
-            raise FormatError(f'{name}:1: not a run of a study, which begins with {{"source": ; give another file')
+            raise FormatError(
+                f'{name}:1: not a run of a study, which begins with {{"source": ; give another file'
+            )
         for text in content.split(b"\n"):
             if record := record_of(text):
                 self._remember(record)
             else:
-                cut = text.startswith(_FIRST) and not text.endswith(b"}")  # by the end of a killed study
+                cut = text.startswith(_FIRST) and not text.endswith(
+                    b"}"
+                )  # by the end of a killed study
                 self.damaged += bool(text) and not cut and not text.startswith(_LAST)
         self._end = b"" if content.endswith(b"\n") or not content else b"\n"
 
@@ -273,7 +302,9 @@ class Ledger:
                 warnings=tuple(record["warnings"]),
                 acceptable=np.array(record["acceptable"][0]).reshape(-1, 2),
                 alike=np.array(record["acceptable"][1]).reshape(-1, 2),
-                profile=None if record["profile"] is None else np.array(record["profile"]).reshape(2, -1),
+                profile=None
+                if record["profile"] is None
+                else np.array(record["profile"]).reshape(2, -1),
                 files=files,
                 curve=np.array(record["curve"]) if self.curve else None,
             )
@@ -290,13 +321,25 @@ class Ledger:
 
     def taking(self, sources: Sequence[str]) -> int:
         """Count the runs that are known."""
-        self.known = {number: row for number, source in enumerate(sources) if (row := self.find(source))}
+        self.known = {
+            number: row
+            for number, source in enumerate(sources)
+            if (row := self.find(source))
+        }
         return len(self.known)
 
     def told(self, runs: int) -> str:
         """Say how many of so many runs were taken, and why others that the file holds were not."""
-        outdated = f"; {self.outdated} have changed, or were computed with other options" if self.outdated else ""
-        damaged = f"; lines skipped, damaged or without a checksum: {self.damaged}" if self.damaged else ""
+        outdated = (
+            f"; {self.outdated} have changed, or were computed with other options"
+            if self.outdated
+            else ""
+        )
+        damaged = (
+            f"; lines skipped, damaged or without a checksum: {self.damaged}"
+            if self.damaged
+            else ""
+        )
         return f"{self.taken} of {runs} runs reused from {self.name}{outdated}{damaged}"
 
     def add(self, row: StudyRow) -> None:
@@ -304,7 +347,11 @@ class Ledger:
         if row.status in (FAILED, UNREADABLE, INTERNAL_ERROR):  # asked again next time
             return
         try:
-            append_whole(Path(self.name), self._end + line(row, self.asked).encode() + b"\n")
+            append_whole(
+                Path(self.name), self._end + line(row, self.asked).encode() + b"\n"
+            )
         except OSError as error:
-            raise FormatError(f"{self.name}: cannot be written ({error.strerror}); make room and begin again") from None
+            raise FormatError(
+                f"{self.name}: cannot be written ({error.strerror}); make room and begin again"
+            ) from None
         self._end = b""

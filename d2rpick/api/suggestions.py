@@ -57,7 +57,9 @@ class Suggestion(RunAnswer, answers.Suggestion):
         from d2rpick.report.suggestion import CANDIDATE
 
         source, rows = list(self.situation.history.source), self.to_dict()["candidates"]
-        return frame_of(rows, CANDIDATE.keys, td=self.td, basis=self.basis, source=source)
+        return frame_of(
+            rows, CANDIDATE.keys, td=self.td, basis=self.basis, source=source
+        )
 
     def card(self, **options: Unpack[CardOptions]) -> JudgedCard | None:
         """Print the card of the recommended pair, judged as printed; None without one."""
@@ -66,17 +68,31 @@ class Suggestion(RunAnswer, answers.Suggestion):
     def printed(self, cards: Cards) -> JudgedCard | None:
         """Print the card of the recommended pair, judged as printed; None without one."""
         pair, asked = self.recommended, self.question
-        judge = partial(answers.verify_of, asked.reference, settings=self.situation.settings, known=self.situation)
+        judge = partial(
+            answers.verify_of,
+            asked.reference,
+            settings=self.situation.settings,
+            known=self.situation,
+        )
         return card_judged(asked, cards, [(pair.tr, pair.td)], judge) if pair else None
 
-    def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:
+    def page(
+        self,
+        command: Sequence[str],
+        judging: Sequence[str] = (),
+        cards: Cards | None = None,
+    ) -> str:
         """Write the page, with the card of the recommended pair."""
         from d2rpick.choice.trade_off import explored_around
         from d2rpick.report.pages import suggestion_page
 
         chosen = (self.situation, self.recommended.tr) if self.recommended else None
-        explored = explored_around(self.question.reference, self.situation, self.td_window)
-        return suggestion_page(self, self._context(command, judging, cards, chosen, explored))
+        explored = explored_around(
+            self.question.reference, self.situation, self.td_window
+        )
+        return suggestion_page(
+            self, self._context(command, judging, cards, chosen, explored)
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -109,9 +125,19 @@ class Verdict(RunAnswer, answers.Verdict):
         from d2rpick.report.verdict import measures
 
         found = measures(self)
-        return frame_of([found], list(found), basis=self.basis, source=list(self.situation.history.source))
+        return frame_of(
+            [found],
+            list(found),
+            basis=self.basis,
+            source=list(self.situation.history.source),
+        )
 
-    def page(self, command: Sequence[str], judging: Sequence[str] = (), cards: Cards | None = None) -> str:
+    def page(
+        self,
+        command: Sequence[str],
+        judging: Sequence[str] = (),
+        cards: Cards | None = None,
+    ) -> str:
         """Write the page, with the card of the pair where it is good."""
         from d2rpick.choice.trade_off import explored_around
         from d2rpick.report.pages import verdict_page
@@ -119,7 +145,10 @@ class Verdict(RunAnswer, answers.Verdict):
         chosen = (self.situation, self.tr) if self.verified else None
         explored = explored_around(self.question.reference, self.situation)
         context = self._context(command, judging, cards, chosen, explored)
-        return verdict_page(self, context._replace(switched=self.compared.files if self.compared else None))
+        return verdict_page(
+            self,
+            context._replace(switched=self.compared.files if self.compared else None),
+        )
 
 
 def suggest(
@@ -178,16 +207,30 @@ def suggest(
     >>> f"{answer.recommended.tr:.6f} {answer.recommended.td:.6f}"
     '0.013587 0.068753'
     """
-    wanted = time_or_window(arguments.optional("td", td), arguments.window("td_window", td_window))
-    return suggested(ask(run, request_of(run, parts, flying, deck, weights, choosing)), wanted)
+    wanted = time_or_window(
+        arguments.optional("td", td), arguments.window("td_window", td_window)
+    )
+    return suggested(
+        ask(run, request_of(run, parts, flying, deck, weights, choosing)), wanted
+    )
 
 
 def suggested(asked: Asked, td: float | tuple[float, float] | None) -> Suggestion:
     """Choose tr for ``td``, or both times with td in a window or, for None, in the longest flight."""
     found = answers.suggest_of(asked.reference, td, asked.settings)
-    if found.better_pair and found.recommended and _read(found.better_pair) == _read(found.recommended):
+    if (
+        found.better_pair
+        and found.recommended
+        and _read(found.better_pair) == _read(found.recommended)
+    ):
         found = replace(found, better_pair=None)
-    times = ("--td-window", *map(repr, td)) if isinstance(td, tuple) else () if td is None else ("--td", repr(td))
+    times = (
+        ("--td-window", *map(repr, td))
+        if isinstance(td, tuple)
+        else ()
+        if td is None
+        else ("--td", repr(td))
+    )
     return Suggestion.about(asked, found, *times)
 
 
@@ -243,7 +286,9 @@ def verify(
     """
     pair = arguments.optional("tr", tr), arguments.optional("td", td)
     least = arguments.number(
-        "min_mean_energy", MIN_MEAN_ENERGY if min_mean_energy is None else min_mean_energy, FRACTION
+        "min_mean_energy",
+        MIN_MEAN_ENERGY if min_mean_energy is None else min_mean_energy,
+        FRACTION,
     )
     if switched is not None:
         arguments.check_run("switched", switched)
@@ -276,9 +321,14 @@ def judged(
         tr, td = read[0] if tr is None else tr, read[1] if td is None else td
     assert tr is not None
     assert td is not None
-    found, times = answers.verify_of(asked.reference, tr, td, asked.settings), ["--tr", repr(tr), "--td", repr(td)]
+    found, times = (
+        answers.verify_of(asked.reference, tr, td, asked.settings),
+        ["--tr", repr(tr), "--td", repr(td)],
+    )
     if switched is not None and other:
         found = answers.compare_with(found, asked.reference, other, min_mean_energy)
         times += [text for name in switched.sources for text in ("--switched", name)]
-        times += ["--min-mean-energy", repr(min_mean_energy)] * (min_mean_energy != MIN_MEAN_ENERGY)
+        times += ["--min-mean-energy", repr(min_mean_energy)] * (
+            min_mean_energy != MIN_MEAN_ENERGY
+        )
     return Verdict.about(asked, found, *times, compared=switched)

@@ -9,7 +9,13 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _SERIES_NAME: Final = "internal_energy"
-_METHODS_OF_TABLES: Final = ("to_pandas", "to_dataframe", "to_frame", "get_column", "columns")
+_METHODS_OF_TABLES: Final = (
+    "to_pandas",
+    "to_dataframe",
+    "to_frame",
+    "get_column",
+    "columns",
+)
 
 
 def is_table(value: Any) -> bool:
@@ -25,7 +31,9 @@ def is_table(value: Any) -> bool:
     if kind:
         return hasattr(value, "ndim") and kind not in "OUST"
     # of its type: to look at the columns of a lazy frame would compute them
-    return isinstance(value, Mapping) or any(hasattr(type(value), name) for name in _METHODS_OF_TABLES)
+    return isinstance(value, Mapping) or any(
+        hasattr(type(value), name) for name in _METHODS_OF_TABLES
+    )
 
 
 def is_plain_array(table: Any) -> bool:
@@ -53,15 +61,27 @@ def frame_of_table(table: Any) -> pd.DataFrame:
     if isinstance(table, pd.Series):
         return table.to_frame(_SERIES_NAME)
     if hasattr(table, "to_dataframe"):  # xarray; only an array has a name
-        frame = table.to_dataframe(name=_SERIES_NAME) if hasattr(table, "name") else table.to_dataframe()
+        frame = (
+            table.to_dataframe(name=_SERIES_NAME)
+            if hasattr(table, "name")
+            else table.to_dataframe()
+        )
         return pd.DataFrame(frame)
     if hasattr(table, "collect"):  # a frame of polars that is not computed yet
         table = table.collect()
-    if hasattr(table, "columns") and hasattr(table, "get_column"):  # polars, whose own way needs pyarrow
-        return pd.DataFrame({str(name): table.get_column(name).to_numpy() for name in table.columns})
+    if hasattr(table, "columns") and hasattr(
+        table, "get_column"
+    ):  # polars, whose own way needs pyarrow
+        return pd.DataFrame(
+            {str(name): table.get_column(name).to_numpy() for name in table.columns}
+        )
     if hasattr(table, "to_pandas"):  # pyarrow and others
         frame = table.to_pandas()
-        return frame.to_frame(_SERIES_NAME) if isinstance(frame, pd.Series) else pd.DataFrame(frame)
+        return (
+            frame.to_frame(_SERIES_NAME)
+            if isinstance(frame, pd.Series)
+            else pd.DataFrame(frame)
+        )
     if isinstance(table, Mapping):
         return pd.DataFrame({str(name): values for name, values in table.items()})
     kind = getattr(getattr(table, "dtype", None), "kind", "")

@@ -57,7 +57,11 @@ class Caution(NamedTuple):
 
 
 INTERNAL_ERROR: Final = "internal-error"  # what becomes of one of several inputs where it meets an error of the program
-FORESEEN: Final = (D2RPickError, OSError, MemoryError)  # what is no error of the program itself
+FORESEEN: Final = (
+    D2RPickError,
+    OSError,
+    MemoryError,
+)  # what is no error of the program itself
 
 
 def if_written(read: Callable[[], _Read]) -> _Read | None:
@@ -106,7 +110,9 @@ def printable(text: str) -> str:
     import unicodedata
 
     return "".join(
-        letter.encode("unicode_escape").decode() if unicodedata.category(letter) in UNSEEN else letter
+        letter.encode("unicode_escape").decode()
+        if unicodedata.category(letter) in UNSEEN
+        else letter
         for letter in text
     )
 
@@ -125,7 +131,11 @@ def in_rows(ids: Iterable[int]) -> list[str]:
             rows[-1].append(number)
         else:
             rows.append([number])
-    return [text for row in rows for text in ([f"{row[0]}-{row[-1]}"] if len(row) > 2 else map(str, row))]
+    return [
+        text
+        for row in rows
+        for text in ([f"{row[0]}-{row[-1]}"] if len(row) > 2 else map(str, row))
+    ]
 
 
 def name_units(ids: Iterable[int], kind: str = "part") -> str:
@@ -140,7 +150,11 @@ def name_units(ids: Iterable[int], kind: str = "part") -> str:
     """
     every = sorted(set(ids))
     named = in_rows(every)[:_MOST_NAMED]
-    left = len(every) - bisect_right(every, int(named[-1].rpartition("-")[2])) if named else 0
+    left = (
+        len(every) - bisect_right(every, int(named[-1].rpartition("-")[2]))
+        if named
+        else 0
+    )
     return f"{kind}{'s' * (len(every) > 1)} {', '.join(named)}{f' and {left} more' * (left > 0)}"
 
 
@@ -149,7 +163,9 @@ def are(things: Collection[object]) -> str:
     return "is" if len(things) == 1 else "are"
 
 
-def listing(names: Sequence[object], most: int = _MOST_NAMED, between: str = ", ") -> str:
+def listing(
+    names: Sequence[object], most: int = _MOST_NAMED, between: str = ", "
+) -> str:
     """Name things in one line, printable, cut where they would fill the screen.
 
     Examples

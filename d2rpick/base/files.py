@@ -51,7 +51,9 @@ def bound(name: str) -> float:
     except ValueError:
         value = 0.0
     if not value > 0:
-        raise D2RPickError(f"{variable} is {text!r}, a number above 0 was expected; correct it or leave it out")
+        raise D2RPickError(
+            f"{variable} is {text!r}, a number above 0 was expected; correct it or leave it out"
+        )
     return value
 
 
@@ -67,7 +69,9 @@ def beyond(name: str, value: float = float("inf")) -> str:
     if value <= most:
         return ""
     what = f"more than {most:,.10g} {_BOUNDS[name][1]}"
-    return f"{what}; is the file damaged? Copy it again, or set D2RPICK_MAX_{name} higher"
+    return (
+        f"{what}; is the file damaged? Copy it again, or set D2RPICK_MAX_{name} higher"
+    )
 
 
 def unpacked_beyond(packed: int, unpacked: int) -> str:
@@ -97,7 +101,9 @@ def long_line(data: bytes | Searched, most: float | None = None) -> int:
 
 _TRIES: Final = 5  # looks at a file that changes all the time
 _TICK: Final = 50_000_000  # [ns] above the resolution of most files' times: later changes show in them
-_COARSE: Final = 2_000_000_000  # [ns] the resolution of the others, which give whole seconds
+_COARSE: Final = (
+    2_000_000_000  # [ns] the resolution of the others, which give whole seconds
+)
 _SLOWEST: Final = 5  # [ns] for a byte that is written: the times of a file are those when its last write began
 _PAUSE: Final = 0.05  # [s] for a write that may be under way: until it ends, half of it stands in the file
 
@@ -125,9 +131,20 @@ class FileState(NamedTuple):
         """
         now = time.time_ns()
         # Of the two times the modification can be set, to one in the future too, which would never be past.
-        latest = max(found.st_ctime_ns, found.st_mtime_ns if found.st_mtime_ns <= now else 0)
-        settled = now - latest > _TICK + _slowness(latest, 0 if may_grow else found.st_size)
-        return cls(found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns, settled)
+        latest = max(
+            found.st_ctime_ns, found.st_mtime_ns if found.st_mtime_ns <= now else 0
+        )
+        settled = now - latest > _TICK + _slowness(
+            latest, 0 if may_grow else found.st_size
+        )
+        return cls(
+            found.st_dev,
+            found.st_ino,
+            found.st_size,
+            found.st_mtime_ns,
+            found.st_ctime_ns,
+            settled,
+        )
 
     def is_as(self, other: FileState) -> bool:
         """Whether this is the same file, and nothing that shows has changed."""
@@ -135,7 +152,9 @@ class FileState(NamedTuple):
 
     def continues(self, earlier: FileState) -> bool:
         """Whether this is the earlier one, or has grown since; a new file may take an old one's number."""
-        return self.is_as(earlier) or (self[:2] == earlier[:2] and self.size > earlier.size)
+        return self.is_as(earlier) or (
+            self[:2] == earlier[:2] and self.size > earlier.size
+        )
 
 
 def _slowness(changed: int, size: int) -> int:
@@ -152,7 +171,9 @@ def settled_state(file: FileIO, *, may_grow: bool = False) -> FileState | None:
         found = FileState.of(file)
         if found.settled:
             return found
-        time.sleep(_PAUSE + _slowness(found.changed, 0 if may_grow else found.size) * 1e-9)
+        time.sleep(
+            _PAUSE + _slowness(found.changed, 0 if may_grow else found.size) * 1e-9
+        )
         now = FileState.of(file)
         if now.is_as(found) or (may_grow and now.continues(found)):
             return found
@@ -168,12 +189,21 @@ def settled_states(names: Sequence[str], error: type[D2RPickError]) -> list[File
             return states
         time.sleep(_PAUSE + max(_slowness(found.changed, 0) for found in moving) * 1e-9)
         looks = [
-            (found, found if found.settled else _state_of(name)) for name, found in zip(names, states, strict=True)
+            (found, found if found.settled else _state_of(name))
+            for name, found in zip(names, states, strict=True)
         ]
-        states = [found._replace(settled=True) if now.continues(found) else now for found, now in looks]
-    name = next((name for name, found in zip(names, states, strict=True) if not found.settled), None)
+        states = [
+            found._replace(settled=True) if now.continues(found) else now
+            for found, now in looks
+        ]
+    name = next(
+        (name for name, found in zip(names, states, strict=True) if not found.settled),
+        None,
+    )
     if name is not None:
-        raise error(f"{name}: the file keeps changing while it is read; read it again when it is complete")
+        raise error(
+            f"{name}: the file keeps changing while it is read; read it again when it is complete"
+        )
     return states
 
 
@@ -181,19 +211,25 @@ def _state_of(name: str) -> FileState:
     return FileState.of_stat(os.stat(name), may_grow=True)  # noqa: PTH116  of many files
 
 
-def at_rest(name: str, file: FileIO, error: type[D2RPickError], *, may_grow: bool = False) -> FileState | bytes:
+def at_rest(
+    name: str, file: FileIO, error: type[D2RPickError], *, may_grow: bool = False
+) -> FileState | bytes:
     """Give the `settled_state` of a file, or all bytes of a pipe or a terminal, which are read once.
 
     An ``error`` is raised where it changes all the time, or is another device: /dev/zero and /dev/full never end.
     """
     mode = os.fstat(file.fileno()).st_mode
     if stat.S_ISCHR(mode) and not file.isatty():
-        raise error(f"{name}: this is a device; a file, a pipe or a terminal was expected")
+        raise error(
+            f"{name}: this is a device; a file, a pipe or a terminal was expected"
+        )
     if not stat.S_ISREG(mode):
         return file.read()
     state = settled_state(file, may_grow=may_grow)
     if state is None:
-        raise error(f"{name}: the file keeps changing while it is read; read it again when it is complete")
+        raise error(
+            f"{name}: the file keeps changing while it is read; read it again when it is complete"
+        )
     return state
 
 
@@ -239,7 +275,9 @@ def _copy_access(replaced: Path, scratch: Path) -> None:
     if hasattr(os, "chown"):
         with suppress(PermissionError):
             os.chown(scratch, status.st_uid, status.st_gid)
-    scratch.chmod(stat.S_IMODE(status.st_mode))  # after the owner, whose change takes away the bits of set-user-id
+    scratch.chmod(
+        stat.S_IMODE(status.st_mode)
+    )  # after the owner, whose change takes away the bits of set-user-id
 
 
 def append_whole(path: Path, content: bytes, *, durable: bool = False) -> None:

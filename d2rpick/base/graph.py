@@ -10,7 +10,12 @@ if TYPE_CHECKING:
     Node = TypeVar("Node", bound=Hashable)
 
 
-def reached(starts: Iterable[Node], further: Callable[[Node], Iterable[Node]], *, wide: bool = False) -> list[Node]:
+def reached(
+    starts: Iterable[Node],
+    further: Callable[[Node], Iterable[Node]],
+    *,
+    wide: bool = False,
+) -> list[Node]:
     """Give the starts and all that ``further`` leads to, directly or not, each once.
 
     The latest found is followed first; if ``wide`` the earliest, so that the nearest come first.

@@ -18,9 +18,18 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
 
 _OWN, _SHARED = "d2rpick.toml", "pyproject.toml"
-_OF_REPOSITORIES: Final = (".git", ".hg")  # the root of a repository contains one of these
-RULE_KEYS: Final = ("select", "ignore", "severity")  # of the deck check, which takes them from beside each deck
-_UNIMPORTANT: Final = dict.fromkeys(map(ord, " \t\"'"))  # signs around the pieces of a dotted key
+_OF_REPOSITORIES: Final = (
+    ".git",
+    ".hg",
+)  # the root of a repository contains one of these
+RULE_KEYS: Final = (
+    "select",
+    "ignore",
+    "severity",
+)  # of the deck check, which takes them from beside each deck
+_UNIMPORTANT: Final = dict.fromkeys(
+    map(ord, " \t\"'")
+)  # signs around the pieces of a dotted key
 _LONGEST_VALUE: Final = 60  # characters of a value in a message
 
 
@@ -52,13 +61,17 @@ def nearest_settings(folder: str) -> NearestSettings:
                 continue
             if not _is_owned_by_user(source):
                 if name == _OWN or _has_settings(source):
-                    notes.append(f"{source}: not used, since another user owns it; copy it to use its settings")
+                    notes.append(
+                        f"{source}: not used, since another user owns it; copy it to use its settings"
+                    )
                 continue
             table = _read_table(source, shared=name == _SHARED)
             if isinstance(table, Mapping):
                 return NearestSettings(table, source, tuple(notes))
             if table is not None:
-                raise ConfigurationError(f"{source}: the configuration is {toml_text(table)}, a table was expected")
+                raise ConfigurationError(
+                    f"{source}: the configuration is {toml_text(table)}, a table was expected"
+                )
     return NearestSettings({}, "", tuple(notes))
 
 
@@ -72,8 +85,18 @@ def _searched_folders(folder: str) -> Iterator[str]:
         yield folder
         above = os.path.dirname(folder)
         is_top = os.path.dirname(above) == above or not _is_owned_by_user(above)
-        is_home = os.path.exists(home) and os.path.exists(folder) and os.path.samefile(folder, home)
-        if is_top or is_home or any(os.path.exists(os.path.join(folder, name)) for name in _OF_REPOSITORIES):
+        is_home = (
+            os.path.exists(home)
+            and os.path.exists(folder)
+            and os.path.samefile(folder, home)
+        )
+        if (
+            is_top
+            or is_home
+            or any(
+                os.path.exists(os.path.join(folder, name)) for name in _OF_REPOSITORIES
+            )
+        ):
             return
         folder = above
 
@@ -115,7 +138,9 @@ def refuse_unknown(names: Iterable[str], known: Collection[str], source: str) ->
 
             near = difflib.get_close_matches(name, known, n=1)
             hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise ConfigurationError(f"{source}: unknown key {name!r}, one of {', '.join(known)} was expected{hint}")
+            raise ConfigurationError(
+                f"{source}: unknown key {name!r}, one of {', '.join(known)} was expected{hint}"
+            )
 
 
 def _has_settings(path: str) -> bool:
@@ -135,14 +160,18 @@ def _may_have_settings(text: str) -> bool:
 def _read_table(path: str, *, shared: bool) -> object:
     """Read the settings of a TOML file; None if one that is ``shared`` with other tools has none."""
     try:
-        with open(path, encoding="utf-8-sig") as file:  # editors on Windows begin a text with a byte order mark
+        with open(
+            path, encoding="utf-8-sig"
+        ) as file:  # editors on Windows begin a text with a byte order mark
             text = file.read()
         if shared and not _may_have_settings(text):
             return None
         import tomllib
 
         table = tomllib.loads(text)
-        repr(table)  # as a message may show it: Python refuses to write numbers of thousands of digits, or to read them
+        repr(
+            table
+        )  # as a message may show it: Python refuses to write numbers of thousands of digits, or to read them
     except (ValueError, OSError, RecursionError) as error:
         raise ConfigurationError(f"{path}: {error}; valid TOML was expected") from None
     if not shared:

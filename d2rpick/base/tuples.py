@@ -25,10 +25,21 @@ else:
         def __new__(cls, name, bases, body):
             own = body.pop("__annotations__")
             given = {field: body.pop(field) for field in own if field in body}
-            of_bases = [(field, one) for one in bases for field in getattr(one, "_fields", ())]
-            fields = [*(field for field in own if field not in given), *(field for field, _ in of_bases), *given]
-            defaults = [*(one._field_defaults[field] for field, one in of_bases), *given.values()]
-            made = namedtuple(name, fields, defaults=defaults, module=body.pop("__module__"))
+            of_bases = [
+                (field, one) for one in bases for field in getattr(one, "_fields", ())
+            ]
+            fields = [
+                *(field for field in own if field not in given),
+                *(field for field, _ in of_bases),
+                *given,
+            ]
+            defaults = [
+                *(one._field_defaults[field] for field, one in of_bases),
+                *given.values(),
+            ]
+            made = namedtuple(
+                name, fields, defaults=defaults, module=body.pop("__module__")
+            )
             for key in body:
                 setattr(made, key, body[key])
             return made

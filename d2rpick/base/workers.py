@@ -5,10 +5,21 @@ from __future__ import annotations
 import os
 import signal
 import time
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    CancelledError,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
 from concurrent.futures.process import BrokenProcessPool
 from itertools import islice
-from multiprocessing import Pipe, get_all_start_methods, get_context, set_forkserver_preload
+from multiprocessing import (
+    Pipe,
+    get_all_start_methods,
+    get_context,
+    set_forkserver_preload,
+)
 from threading import Thread
 from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeVar
 
@@ -61,7 +72,9 @@ class Farm:
     def __exit__(self, *_: object) -> None:
         """Give up what has not begun."""
 
-    def answers(self, function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Finished]:
+    def answers(
+        self, function: Callable[[Item], Result], items: Iterable[Item]
+    ) -> Iterator[Finished]:
         """Compute ``function`` for all items, taken as there is room; answers come as they are finished."""
         return (_computed(number, function, item) for number, item in enumerate(items))
 
@@ -79,14 +92,18 @@ class Cores(Farm):
     def __init__(self, processes: int, module: str) -> None:
         begin(processes, module)
         self.processes, self.room = processes, (1 + _WAITING) * processes
-        self._held, self._leash = Pipe(duplex=False)  # the processes see when this end of it is closed
+        self._held, self._leash = Pipe(
+            duplex=False
+        )  # the processes see when this end of it is closed
         self._pool = self._new(processes)
 
     def __exit__(self, *_: object) -> None:
         self._pool.shutdown(wait=False, cancel_futures=True)
         self._leash.close()
 
-    def answers(self, function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Finished]:
+    def answers(
+        self, function: Callable[[Item], Result], items: Iterable[Item]
+    ) -> Iterator[Finished]:
         """Compute up to ``room`` calls at a time.
 
         A call whose process died is repeated once, alone: the death breaks a whole pool, and not all of its calls are
@@ -118,7 +135,9 @@ class Cores(Farm):
             self._pool, future = self._begin_pool(self.processes, function, item)
             return future
 
-    def _answer_alone(self, number: int, function: Callable[[Item], Result], item: Item) -> Finished:
+    def _answer_alone(
+        self, number: int, function: Callable[[Item], Result], item: Item
+    ) -> Finished:
         """Compute a call in a pool of its own, so that no other call ends with its process."""
         pool, future = self._begin_pool(1, function, item)
         try:
@@ -138,22 +157,30 @@ class Cores(Farm):
                 pool.shutdown(wait=False)
                 time.sleep(_DYING)
                 reason = " ".join(str(error).split())
-        raise D2RPickError(f"no process can be started ({reason}); is there a limit on their number?")
+        raise D2RPickError(
+            f"no process can be started ({reason}); is there a limit on their number?"
+        )
 
     def _new(self, processes: int) -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(processes, get_context(_METHOD), _begin_work, (self._held,))
+        return ProcessPoolExecutor(
+            processes, get_context(_METHOD), _begin_work, (self._held,)
+        )
 
 
 def _answer(number: int, future: Future[Any]) -> Finished:
     error = future.exception()
     if isinstance(error, BrokenProcessPool):
-        error = D2RPickError("its process ended without a result; was there enough memory?")
+        error = D2RPickError(
+            "its process ended without a result; was there enough memory?"
+        )
     return Finished(number, None if error else future.result(), error)
 
 
 def _begin_work(held: Connection) -> None:
     """End this process, whatever it does, when the other end of ``held`` is closed; without a word on interrupts."""
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a spawned process; a forked one has no such
+    if (
+        signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    ):  # a spawned process; a forked one has no such
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 
     def follow() -> None:
@@ -207,19 +234,25 @@ class Cluster(Farm):
             from distributed import Client
         except ImportError:
             found = "a Dask cluster needs the extra 'dask' of d2rpick"
-            raise D2RPickError(f"{found}; install it with: pip install distributed") from None
+            raise D2RPickError(
+                f"{found}; install it with: pip install distributed"
+            ) from None
         try:
             self._client = Client(address, timeout=patience, set_as_default=False)
         except (OSError, ValueError) as error:
             what = " ".join(str(error).split())
-            raise D2RPickError(f"{address}: no answer from a Dask scheduler ({what}); check the address") from None
+            raise D2RPickError(
+                f"{address}: no answer from a Dask scheduler ({what}); check the address"
+            ) from None
         self.threads = sum(self._client.nthreads().values())
         self.room = max(_LEAST_ON_CLUSTER, (1 + _WAITING) * self.threads)
 
     def __exit__(self, *_: object) -> None:
         self._client.close()
 
-    def answers(self, function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Finished]:
+    def answers(
+        self, function: Callable[[Item], Result], items: Iterable[Item]
+    ) -> Iterator[Finished]:
         """Hand up to ``room`` calls to the scheduler, which repeats them where a worker dies.
 
         They go by the half of it, since each message costs as much as a call.
@@ -227,12 +260,19 @@ class Cluster(Farm):
         from distributed import as_completed
 
         queue, numbers = enumerate(items), dict[str, int]()
-        done = as_completed(loop=self._client.loop, with_results=True, raise_errors=False)
+        done = as_completed(
+            loop=self._client.loop, with_results=True, raise_errors=False
+        )
         while True:
             wanted = self.room - len(numbers)
             if wanted >= self.room // 2 and (more := list(islice(queue, wanted))):
-                begun = self._client.map(function, [item for _, item in more], pure=False)
-                numbers.update((future.key, number) for future, (number, _) in zip(begun, more, strict=True))
+                begun = self._client.map(
+                    function, [item for _, item in more], pure=False
+                )
+                numbers.update(
+                    (future.key, number)
+                    for future, (number, _) in zip(begun, more, strict=True)
+                )
                 done.update(begun)
             if not numbers:
                 return
@@ -246,5 +286,13 @@ def _of_cluster(number: int, status: str, result: Any) -> Finished:
     The status of one that did not may be another by now: its worker may have died since it was asked for the result.
     """
     if isinstance(result, CancelledError):
-        return Finished(number, None, D2RPickError("cancelled by the cluster; is its scheduler still running?"))
-    return Finished(number, None, result[1]) if status == "error" else Finished(number, result, None)
+        return Finished(
+            number,
+            None,
+            D2RPickError("cancelled by the cluster; is its scheduler still running?"),
+        )
+    return (
+        Finished(number, None, result[1])
+        if status == "error"
+        else Finished(number, result, None)
+    )

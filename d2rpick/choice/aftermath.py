@@ -47,7 +47,10 @@ def kept_mean_energy(situation: Situation, candidate: Candidate) -> Kept | None:
     """Bound the mean energy after td for one tr; None if nothing tells it."""
     if situation.at_rest:
         return Kept(1.0, 1.0)
-    ratios = [_ratio(candidate.energy, situation.energy_td, *one) for one in _vibration_energies(situation)]
+    ratios = [
+        _ratio(candidate.energy, situation.energy_td, *one)
+        for one in _vibration_energies(situation)
+    ]
     known = [ratio for ratio in ratios if np.isfinite(ratio)]
     if not known:
         return None
@@ -56,14 +59,23 @@ def kept_mean_energy(situation: Situation, candidate: Candidate) -> Kept | None:
         low, high = low - _OF_SOLVER, high + _OF_SOLVER
     # parts that were not chosen may hand over what they hold
     beside = situation.together.beside.energy
-    return Kept(max(low, 0.0), high + (beside / situation.energy_td if situation.energy_td > 0 else 0.0))
+    return Kept(
+        max(low, 0.0),
+        high + (beside / situation.energy_td if situation.energy_td > 0 else 0.0),
+    )
 
 
-def _ratio(energy_tr: float, energy_td: float, elastic_td: float, whole: float) -> float:
+def _ratio(
+    energy_tr: float, energy_td: float, elastic_td: float, whole: float
+) -> float:
     """Mean energy after td over that of the reference, from the elastic and the whole vibration energy at td [-]."""
     static = max(energy_td - elastic_td, 0.0)
     reference = static + whole / 2
-    return (static + max(energy_tr - static, 0.0) / 2) / reference if reference > 0 else np.nan
+    return (
+        (static + max(energy_tr - static, 0.0) / 2) / reference
+        if reference > 0
+        else np.nan
+    )
 
 
 def _vibration_energies(situation: Situation) -> list[tuple[float, float]]:
@@ -72,7 +84,11 @@ def _vibration_energies(situation: Situation) -> list[tuple[float, float]]:
     if compared is not None:
         elastic = float(compared.deformation.elastic_energy(situation.td))
         whole = float(compared.deformation.vibration_energy(situation.td))
-        scales = (1.0,) if situation.basis == "oscillator" else (1 - _KNOWN_WITHIN, 1 + _KNOWN_WITHIN)
+        scales = (
+            (1.0,)
+            if situation.basis == "oscillator"
+            else (1 - _KNOWN_WITHIN, 1 + _KNOWN_WITHIN)
+        )
         return [(scale * elastic, scale * whole) for scale in scales]
     bounds = vibration_energy_bounds(situation)
     if bounds is None:
@@ -80,9 +96,20 @@ def _vibration_energies(situation: Situation) -> list[tuple[float, float]]:
     time, energy = _energies_in_flight(situation)
     mean = float(np.mean(energy))
     # what damping leaves at td of the mean over the flight
-    left = 1 / float(np.mean(np.exp(np.minimum(-situation.flight.damping * (time - situation.td), _LARGEST_EXPONENT))))
+    left = 1 / float(
+        np.mean(
+            np.exp(
+                np.minimum(
+                    -situation.flight.damping * (time - situation.td), _LARGEST_EXPONENT
+                )
+            )
+        )
+    )
     # half of the whole is the mean above what is static
-    return [(max(situation.energy_td - (mean - whole / 2), 0.0), left * whole) for whole in bounds]
+    return [
+        (max(situation.energy_td - (mean - whole / 2), 0.0), left * whole)
+        for whole in bounds
+    ]
 
 
 def vibration_energy_bounds(situation: Situation) -> tuple[float, float] | None:
@@ -97,13 +124,17 @@ def vibration_energy_bounds(situation: Situation) -> tuple[float, float] | None:
     swing = energy - np.polyval(np.polyfit(since, energy, 2), since)
     largest = max(2 * float(energy.mean()), 0.0)
     least = min(float(np.ptp(swing)), largest)
-    return least, max(least, min(np.sqrt(8 * _MODES_OUT_OF_STEP) * float(swing.std()), largest))
+    return least, max(
+        least, min(np.sqrt(8 * _MODES_OUT_OF_STEP) * float(swing.std()), largest)
+    )
 
 
 def _energies_in_flight(situation: Situation) -> tuple[Samples, Samples]:
     """Times and energies of the flight, up to td if its end is not known [time], [energy]."""
     start, end = situation.flight.start, situation.flight.end
-    return situation.history.between(np.inf if start is None else start, situation.td if end is None else end)
+    return situation.history.between(
+        np.inf if start is None else start, situation.td if end is None else end
+    )
 
 
 class Worth(NamedTuple):
@@ -128,7 +159,9 @@ def worth_of_error(situation: Situation, candidate: Candidate) -> Worth | None:
     compared = situation.vibration.compared
     if compared is not None and candidate.residual is not None:
         residual = max(candidate.residual, candidate.residual_high or 0.0)
-        energy = residual**2 * float(compared.deformation.vibration_energy(situation.td))
+        energy = residual**2 * float(
+            compared.deformation.vibration_energy(situation.td)
+        )
     else:
         bounds = vibration_energy_bounds(situation)
         if bounds is None:

@@ -13,8 +13,21 @@ from d2rpick.base.errors import Caution, RangeError
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.aftermath import Kept, kept_mean_energy
 from d2rpick.choice.candidates import Candidate, Candidates, Pair, judge
-from d2rpick.choice.health import OF_THE_MODEL, assess, cautions_of_engine, cautions_of_health, refuse_unsound
-from d2rpick.choice.quality import EQUALLY_GOOD, ROUNDING, Quality, candidates_at, over_limits, quality_of
+from d2rpick.choice.health import (
+    OF_THE_MODEL,
+    assess,
+    cautions_of_engine,
+    cautions_of_health,
+    refuse_unsound,
+)
+from d2rpick.choice.quality import (
+    EQUALLY_GOOD,
+    ROUNDING,
+    Quality,
+    candidates_at,
+    over_limits,
+    quality_of,
+)
 from d2rpick.choice.situation import OfTd, Situation, examine
 from d2rpick.choice.warnings import (
     POOR_KINETIC_SHARE,
@@ -62,7 +75,13 @@ class Verdict(OfTd):
         """The verdict in a few words."""
         if self.verified and self.situation.basis == "energy":
             return "verified by the energy level alone"
-        return "verified" if self.verified else "unknown" if self.tr_ok is None else "not verified"
+        return (
+            "verified"
+            if self.verified
+            else "unknown"
+            if self.tr_ok is None
+            else "not verified"
+        )
 
     @property
     def quality(self) -> Quality | None:
@@ -77,14 +96,22 @@ class Verdict(OfTd):
         return kept_mean_energy(self.situation, self.candidate)
 
 
-def verify(history: History, tr: float, td: float, settings: Settings, known: Situation | None = None) -> Verdict:
+def verify(
+    history: History,
+    tr: float,
+    td: float,
+    settings: Settings,
+    known: Situation | None = None,
+) -> Verdict:
     """Judge one pair, by what is ``known`` where its td is that one, or nearly so as it is printed.
 
     RangeError when a time lies outside the record or tr is not before td.
     """
     _in_order(tr, td)
     fits = known.fits if known else None
-    return verify_at(known if known and td == known.td else examine(history, td, settings, fits), tr)
+    return verify_at(
+        known if known and td == known.td else examine(history, td, settings, fits), tr
+    )
 
 
 def verify_at(situation: Situation, tr: float) -> Verdict:
@@ -96,8 +123,14 @@ def verify_at(situation: Situation, tr: float) -> Verdict:
     candidate = judged[0]
     known = situation.flight.start is not None
     share = situation.kinetic_share
-    limit = POOR_KINETIC_SHARE if settings.max_kinetic_share is None else settings.max_kinetic_share
-    outside = td > situation.latest_td or (situation.earliest_tr is not None and td <= situation.earliest_tr)
+    limit = (
+        POOR_KINETIC_SHARE
+        if settings.max_kinetic_share is None
+        else settings.max_kinetic_share
+    )
+    outside = td > situation.latest_td or (
+        situation.earliest_tr is not None and td <= situation.earliest_tr
+    )
     td_ok = False if outside else None if share is None else share <= limit
     return Verdict(
         situation=situation,
@@ -112,7 +145,9 @@ def verify_at(situation: Situation, tr: float) -> Verdict:
 
 def _in_order(tr: float, td: float) -> None:
     if not tr < td:
-        raise RangeError(f"tr {tr:g} is not before td {td:g}; the part is rigid from tr to td")
+        raise RangeError(
+            f"tr {tr:g} is not before td {td:g}; the part is rigid from tr to td"
+        )
 
 
 # Pairs at other peaks that may turn out not to verify when the record is examined there, before it is given up.
@@ -151,7 +186,9 @@ class Suggestion(OfTd):
     @property
     def why_none(self) -> str:
         """Why nothing is recommended; empty where a pair is."""
-        return "; ".join(one.message for one in self.cautions if one.code == "no-candidate")
+        return "; ".join(
+            one.message for one in self.cautions if one.code == "no-candidate"
+        )
 
     @property
     def recommended(self) -> Pair | None:
@@ -170,9 +207,13 @@ class Suggestion(OfTd):
         """First and last acceptable tr of each window of them, on any basis [time]."""
         if not self.situation.in_flight:
             return ()
-        from d2rpick.choice.windows import acceptable_windows  # not above: an oscillator does without it
+        from d2rpick.choice.windows import (
+            acceptable_windows,
+        )  # not above: an oscillator does without it
 
-        found = acceptable_windows(self.situation, self.candidates, self.chosen.tr if self.chosen else None)
+        found = acceptable_windows(
+            self.situation, self.candidates, self.chosen.tr if self.chosen else None
+        )
         return tuple((start, end) for start, end in found.tolist())
 
     @cached_property
@@ -181,7 +222,10 @@ class Suggestion(OfTd):
         if self.situation.basis != "energy":
             return None
         flown = self.situation.td - (self.situation.earliest_tr or 0.0)
-        return tuple(AcceptableWindow(low, high, (high - low) / flown) for low, high in self.acceptable_windows)
+        return tuple(
+            AcceptableWindow(low, high, (high - low) / flown)
+            for low, high in self.acceptable_windows
+        )
 
     @property
     def quality(self) -> Quality | None:
@@ -206,8 +250,15 @@ class Suggestion(OfTd):
         if better.residual is not None and own.residual is not None:
             bound = self.chosen.residual_high if self.chosen else None
             uncertain = 0.0 if bound is None else bound - own.residual
-            return better if own.residual - better.residual > max(EQUALLY_GOOD, uncertain) else None
-        levels = [max(self.situation.vibration.whole.energy(td), 0.0) ** 0.5 for td in (better.td, own.td)]
+            return (
+                better
+                if own.residual - better.residual > max(EQUALLY_GOOD, uncertain)
+                else None
+            )
+        levels = [
+            max(self.situation.vibration.whole.energy(td), 0.0) ** 0.5
+            for td in (better.td, own.td)
+        ]
         return better if levels[0] > (1 + EQUALLY_GOOD) * levels[1] else None
 
 
@@ -216,7 +267,9 @@ def suggest(history: History, td: float, settings: Settings) -> Suggestion:
     return suggest_at(examine(history, td, settings))
 
 
-def suggest_at(situation: Situation, *, with_better: bool = True, ranked: Candidates | None = None) -> Suggestion:
+def suggest_at(
+    situation: Situation, *, with_better: bool = True, ranked: Candidates | None = None
+) -> Suggestion:
     """Rank the candidates for tr in a situation that is known, and recommend one; look for a better td too.
 
     ``ranked`` are the candidates in order where they are known, up to the recommended one at least.
@@ -230,7 +283,12 @@ def suggest_at(situation: Situation, *, with_better: bool = True, ranked: Candid
     else:
         cautions.append(Caution("no-candidate", _why_none(situation, candidates)))
     if with_better and not better:
-        cautions.append(Caution("no-better-td", "no peak of the energy in the flight has an acceptable tr"))
+        cautions.append(
+            Caution(
+                "no-better-td",
+                "no peak of the energy in the flight has an acceptable tr",
+            )
+        )
     return Suggestion(situation, candidates, better, tuple(cautions))
 
 
@@ -243,11 +301,21 @@ def find_better_pair(situation: Situation) -> Pair | None:
     if start is None:
         return None
     # where nothing tells the end of the flight, it is not sought beyond td
-    end = situation.td if situation.flight.end is None and not situation.evidence.span else situation.latest_td
+    end = (
+        situation.td
+        if situation.flight.end is None and not situation.evidence.span
+        else situation.latest_td
+    )
     refused = 0
-    for td in sorted(situation.peaks(start, end), key=lambda peak: abs(peak - situation.td)):
+    for td in sorted(
+        situation.peaks(start, end), key=lambda peak: abs(peak - situation.td)
+    ):
         there = situation.at(td)
-        if there.vibration.doubts or _level_refuses(there) or not (best := _saving(there)):
+        if (
+            there.vibration.doubts
+            or _level_refuses(there)
+            or not (best := _saving(there))
+        ):
             continue
         anew = _anew(situation, td)
         best = best if anew.sees_as(there) else _saving(anew)
@@ -263,8 +331,13 @@ def _level_refuses(situation: Situation) -> bool:
     """Whether the level at td alone speaks against any tr: noise makes thousands of peaks below zero, or too high."""
     if situation.basis != "energy":
         return False
-    level, least = situation.energy_td, max(0.0, 1 - situation.settings.tolerance - ROUNDING)
-    return level < -round_off(situation.history) or level * least**2 > most_energy(situation)
+    level, least = (
+        situation.energy_td,
+        max(0.0, 1 - situation.settings.tolerance - ROUNDING),
+    )
+    return level < -round_off(situation.history) or level * least**2 > most_energy(
+        situation
+    )
 
 
 def _saving(situation: Situation) -> Pair | None:
@@ -274,8 +347,12 @@ def _saving(situation: Situation) -> Pair | None:
 
 def _anew(situation: Situation, td: float) -> Situation:
     """Look at the same record for another td, as if that had been asked for."""
-    quick = situation.evidence.span is None  # an oscillator is sought again, why there is none is not
-    return examine(situation.history, td, situation.settings, situation.fits, quick=quick)
+    quick = (
+        situation.evidence.span is None
+    )  # an oscillator is sought again, why there is none is not
+    return examine(
+        situation.history, td, situation.settings, situation.fits, quick=quick
+    )
 
 
 def _holds_as_printed(situation: Situation, tr: float, td: float) -> bool:
@@ -323,25 +400,39 @@ def suggest_of(
     """
     refuse_unsound(reference.history, settings, td)
     if td is None or isinstance(td, tuple):
-        from d2rpick.choice.suggest_td import choose_td  # not above: a td that is given needs no search
+        from d2rpick.choice.suggest_td import (
+            choose_td,
+        )  # not above: a td that is given needs no search
 
         chosen = choose_td(reference.history, td, settings, fits, since, times)
         answer = suggest_at(chosen.situation)
-        answer = replace(answer, td_window=chosen.window, longer=chosen.given_up(answer.recommended))
+        answer = replace(
+            answer, td_window=chosen.window, longer=chosen.given_up(answer.recommended)
+        )
     else:
-        answer = suggest_at(examine(reference.history, td, settings, fits), with_better=with_better)
+        answer = suggest_at(
+            examine(reference.history, td, settings, fits), with_better=with_better
+        )
     return _with_health(answer, reference.run)
 
 
 def verify_of(
-    reference: Reference, tr: float, td: float, settings: Settings, known: Situation | None = None
+    reference: Reference,
+    tr: float,
+    td: float,
+    settings: Settings,
+    known: Situation | None = None,
 ) -> Verdict:
     """Judge one pair of switch times; errors and ``known`` as for `verify`."""
     refuse_unsound(reference.history, settings, td, choosing=False)
-    return _with_health(verify(reference.history, tr, td, settings, known), reference.run)
+    return _with_health(
+        verify(reference.history, tr, td, settings, known), reference.run
+    )
 
 
-def compare_with(verdict: Verdict, reference: Reference, switched: Reference, min_mean: float = 0.0) -> Verdict:
+def compare_with(
+    verdict: Verdict, reference: Reference, switched: Reference, min_mean: float = 0.0
+) -> Verdict:
     """Hold a finished switched run, read in the same way, against the reference by which its times were judged.
 
     ``min_mean`` is the least mean energy after td that is expected, as a share of the reference's [-].
@@ -353,11 +444,14 @@ def compare_with(verdict: Verdict, reference: Reference, switched: Reference, mi
     """
     from d2rpick.choice.comparison import compare
 
-    found = compare(verdict.situation, verdict.candidate.tr, reference, switched, min_mean)
+    found = compare(
+        verdict.situation, verdict.candidate.tr, reference, switched, min_mean
+    )
     return replace(
         verdict,
         switched=found,
-        verified=verdict.verified and not found.objections,  # a wrong motion overrules the verdict
+        verified=verdict.verified
+        and not found.objections,  # a wrong motion overrules the verdict
         reasons=verdict.reasons + found.objections,
         cautions=(*verdict.cautions, *cautions_of_engine(switched.run.sources)),
     )
@@ -368,7 +462,9 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
 
     What comes after td does not matter for the choice.
     """
-    answer = replace(answer, cautions=(*answer.cautions, *cautions_of_engine(run.sources)))
+    answer = replace(
+        answer, cautions=(*answer.cautions, *cautions_of_engine(run.sources))
+    )
     history, td = answer.situation.history, answer.situation.td
     balance = balance_of(run.databases, history.parts, td)
     if balance is None:
@@ -376,11 +472,23 @@ def _with_health(answer: _Answer, run: Run) -> _Answer:
     if isinstance(answer, Verdict):
         start: float | None = answer.candidate.tr
     else:
-        start = answer.recommended.tr if answer.recommended else answer.situation.earliest_tr
+        start = (
+            answer.recommended.tr
+            if answer.recommended
+            else answer.situation.earliest_tr
+        )
     window = None if start is None or start >= td else (start, td)
     locked = history.mean_energy(*window) if window else None
     health, flight = assess(balance, window, locked, td), answer.situation.flight
-    flies = window is not None and flight.within(history.time)[0] <= window[0] and answer.situation.in_flight
+    flies = (
+        window is not None
+        and flight.within(history.time)[0] <= window[0]
+        and answer.situation.in_flight
+    )
     found = cautions_of_health(health, at_rest=answer.situation.at_rest)
-    told: list[Caution] = [one for one in found if not (flies and flight.by_parts and one.code in OF_THE_MODEL)]
+    told: list[Caution] = [
+        one
+        for one in found
+        if not (flies and flight.by_parts and one.code in OF_THE_MODEL)
+    ]
     return replace(answer, health=health, cautions=(*answer.cautions, *told))

@@ -26,7 +26,13 @@ from d2rpick.deck.radioss_files import run_files
 from d2rpick.deck.radioss_run import find_run_windows, read_run
 from d2rpick.deck.reader import Deck, read_deck
 from d2rpick.deck.switching import find_windows, read_switching
-from d2rpick.histories.listings import Timing, ZoneTimes, is_glstat, read_timing, read_zone_times
+from d2rpick.histories.listings import (
+    Timing,
+    ZoneTimes,
+    is_glstat,
+    read_timing,
+    read_zone_times,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -77,9 +83,18 @@ def calibrate(observations: Sequence[Observation]) -> Calibration:
         If there is no leg without rigid parts, or none of its elements has a class with a measured weight.
     """
     deformable = [one for one in observations if not one.rigid_nodes]
-    classes = sorted({name for one in observations for name, count in one.counts.items() if count and name in MEASURED})
+    classes = sorted(
+        {
+            name
+            for one in observations
+            for name, count in one.counts.items()
+            if count and name in MEASURED
+        }
+    )
     if not deformable or not classes:
-        raise ConfigurationError("no leg without rigid parts has elements of a known formulation; give such a run too")
+        raise ConfigurationError(
+            "no leg without rigid parts has elements of a known formulation; give such a run too"
+        )
     start = _start(deformable, classes)
     matrix, right = _rows(observations, classes)
     scaled = matrix * start / right[:, np.newaxis]
@@ -92,20 +107,35 @@ def calibrate(observations: Sequence[Observation]) -> Calibration:
     )  # fmt: skip
     misfit = float(np.sqrt(np.mean((scaled @ found - 1) ** 2)))
     names = (*classes, _REST, _RIGID)
-    return Calibration(weights, tuple(np.array(names)[told].tolist()), misfit, tuple(observations))
+    return Calibration(
+        weights, tuple(np.array(names)[told].tolist()), misfit, tuple(observations)
+    )
 
 
 def _start(deformable: Sequence[Observation], classes: Sequence[str]) -> Samples:
     """Measured weights in the unit of these runs, then the rest per node, then what a node of a rigid body costs."""
-    measured = [sum(MEASURED[name] * one.counts.get(name, 0.0) for name in classes) for one in deformable]
-    elements = [ELEMENT_SHARE * one.total if one.elements is None else one.elements for one in deformable]
+    measured = [
+        sum(MEASURED[name] * one.counts.get(name, 0.0) for name in classes)
+        for one in deformable
+    ]
+    elements = [
+        ELEMENT_SHARE * one.total if one.elements is None else one.elements
+        for one in deformable
+    ]
     scale = float(np.median(np.array(elements) / np.array(measured)))
-    rest = [max(one.total - spent, 1e-6 * one.total) for one, spent in zip(deformable, elements, strict=True)]
+    rest = [
+        max(one.total - spent, 1e-6 * one.total)
+        for one, spent in zip(deformable, elements, strict=True)
+    ]
     per_node = float(np.median(np.array(rest) / [one.nodes for one in deformable]))
-    return np.array([*(scale * MEASURED[name] for name in classes), per_node, scale * RIGID_NODE])
+    return np.array(
+        [*(scale * MEASURED[name] for name in classes), per_node, scale * RIGID_NODE]
+    )
 
 
-def _rows(observations: Sequence[Observation], classes: Sequence[str]) -> tuple[Samples, Samples]:
+def _rows(
+    observations: Sequence[Observation], classes: Sequence[str]
+) -> tuple[Samples, Samples]:
     rows, right = [], []
     for one in observations:
         counts = [one.counts.get(name, 0.0) for name in classes]
@@ -149,7 +179,9 @@ class _Rigid(NamedTuple):
     td: float
 
 
-def observations_of_runs(folders: Sequence[str]) -> tuple[tuple[Observation, ...], tuple[Caution, ...]]:
+def observations_of_runs(
+    folders: Sequence[str],
+) -> tuple[tuple[Observation, ...], tuple[Caution, ...]]:
     """Read what the legs of several runs took; a file of the same content, in a folder named twice or a copy, once.
 
     Raises
@@ -168,11 +200,19 @@ def observations_of_runs(folders: Sequence[str]) -> tuple[tuple[Observation, ...
                 content = hashlib.file_digest(stream, "sha256").hexdigest()
             if content in found:
                 same = found[content][0].name
-                what = "is given twice" if Path(same).samefile(name) else f"has the content of {same}"
-                cautions.append(Caution("same-leg-twice", f"{name} {what}; it counts once"))
+                what = (
+                    "is given twice"
+                    if Path(same).samefile(name)
+                    else f"has the content of {same}"
+                )
+                cautions.append(
+                    Caution("same-leg-twice", f"{name} {what}; it counts once")
+                )
             else:
                 found[content] = tuple(legs)
-    return tuple(one for legs in found.values() for one in legs), tuple(dict.fromkeys(cautions))
+    return tuple(one for legs in found.values() for one in legs), tuple(
+        dict.fromkeys(cautions)
+    )
 
 
 def observations_of(folder: str) -> tuple[Observation, ...]:
@@ -192,9 +232,13 @@ def observations_of(folder: str) -> tuple[Observation, ...]:
     """
     decks = main_decks(folder)
     if len(decks) != 1:
-        count = f"{len(decks)} main decks were found" if decks else "no main deck was found"
+        count = (
+            f"{len(decks)} main decks were found" if decks else "no main deck was found"
+        )
         raise DeckError(f"{folder}: {count}, the folder of one run was expected")
-    found = tuple(_of_radioss(decks[0]) if run_files(decks[0]) else _of_ls_dyna(decks[0]))
+    found = tuple(
+        _of_radioss(decks[0]) if run_files(decks[0]) else _of_ls_dyna(decks[0])
+    )
     if not found:
         wanted = "listings NAME_0001.out of Radioss, d3hsp or glstat were expected"
         raise FormatError(f"{folder}: nothing says what the run took; {wanted}")
@@ -205,26 +249,42 @@ def _of_radioss(deck: str) -> Iterator[Observation]:
     run = read_run(deck)
     inventory = radioss_inventory.read(run)
     windows = find_run_windows(run).windows.windows
-    rigid = [_Rigid(one.unit.id, one.tr, one.td or np.inf) for one in windows if not one.unit.is_body]
+    rigid = [
+        _Rigid(one.unit.id, one.tr, one.td or np.inf)
+        for one in windows
+        if not one.unit.is_body
+    ]
     start = 0.0
     for leg in run.legs:
         listing = Path(deck).parent / f"{leg.name}_{leg.number:04d}.out"
         middle, start = (start + leg.stop.value) / 2, leg.stop.value
         if listing.is_file():
             parts = {one.part for one in rigid if one.tr <= middle < one.td}
-            yield _of_timing(read_timing(str(listing)), inventory, dict.fromkeys(parts, 1.0))
+            yield _of_timing(
+                read_timing(str(listing)), inventory, dict.fromkeys(parts, 1.0)
+            )
 
 
 def _of_ls_dyna(deck: str) -> Iterator[Observation]:
     read = read_deck(deck)
     inventory = ls_dyna_inventory.read(read)
     windows = find_windows(read_switching(read), read_parts(read)).windows
-    rigid = [_Rigid(one.part, one.tr, one.td or np.inf) for one in windows if one.part is not None]
-    for name in sorted(one.name for one in Path(deck).parent.iterdir() if one.is_file()):
+    rigid = [
+        _Rigid(one.part, one.tr, one.td or np.inf)
+        for one in windows
+        if one.part is not None
+    ]
+    for name in sorted(
+        one.name for one in Path(deck).parent.iterdir() if one.is_file()
+    ):
         path = str(Path(deck).parent / name)
         if name == "d3hsp":
             end = _end(read)
-            lasting = {one.part: (min(one.td, end) - one.tr) / end for one in rigid} if end else {}
+            lasting = (
+                {one.part: (min(one.td, end) - one.tr) / end for one in rigid}
+                if end
+                else {}
+            )
             if not rigid or end:
                 yield _of_timing(read_timing(path), inventory, lasting)
         elif name.startswith("glstat") and is_glstat(path):
@@ -238,43 +298,77 @@ def _end(deck: Deck) -> float:
     return float(cards[0].real(rows[0], 0).value) if rows else 0.0
 
 
-def _of_timing(timing: Timing, inventory: Inventory, lasting: Mapping[int, float]) -> Observation:
+def _of_timing(
+    timing: Timing, inventory: Inventory, lasting: Mapping[int, float]
+) -> Observation:
     """Take a leg in which parts were rigid for a fraction of it."""
     counts, nodes = _computed(inventory, lasting)
     cycle = _US / timing.cycles
     return Observation(
-        timing.name, counts, len(inventory.coordinates), nodes, timing.total * cycle, timing.elements * cycle
+        timing.name,
+        counts,
+        len(inventory.coordinates),
+        nodes,
+        timing.total * cycle,
+        timing.elements * cycle,
     )
 
 
-def _of_zones(zones: ZoneTimes, inventory: Inventory, rigid: Sequence[_Rigid]) -> Iterator[Observation]:
+def _of_zones(
+    zones: ZoneTimes, inventory: Inventory, rigid: Sequence[_Rigid]
+) -> Iterator[Observation]:
     """Take the median over states in which the same parts are rigid."""
     number = sum(counts.total() for counts in inventory.counts.values())
     states: dict[frozenset[int], list[float]] = {}
-    for time, per_zone in zip(zones.time.tolist(), zones.per_zone.tolist(), strict=True):
+    for time, per_zone in zip(
+        zones.time.tolist(), zones.per_zone.tolist(), strict=True
+    ):
         now = frozenset(one.part for one in rigid if one.tr < time <= one.td)
         states.setdefault(now, []).append(per_zone)
     for now, times in states.items():
         counts, nodes = _computed(inventory, dict.fromkeys(now, 1.0))
         total = float(np.median(times)) * number * _US
-        yield Observation(zones.name, counts, len(inventory.coordinates), nodes, total, None)
+        yield Observation(
+            zones.name, counts, len(inventory.coordinates), nodes, total, None
+        )
 
 
-def _computed(inventory: Inventory, lasting: Mapping[int, float]) -> tuple[dict[str, float], float]:
+def _computed(
+    inventory: Inventory, lasting: Mapping[int, float]
+) -> tuple[dict[str, float], float]:
     """Deformable elements by class, with their further points, and nodes of rigid bodies, on the average of a leg."""
-    always = {part for part, data in inventory.parts.items() if data.material and data.material.kind == "rigid"}
+    always = {
+        part
+        for part, data in inventory.parts.items()
+        if data.material and data.material.kind == "rigid"
+    }
     computed: dict[str, float] = {}
-    _count(computed, inventory, {part: one for part, one in inventory.counts.items() if part not in always}, 1.0)
+    _count(
+        computed,
+        inventory,
+        {part: one for part, one in inventory.counts.items() if part not in always},
+        1.0,
+    )
     nodes = 0.0
     for fraction in sorted(set(lasting.values())):
         parts = [part for part, value in lasting.items() if value == fraction]
         nodes += fraction * inventory.rigid_nodes(parts)
         within = inventory.elements_within(parts)
-        _count(computed, inventory, {part: one for part, one in within.items() if part not in always}, -fraction)
+        _count(
+            computed,
+            inventory,
+            {part: one for part, one in within.items() if part not in always},
+            -fraction,
+        )
     return computed, nodes
 
 
-def _count(into: dict[str, float], inventory: Inventory, counts: Mapping[int, Mapping[str, int]], times: float) -> None:
+def _count(
+    into: dict[str, float],
+    inventory: Inventory,
+    counts: Mapping[int, Mapping[str, int]],
+    times: float,
+) -> None:
     """Add elements of known cost by their class, so many times."""
     for part, kinds in counts.items():
         for kind, count in kinds.items():

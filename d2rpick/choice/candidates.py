@@ -121,19 +121,33 @@ class Judged:
         """Measure the moments of each situation, and judge them; where nothing vibrates, no measure counts."""
         sizes = [len(one) for one in each]
         ends = [0, *accumulate(sizes)]
-        moments, place = Moments.joined(each), np.repeat(np.arange(len(sizes), dtype=np.int32), sizes)
+        moments, place = (
+            Moments.joined(each),
+            np.repeat(np.arange(len(sizes), dtype=np.int32), sizes),
+        )
         if len(each) == 1:  # of a noisy record, which memory is to hold once
             moments, place = each[0], np.broadcast_to(np.int32(0), sizes[0])
         tr = moments.tr
         energy, known = measured_of([one.vibration for one in situations], tr, ends)
         still = np.array([one.at_rest for one in situations])[place]
-        level_error = measures.level_error(energy, np.array([one.energy_td for one in situations])[place])
+        level_error = measures.level_error(
+            energy, np.array([one.energy_td for one in situations])[place]
+        )
         if still.any():  # beside nothing that vibrates the ratio of two rests of round-off is no error
             level_error[still] = 0.0
-            known = {name: np.where(still, np.nan, column) for name, column in known.items()}
+            known = {
+                name: np.where(still, np.nan, column) for name, column in known.items()
+            }
         turns = situations[0].history.turns
-        few = np.searchsorted(turns, [one.td for one in situations])[place] - np.searchsorted(turns, tr, "right") < 2
-        off = [one.position_errors(tr[slice(*rows)]) for one, rows in zip(situations, pairwise(ends), strict=True)]
+        few = (
+            np.searchsorted(turns, [one.td for one in situations])[place]
+            - np.searchsorted(turns, tr, "right")
+            < 2
+        )
+        off = [
+            one.position_errors(tr[slice(*rows)])
+            for one, rows in zip(situations, pairwise(ends), strict=True)
+        ]
         columns = {
             **known,
             "energy": energy,
@@ -141,12 +155,20 @@ class Judged:
             "same_swing": few & ~still,
             "position_error": off[0] if len(off) == 1 else np.concatenate(off),
         }
-        return cls(situations, place, moments, columns, tuple(objections(situations, place, tr, columns)))
+        return cls(
+            situations,
+            place,
+            moments,
+            columns,
+            tuple(objections(situations, place, tr, columns)),
+        )
 
     @property
     def ends(self) -> list[int]:
         """Where the candidates of each situation begin, and where the last ones end."""
-        ends: list[int] = np.searchsorted(self.place, np.arange(len(self.situations) + 1)).tolist()
+        ends: list[int] = np.searchsorted(
+            self.place, np.arange(len(self.situations) + 1)
+        ).tolist()
         return ends
 
     @property
@@ -164,10 +186,15 @@ class Judged:
         """Which of them are acceptable and keep the limits asked for: the rule of ``suggest`` and ``verify``."""
         settings, found = self.situations[0].settings, self.acceptable
         if settings.max_kinetic_share is not None:
-            shares = [np.inf if one.kinetic_share is None else one.kinetic_share for one in self.situations]
+            shares = [
+                np.inf if one.kinetic_share is None else one.kinetic_share
+                for one in self.situations
+            ]
             found = found & (np.array(shares) <= settings.max_kinetic_share)[self.place]
         if settings.max_residual is not None:
-            found = found & (self.columns["residual"] <= settings.max_residual)  # not where unknown, NaN
+            found = found & (
+                self.columns["residual"] <= settings.max_residual
+            )  # not where unknown, NaN
         return found
 
     @property
@@ -176,7 +203,11 @@ class Judged:
         residual = self.columns["residual"]
         # the least of many that are not known exactly is too good to be true: a wide band counts against it
         doubted = np.sqrt((residual**2 + self.columns["residual_high"] ** 2) / 2)
-        error = np.where(np.isnan(residual), self.columns["level_error"], np.where(self.modal, doubted, residual))
+        error = np.where(
+            np.isnan(residual),
+            self.columns["level_error"],
+            np.where(self.modal, doubted, residual),
+        )
         return np.where(np.isnan(error), np.inf, error)
 
     @property
@@ -187,20 +218,28 @@ class Judged:
     @property
     def near_td(self) -> NDArray[np.bool_]:
         """Which of them, judged by many modes, lie in the last part of the flight up to td, and so save little."""
-        first = [-np.inf if one.earliest_tr is None else one.earliest_tr for one in self.situations]
+        first = [
+            -np.inf if one.earliest_tr is None else one.earliest_tr
+            for one in self.situations
+        ]
         flown = self.td - np.array(first)[self.place]
         return np.asarray(self.modal & (self.td - self.moments.tr < NEAR_TD * flown))
 
     @property
     def out_of_place(self) -> NDArray[np.bool_]:
         """Which of them leave a body so far out of place that it is worth a warning."""
-        limits = [np.inf if one.bodies is None else one.bodies.limit for one in self.situations]
+        limits = [
+            np.inf if one.bodies is None else one.bodies.limit
+            for one in self.situations
+        ]
         return np.asarray(self.columns["position_error"] > np.array(limits)[self.place])
 
     def at(self, rows: NDArray[np.intp]) -> Judged:
         """Keep some that nothing speaks against, in ascending order."""
         columns = {name: column[rows] for name, column in self.columns.items()}
-        return Judged(self.situations, self.place[rows], self.moments.at(rows), columns, ())
+        return Judged(
+            self.situations, self.place[rows], self.moments.at(rows), columns, ()
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -238,10 +277,19 @@ class Candidates(Sequence[Candidate]):
         if self.recommended is None:
             return None
         i = self.order[self.recommended]
-        found = {name: self.judged.columns[name][i].item() for name in ("residual", "level_error", "same_swing")}
+        found = {
+            name: self.judged.columns[name][i].item()
+            for name in ("residual", "level_error", "same_swing")
+        }
         residual = _known(found["residual"])
         error = found["level_error"] if residual is None else residual
-        return Pair(self.judged.moments.tr[i].item(), self.situation.td, residual, error, found["same_swing"])
+        return Pair(
+            self.judged.moments.tr[i].item(),
+            self.situation.td,
+            residual,
+            error,
+            found["same_swing"],
+        )
 
     @property
     def saving(self) -> Pair | None:
@@ -261,7 +309,9 @@ class Candidates(Sequence[Candidate]):
             i = range(len(self))[place]
             return self[i : i + 1][0]
         # how far the true time may lie away is asked of these only: of all it takes longer than the choice
-        reach = self.situation.vibration.reach(_as_found(self.situation, self.judged.moments.at(self.order[place])))
+        reach = self.situation.vibration.reach(
+            _as_found(self.situation, self.judged.moments.at(self.order[place]))
+        )
         return tuple(map(self._candidate, range(len(self))[place], reach.tolist()))
 
     def __iter__(self) -> Iterator[Candidate]:
@@ -270,21 +320,29 @@ class Candidates(Sequence[Candidate]):
     def _candidate(self, rank: int, reach: float) -> Candidate:
         i, situation, found = int(self.order[rank]), self.situation, self.judged
         tr, kind, rising = found.moments[i]
-        values: dict[str, Any] = {name: _known(column[i].item()) for name, column in found.columns.items()}
-        known = values["sign_match"] is not None  # whether its deformation was compared with that at td
+        values: dict[str, Any] = {
+            name: _known(column[i].item()) for name, column in found.columns.items()
+        }
+        known = (
+            values["sign_match"] is not None
+        )  # whether its deformation was compared with that at td
         values["sign_match"] = values["sign_match"] > 0 if known else None
         history, td, energy = situation.history, situation.td, values["energy"]
         if values["position_error"] is not None and situation.bodies:
             values |= _position(situation.bodies.worst(tr, td))
         rigid_fraction = (td - tr) / float(history.time[-1] - history.time[0])
         parts = situation.vibration.part_matches(tr) if known else ()
-        against = tuple(chain.from_iterable(one.told(i) for one in found.objections if one.holds[i]))
+        against = tuple(
+            chain.from_iterable(one.told(i) for one in found.objections if one.holds[i])
+        )
         remarks = _remarks(situation, reach, values if known else {}, parts)
         return Candidate(
             rank=(rank + 1) * self.ranked,
             tr=tr,
             kind=kind,
-            energy_ratio=energy / situation.energy_td if situation.energy_td > 0 and not situation.at_rest else None,
+            energy_ratio=energy / situation.energy_td
+            if situation.energy_td > 0 and not situation.at_rest
+            else None,
             rising=rising,
             rigid_time=td - tr,
             rigid_fraction=rigid_fraction,
@@ -304,7 +362,9 @@ def _known(value: Any) -> Any:
     return None if value != value else value
 
 
-def judged_of(situations: Sequence[Situation], *, in_flight: bool = False, most: int = _MOST) -> Iterator[Judged]:
+def judged_of(
+    situations: Sequence[Situation], *, in_flight: bool = False, most: int = _MOST
+) -> Iterator[Judged]:
     """All crossings of the level before td, extrema near enough to it, and closest matches, judged, in time order.
 
     Where nothing vibrates in the flight, its start alone.  With ``in_flight`` those before the flight, of which none is
@@ -314,9 +374,17 @@ def judged_of(situations: Sequence[Situation], *, in_flight: bool = False, most:
     first, together = 0, 1
     while first < len(situations):
         asked = situations[first : first + together]
-        starts = [one.earliest_tr if in_flight and one.earliest_tr is not None else -np.inf for one in asked]
-        found = moments_of([one.vibration for one in asked], asked[0].settings.tolerance, starts)
-        kept = [_at_start(one) or _distinct(one, moments) for one, moments in zip(asked, found, strict=True)]
+        starts = [
+            one.earliest_tr if in_flight and one.earliest_tr is not None else -np.inf
+            for one in asked
+        ]
+        found = moments_of(
+            [one.vibration for one in asked], asked[0].settings.tolerance, starts
+        )
+        kept = [
+            _at_start(one) or _distinct(one, moments)
+            for one, moments in zip(asked, found, strict=True)
+        ]
         yield Judged.of(asked, kept)
         first += together
         together = max(1, min(_MORE * together, most // max(1, *map(len, kept))))
@@ -348,7 +416,9 @@ def _as_found(situation: Situation, moments: Moments) -> Moments:
         return moments
     nearest = found.at(np.array([np.abs(found.tr - tr).argmin() for tr in moments.tr]))
     same = given & (np.abs(nearest.tr - moments.tr) <= vibration.reach(nearest))
-    return Moments(moments.tr, np.where(same, nearest.kind, moments.kind), moments.rising)
+    return Moments(
+        moments.tr, np.where(same, nearest.kind, moments.kind), moments.rising
+    )
 
 
 def _distinct(situation: Situation, found: Moments) -> Moments:
@@ -357,17 +427,30 @@ def _distinct(situation: Situation, found: Moments) -> Moments:
     if matches.any():
         kept, of_level = ~matches, found.tr[~matches]
         for place in np.flatnonzero(matches).tolist():
-            kept[place] = np.all(np.abs(of_level - found.tr[place]) > situation.history.step)
+            kept[place] = np.all(
+                np.abs(of_level - found.tr[place]) > situation.history.step
+            )
         found = found.at(kept)
-    return found if np.all(found.tr[1:] >= found.tr[:-1]) else found.at(np.argsort(found.tr, kind="stable"))
+    return (
+        found
+        if np.all(found.tr[1:] >= found.tr[:-1])
+        else found.at(np.argsort(found.tr, kind="stable"))
+    )
 
 
-def _remarks(situation: Situation, reach: float, known: Mapping[str, Any], parts: Sequence[PartMatch]) -> Iterator[str]:
+def _remarks(
+    situation: Situation,
+    reach: float,
+    known: Mapping[str, Any],
+    parts: Sequence[PartMatch],
+) -> Iterator[str]:
     """What to know of this tr beside its acceptance."""
     if not (known or situation.vibration.unknown or situation.at_rest):
         yield f"sign, lock-in error and residual unknown: {situation.vibration.undescribed}"
     if known and known["lock_in_error"] > measures.TOLERATED_GROWTH and parts:
-        from d2rpick.vibration.part_signs import main_contributors  # not above: a table has no parts
+        from d2rpick.vibration.part_signs import (
+            main_contributors,
+        )  # not above: a table has no parts
 
         yield f"mismatch of {main_contributors(parts)}"
     if known and known["residual_high"] > known["residual"] + MUCH_HIGHER:

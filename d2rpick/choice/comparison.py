@@ -72,7 +72,11 @@ class Comparison(NamedTuple):
 
 
 def compare(
-    situation: Situation, tr: float, reference: Reference, switched: Reference, min_mean: float = 0.0
+    situation: Situation,
+    tr: float,
+    reference: Reference,
+    switched: Reference,
+    min_mean: float = 0.0,
 ) -> Comparison:
     """Hold a finished switched run against the reference, by the parts that tell how right it is.
 
@@ -94,11 +98,16 @@ def compare(
         situation.latest_td if situation.latest_td > situation.td else np.inf,
         situation.settings.tolerance,
         momenta=(run.momentum(together), _momentum(switched.run, together)),
-        centres=(run.centre(parts), switched.run.centre(parts)) if parts else (None, None),
+        centres=(run.centre(parts), switched.run.centre(parts))
+        if parts
+        else (None, None),
         known=judged.known,
         min_mean=min_mean,
     )
-    return found._replace(objections=(*judged.objections, *found.objections), notes=(*judged.notes, *found.notes))
+    return found._replace(
+        objections=(*judged.objections, *found.objections),
+        notes=(*judged.notes, *found.notes),
+    )
 
 
 def _momentum(run: Run, parts: Sequence[Part] | None) -> Track | None:
@@ -149,7 +158,10 @@ def compare_runs(
     _refuse_few(reference, switched, min(after.size, reference_after.size), td, end)
     before, rest = switched.energy[switched.time < td], switched.between(td, np.inf)[1]
     if before.size and after[0] == before[-1] and _reported_wrong(before[-1], rest[1:]):
-        after, rest = after[1:], rest[1:]  # the switch comes at the first step from td on: this state was still rigid
+        after, rest = (
+            after[1:],
+            rest[1:],
+        )  # the switch comes at the first step from td on: this state was still rigid
     frozen, wanted = float(after[0]), reference.energy_at(td)
     notes = [note for note in switched.notes if note not in reference.notes]
     if before.size and _reported_wrong(before[-1], rest):
@@ -185,13 +197,17 @@ def compare_runs(
     )
 
 
-def _refuse_few(reference: History, switched: History, states: int, td: float, end: float) -> None:
+def _refuse_few(
+    reference: History, switched: History, states: int, td: float, end: float
+) -> None:
     """RangeError where a run holds too few states after td."""
     if states < 3:
         short = min(reference, switched, key=lambda history: history.time[-1])
         name, last = ", ".join(short.source), float(short.time[-1])
         if last <= td:
-            raise RangeError(f"{name}: ends at {last:g}, not after td {td:g}; give the later legs of the run too")
+            raise RangeError(
+                f"{name}: ends at {last:g}, not after td {td:g}; give the later legs of the run too"
+            )
         found = f"fewer than 3 states from td {td:g} to {end:g}"
         raise RangeError(f"{name}: {found}; too few to compare the runs")
 
@@ -201,15 +217,29 @@ def _still(reference: History, switched: History, tr: float, td: float) -> float
     level = float(np.abs(switched.energies_at(np.array((tr + td) / 2))))
     digits = max(SAME * level, switched.energy_precision.quantum(level))
     vibrates, least = _range(reference, tr, td), round_off(reference)
-    return max(digits, least if level + vibrates <= least else min(_STILL * level, _STILL_OF_VIBRATION * vibrates))
+    return max(
+        digits,
+        least
+        if level + vibrates <= least
+        else min(_STILL * level, _STILL_OF_VIBRATION * vibrates),
+    )
 
 
 def _range(history: History, start: float, end: float) -> float:
     """Range of the energy between two times [energy]."""
-    return float(np.ptp(np.append(history.between(start, end)[1], history.energies_at(np.array([start, end])))))
+    return float(
+        np.ptp(
+            np.append(
+                history.between(start, end)[1],
+                history.energies_at(np.array([start, end])),
+            )
+        )
+    )
 
 
-def _rigid_window(switched: History, tr: float, td: float, limit: float) -> tuple[float, float] | None:
+def _rigid_window(
+    switched: History, tr: float, td: float, limit: float
+) -> tuple[float, float] | None:
     """First and last state around the middle of (tr, td) between which the energy stands still; None without any."""
     time, energy = switched.time, switched.energy
     middle = int(np.argmin(np.abs(time - (tr + td) / 2)))
@@ -222,7 +252,12 @@ def _rigid_window(switched: History, tr: float, td: float, limit: float) -> tupl
 
 
 def _not_rigid(
-    reference: History, switched: History, rigid: tuple[float, float] | None, tr: float, td: float, limit: float
+    reference: History,
+    switched: History,
+    rigid: tuple[float, float] | None,
+    tr: float,
+    td: float,
+    limit: float,
 ) -> Iterator[str]:
     """Object when the energy does not stand still from about tr to about td, as far as the states tell.
 
@@ -239,12 +274,19 @@ def _not_rigid(
     def longer(start: float, end: float) -> bool:
         return end - start > room and _range(reference, start, end) > limit
 
-    if rigid[0] > tr + room or rigid[1] < td - room or longer(rigid[0], tr) or longer(td, rigid[1]):
+    if (
+        rigid[0] > tr + room
+        or rigid[1] < td - room
+        or longer(rigid[0], tr)
+        or longer(td, rigid[1])
+    ):
         found = f"the switched run is rigid from {rigid[0]:.6g} to {rigid[1]:.6g} by its energy"
         yield f"{found}, not from tr {tr:g} to td {td:g}"
 
 
-def _not_locked_in(reference: History, tr: float, frozen: float, wanted: float, tolerance: float) -> Iterator[str]:
+def _not_locked_in(
+    reference: History, tr: float, frozen: float, wanted: float, tolerance: float
+) -> Iterator[str]:
     """Object when the energy that came back is not one that the reference has about tr, or not that of td."""
     if max(frozen, wanted) <= round_off(reference):
         return  # nothing vibrates: what nothing is off by means nothing
@@ -288,7 +330,8 @@ def times_of(switched: History, reference: History) -> tuple[float, float]:
     moving = [
         (first, last)
         for first, last in spans
-        if _range(reference, float(time[first]), float(time[last])) > max(least, 2 * limit[first : last + 1].max())
+        if _range(reference, float(time[first]), float(time[last]))
+        > max(least, 2 * limit[first : last + 1].max())
     ]
     if not moving:
         found = "its energy stands still nowhere, or that of the reference does so too"
@@ -306,7 +349,9 @@ def _reported_wrong(rigid: float, after: Samples) -> bool:
     return bool(abs(rigid - after[0]) > max(usual, _REPORTED_OFF * abs(after[0])))
 
 
-def _relative(reference: Track | None, other: Track | None, td: float, end: float) -> float | None:
+def _relative(
+    reference: Track | None, other: Track | None, td: float, end: float
+) -> float | None:
     distance = _distance(reference, other, td, end)
     if reference is None or distance is None:
         return None
@@ -316,7 +361,9 @@ def _relative(reference: Track | None, other: Track | None, td: float, end: floa
     return distance / largest if largest > 0 else None
 
 
-def _distance(reference: Track | None, other: Track | None, td: float, end: float) -> float | None:
+def _distance(
+    reference: Track | None, other: Track | None, td: float, end: float
+) -> float | None:
     """Largest distance of the second track from the first between two times; None where one is missing.
 
     The first state from td on is left out, since it may still be rigid.
@@ -326,5 +373,10 @@ def _distance(reference: Track | None, other: Track | None, td: float, end: floa
     inside = np.flatnonzero((other.time >= td) & (other.time <= end))[1:]
     if not inside.size:
         return None
-    there = [np.interp(other.time[inside], reference.time, column) for column in reference.values.T]
-    return float(np.linalg.norm(other.values[inside] - np.stack(there, axis=1), axis=1).max())
+    there = [
+        np.interp(other.time[inside], reference.time, column)
+        for column in reference.values.T
+    ]
+    return float(
+        np.linalg.norm(other.values[inside] - np.stack(there, axis=1), axis=1).max()
+    )

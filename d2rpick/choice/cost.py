@@ -62,7 +62,9 @@ class Weights:
         for name, value in self.per_element.items():
             _check(f"the weight of {name!r}", value)
         if not any(self.per_element.values()):
-            raise ConfigurationError("no weight is above 0; give the cost of at least one formulation")
+            raise ConfigurationError(
+                "no weight is above 0; give the cost of at least one formulation"
+            )
         if not 0 < self.element_share <= 1:
             raise ConfigurationError(
                 f"element_share is {self.element_share:g}, a number above 0 and up to 1 was expected"
@@ -72,7 +74,9 @@ class Weights:
 
 def _check(name: str, value: float) -> None:
     if not 0 <= value <= _LARGEST:
-        raise ConfigurationError(f"{name} is {value:g}, a number of at least 0 and at most {_LARGEST:g} was expected")
+        raise ConfigurationError(
+            f"{name} is {value:g}, a number of at least 0 and at most {_LARGEST:g} was expected"
+        )
 
 
 def saved_share(weights: Weights, total: float, rigid: float, nodes: int) -> float:
@@ -91,7 +95,11 @@ def saved_share(weights: Weights, total: float, rigid: float, nodes: int) -> flo
     >>> saved_share(Weights({"BT": 1.0}, element_share=0.9, rigid_node=0.0), 100.0, 50.0, 60)
     0.45
     """
-    return max(0.0, (rigid - weights.rigid_node * nodes) * weights.element_share / total) if total else 0.0
+    return (
+        max(0.0, (rigid - weights.rigid_node * nodes) * weights.element_share / total)
+        if total
+        else 0.0
+    )
 
 
 class Amount(NamedTuple):
@@ -122,7 +130,9 @@ class CostModel:
         self.inventory = inventory
         self.weights = weights or Weights()
         self._rigid = {
-            part for part, data in inventory.parts.items() if data.material and data.material.kind == "rigid"
+            part
+            for part, data in inventory.parts.items()
+            if data.material and data.material.kind == "rigid"
         }
 
     def of_part(self, part: int) -> Amount:
@@ -147,7 +157,9 @@ class CostModel:
         rigid = _sum(self._of(part, counts) for part, counts in within.items())
         total = self.total
         nodes = self.inventory.rigid_nodes(set(parts) - self._rigid)
-        return self._share(rigid, saved_share(self.weights, total.cost, rigid.cost, nodes))
+        return self._share(
+            rigid, saved_share(self.weights, total.cost, rigid.cost, nodes)
+        )
 
     @property
     def assumed(self) -> tuple[str, ...]:
@@ -157,7 +169,9 @@ class CostModel:
             for part, counts in self.inventory.counts.items()
             if part not in self._rigid
             for one in (self.inventory.formulation(part, kind) for kind in counts)
-            if one.cost is not None and not one.measured and one.name not in self.weights.per_element
+            if one.cost is not None
+            and not one.measured
+            and one.name not in self.weights.per_element
         )
         return tuple(found)
 
@@ -174,7 +188,9 @@ class CostModel:
                 unknown.append(formulation.name)
             else:
                 points = self.inventory.further_points(part, kind)
-                cost += (weight + points * self.weights.per_element.get(POINT, 0.0)) * count
+                cost += (
+                    weight + points * self.weights.per_element.get(POINT, 0.0)
+                ) * count
         return Amount(cost, tuple(unknown))
 
     def _share(self, own: Amount, value: float) -> Share:
@@ -183,10 +199,16 @@ class CostModel:
             return Share(None, "the deck has no elements")
         if not self.inventory.complete:
             return Share(
-                None, f"not all elements are known: {self.inventory.notes[0]}" if self.inventory.notes else None
+                None,
+                f"not all elements are known: {self.inventory.notes[0]}"
+                if self.inventory.notes
+                else None,
             )
         if unknown := sorted({*own.unknown, *self.total.unknown}):
-            return Share(None, f"no weight is known for {', '.join(unknown)}; give one with `weights`")
+            return Share(
+                None,
+                f"no weight is known for {', '.join(unknown)}; give one with `weights`",
+            )
         return Share(value)
 
 
@@ -219,16 +241,29 @@ def read_weights(path: str) -> Weights:
         found = tomllib.loads(content.decode("utf-8"))
     except (OSError, UnicodeDecodeError, ValueError, RecursionError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise ConfigurationError(f"{path}: cannot be read ({reason}), a TOML file of weights was expected") from None
+        raise ConfigurationError(
+            f"{path}: cannot be read ({reason}), a TOML file of weights was expected"
+        ) from None
     if unknown := [key for key in found if key not in _KEYS]:
-        raise ConfigurationError(f"{path}: {unknown[0]!r} is not a key; expected {', '.join(_KEYS)}")
+        raise ConfigurationError(
+            f"{path}: {unknown[0]!r} is not a key; expected {', '.join(_KEYS)}"
+        )
     per_element = found.get("per_element")
     if not isinstance(per_element, dict) or not per_element:
-        raise ConfigurationError(f"{path}: no table [per_element], the cost of each formulation was expected there")
-    given: dict[str, Any] = {key: _number(path, key, found[key]) for key in _NUMBERS if key in found}
+        raise ConfigurationError(
+            f"{path}: no table [per_element], the cost of each formulation was expected there"
+        )
+    given: dict[str, Any] = {
+        key: _number(path, key, found[key]) for key in _NUMBERS if key in found
+    }
     weights = {name: _number(path, name, value) for name, value in per_element.items()}
     try:
-        return Weights(weights, source=str(found.get("source", path)), file=Source(path, content), **given)
+        return Weights(
+            weights,
+            source=str(found.get("source", path)),
+            file=Source(path, content),
+            **given,
+        )
     except ConfigurationError as error:
         raise ConfigurationError(f"{path}: {error}") from None
 
@@ -246,8 +281,13 @@ def weights_as_toml(weights: Weights) -> str:
     [per_element]
     "BT" = 0.3
     """
-    rows = [f"{_quoted(name)} = {value:.6g}" for name, value in weights.per_element.items()]
-    head = [f"source = {_quoted(weights.source)}", *(f"{name} = {getattr(weights, name):.6g}" for name in _NUMBERS)]
+    rows = [
+        f"{_quoted(name)} = {value:.6g}" for name, value in weights.per_element.items()
+    ]
+    head = [
+        f"source = {_quoted(weights.source)}",
+        *(f"{name} = {getattr(weights, name):.6g}" for name in _NUMBERS),
+    ]
     return "\n".join([*head, "", "[per_element]", *rows])
 
 

@@ -44,12 +44,16 @@ def bodies_of(inventory: Inventory, parts: Collection[int]) -> tuple[RigidBody, 
 
 def _whole(inventory: Inventory, body: tuple[int, ...]) -> bool:
     alone = len(body) == 1 and inventory.solver == "radioss"
-    return alone or frozenset(body) in inventory.ready or pieces_of(inventory, body) == 1
+    return (
+        alone or frozenset(body) in inventory.ready or pieces_of(inventory, body) == 1
+    )
 
 
 def merged(parts: Collection[int], bodies: Iterable[RigidBody]) -> RigidBody:
     """Give the rigid body that parts become which are merged, whatever ``bodies`` they would be."""
-    whole = len(parts) > 1 or any(body.whole for body in bodies)  # a part alone may be of pieces
+    whole = len(parts) > 1 or any(
+        body.whole for body in bodies
+    )  # a part alone may be of pieces
     return RigidBody(tuple(sorted(parts)), whole=whole)
 
 
@@ -59,7 +63,11 @@ def of_another_model(run: Run, inventory: Inventory) -> Caution | None:
     It is not where more of the parts that both have differ in their titles than agree, or where all of the deck was
     read and parts with energy are not in it.
     """
-    titled = [one for one in run.parts if one.id in inventory.parts and one.title and _title(one, inventory)]
+    titled = [
+        one
+        for one in run.parts
+        if one.id in inventory.parts and one.title and _title(one, inventory)
+    ]
     other = [one for one in titled if _differ(one.title, _title(one, inventory))]
     found = _named(other, inventory) if 2 * len(other) > len(titled) else ""
     known = inventory.parts.keys() | inventory.history_groups
@@ -77,24 +85,45 @@ def _has_energy(run: Run, parts: Sequence[Part]) -> bool:
 
 def doubts_of(parts: Iterable[Part], inventory: Inventory) -> Iterator[Caution]:
     """Say so where some parts of a history have other titles in the deck: what it says may be of another model."""
-    other = [part for part in parts if part.id in inventory.parts and _differ(part.title, _title(part, inventory))]
+    other = [
+        part
+        for part in parts
+        if part.id in inventory.parts and _differ(part.title, _title(part, inventory))
+    ]
     if other:
-        yield Caution("deck-of-another-model", f"{_named(other, inventory)}: is this the deck of the run?")
+        yield Caution(
+            "deck-of-another-model",
+            f"{_named(other, inventory)}: is this the deck of the run?",
+        )
 
 
 def doubts_of_bodies(parts: Collection[int], inventory: Inventory) -> Iterator[Caution]:
     """Say so where ties that are not followed may join the rigid bodies that parts become, or one has loose pieces."""
     if inventory.ties and len(inventory.bodies(parts)) > 1:
-        more = f" and {len(inventory.ties) - 1} more ties" if len(inventory.ties) > 1 else ""
+        more = (
+            f" and {len(inventory.ties) - 1} more ties"
+            if len(inventory.ties) > 1
+            else ""
+        )
         found = f"{inventory.ties[0]}{more} may join parts that share no nodes, which is not followed"
-        yield Caution("ties-not-followed", f"{found}; parts that are tied belong in one rigid body")
+        yield Caution(
+            "ties-not-followed",
+            f"{found}; parts that are tied belong in one rigid body",
+        )
     cure = "LS-DYNA makes one rigid body of them: leave these parts out, or give each piece a part of its own"
-    cure = cure if inventory.solver == "ls-dyna" else "each of them needs a rigid body of its own"
+    cure = (
+        cure
+        if inventory.solver == "ls-dyna"
+        else "each of them needs a rigid body of its own"
+    )
     for body in bodies_of(inventory, parts):
         if not (body.whole or inventory.ties):
-            lies = f"{name_units(body.parts)} {'lies' if len(body.parts) == 1 else 'lie'}"
+            lies = (
+                f"{name_units(body.parts)} {'lies' if len(body.parts) == 1 else 'lie'}"
+            )
             yield Caution(
-                "loose-pieces", f"{lies} in {pieces_of(inventory, body.parts)} pieces that nothing joins; {cure}"
+                "loose-pieces",
+                f"{lies} in {pieces_of(inventory, body.parts)} pieces that nothing joins; {cure}",
             )
 
 
@@ -105,11 +134,19 @@ def doubts_of_solver(parts: Collection[int], inventory: Inventory) -> Iterator[C
     yield from (Caution("deck-not-followed", note) for note in inventory.boundary.notes)
     for part in parts:
         if part in inventory.parts and (why := inventory.parts[part].unswitchable):
-            yield Caution("unswitchable-part", f"{name_units([part])}: {why}; leave it out")
-    unturned = [part for part in parts if part in inventory.parts and not inventory.parts[part].section.turns]
+            yield Caution(
+                "unswitchable-part", f"{name_units([part])}: {why}; leave it out"
+            )
+    unturned = [
+        part
+        for part in parts
+        if part in inventory.parts and not inventory.parts[part].section.turns
+    ]
     if unturned and inventory.solver == "radioss":
         found = f"{name_units(unturned)}: the stresses of these solids do not turn with the rigid body"
-        yield Caution("stresses-unturned", f"{found}; expect an error after a large rotation")
+        yield Caution(
+            "stresses-unturned", f"{found}; expect an error after a large rotation"
+        )
 
 
 def left_rigid_in(run: Run, inventory: Inventory) -> Iterator[Caution]:
@@ -117,7 +154,10 @@ def left_rigid_in(run: Run, inventory: Inventory) -> Iterator[Caution]:
     left = inventory.left_rigid
     if left and _has_energy(run, [part for part in run.parts if part.id in left.parts]):
         where = f"{left.place.file}:{left.place.line}"
-        yield Caution(LEFT_RIGID, f"{where}: {left.found}, which deform in the history; {left.way_out}")
+        yield Caution(
+            LEFT_RIGID,
+            f"{where}: {left.found}, which deform in the history; {left.way_out}",
+        )
 
 
 def doubts_of_cost(model: CostModel, *, used: bool = True) -> Iterator[Caution]:
@@ -150,7 +190,9 @@ def _differ(one: str, other: str) -> bool:
     return first[:shorter] != second[:shorter]
 
 
-def with_deck(settings: Settings, reference: Reference, model: CostModel) -> tuple[Settings, tuple[Caution, ...]]:
+def with_deck(
+    settings: Settings, reference: Reference, model: CostModel
+) -> tuple[Settings, tuple[Caution, ...]]:
     """Let the deck tell the cost share of the parts of a history, unless it is given, and which bodies they become.
 
     What stays unknown is in the cautions; the deck of another model tells nothing.
@@ -160,11 +202,20 @@ def with_deck(settings: Settings, reference: Reference, model: CostModel) -> tup
         return replace(settings, bodies=()), (foreign,)
     ids = [part.id for part in reference.history.parts or ()]
     told = (*doubts_of_solver(ids, inventory), *left_rigid_in(reference.run, inventory))
-    ruined = tuple(RUINS[code] for code in dict.fromkeys(one.code for one in told) if code in RUINS)
-    history, settings = reference.history, replace(settings, kept_off=inventory.kept_off, ruined=ruined)
+    ruined = tuple(
+        RUINS[code] for code in dict.fromkeys(one.code for one in told) if code in RUINS
+    )
+    history, settings = (
+        reference.history,
+        replace(settings, kept_off=inventory.kept_off, ruined=ruined),
+    )
     if not history.parts:
         why = "no parts are named whose elements are saved; give them with `parts`"
-        open_ = [Caution("cost-unknown", f"the run time stays open: {why}")] if settings.cost_share is None else []
+        open_ = (
+            [Caution("cost-unknown", f"the run time stays open: {why}")]
+            if settings.cost_share is None
+            else []
+        )
         return replace(settings, bodies=()), (*told, *open_)
     asked = settings.cost_share is None
     share = model.saved(ids) if asked else Share(settings.cost_share)
@@ -182,7 +233,9 @@ def with_deck(settings: Settings, reference: Reference, model: CostModel) -> tup
         *told,
     ]
     if share.reason:
-        doubts.append(Caution("cost-unknown", f"the run time stays open: {share.reason}"))
+        doubts.append(
+            Caution("cost-unknown", f"the run time stays open: {share.reason}")
+        )
     return found, tuple(doubts)
 
 
@@ -195,10 +248,14 @@ def in_deck(run: Run, inventory: Inventory | None) -> Run:
 
 def _surroundings(inventory: Inventory) -> Surroundings:
     by_part, whole = supports_of(inventory)
-    supports: dict[int | None, tuple[Support, ...]] = {part: _supports(holds) for part, holds in by_part.items()}
+    supports: dict[int | None, tuple[Support, ...]] = {
+        part: _supports(holds) for part, holds in by_part.items()
+    }
     supports[None] = _supports(whole)
     gravity: dict[int | None, tuple[float, ...]] = dict(_gravity(inventory))
-    on_free = {gravity.get(part) for part in inventory.nodes_by_part.keys() - by_part.keys()}
+    on_free = {
+        gravity.get(part) for part in inventory.nodes_by_part.keys() - by_part.keys()
+    }
     if len(on_free) == 1 and (common := on_free.pop()) is not None:
         gravity[None] = common
     return Surroundings(gravity, supports, partial(_bodies, inventory))
@@ -236,8 +293,12 @@ def _acts(load: Gravity, part: int, nodes: np.ndarray) -> bool | None:
 def _together(loads: list[Gravity]) -> tuple[float, ...] | None:
     """Sizes of several loads together; None where their sum is not known."""
     if len(loads) < 2:
-        return tuple(sorted({abs(value) for one in loads for value in one.values} or {0.0}))
+        return tuple(
+            sorted({abs(value) for one in loads for value in one.values} or {0.0})
+        )
     if any(one.axis is None or len(one.values) > 1 for one in loads):
         return None
-    along = [sum(one.values[0] for one in loads if one.axis == axis) for axis in range(3)]
+    along = [
+        sum(one.values[0] for one in loads if one.axis == axis) for axis in range(3)
+    ]
     return (float(np.linalg.norm(along)),)

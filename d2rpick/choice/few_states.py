@@ -31,8 +31,14 @@ def cautions_of_few_states(situation: Situation) -> Iterator[Caution]:
     begin = float(history.time[0]) if start is None else start
     states = history.between(begin, td)[0].size
     turns = int(np.count_nonzero((history.turns > begin) & (history.turns < td)))
-    if turns >= _TURNS_PER_PERIOD and states * _TURNS_PER_PERIOD >= MIN_SAMPLES_PER_PERIOD * turns:
+    if (
+        turns >= _TURNS_PER_PERIOD
+        and states * _TURNS_PER_PERIOD >= MIN_SAMPLES_PER_PERIOD * turns
+    ):
         return
     oftener = listing([name for name in _OFTENER if name != history.energy_format])
     found = f"{states} states of the {history.energy_format} up to td = {td:.6g} do not show how the energy swings"
-    yield Caution("few-states", f"{found}, so its level at td is unsure; name what was written more often: {oftener}")
+    yield Caution(
+        "few-states",
+        f"{found}, so its level at td is unsure; name what was written more often: {oftener}",
+    )

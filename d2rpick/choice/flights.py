@@ -23,7 +23,11 @@ _WHERE_IT_VIBRATES: Final = (0.5, 0.75, 0.875)
 
 
 def longest_flight(
-    history: History, settings: Settings, fits: Fits | None = None, *, otherwise: tuple[float, float] | None = None
+    history: History,
+    settings: Settings,
+    fits: Fits | None = None,
+    *,
+    otherwise: tuple[float, float] | None = None,
 ) -> tuple[float, float]:
     """Give the longest flight as a window for td within the record [time].
 
@@ -31,14 +35,22 @@ def longest_flight(
     ``otherwise`` is given where nothing shows a flight; without it that is a RangeError.
     """
     flights = flights_of(history, settings, fits)
-    if settings.landing is not None and (last := _last_before(settings.landing, flights)):
+    if settings.landing is not None and (
+        last := _last_before(settings.landing, flights)
+    ):
         flights = (last,)
     if not flights and otherwise:
         return otherwise
     if not flights:
         held = history.surroundings.held(history.parts, float(history.time[-1]))
-        found = held or "nothing in the record shows a flight, in which td could be chosen"
-        cure = "give `td`" if settings.after is not None else "give the end of the load as `after` where it is known"
+        found = (
+            held or "nothing in the record shows a flight, in which td could be chosen"
+        )
+        cure = (
+            "give `td`"
+            if settings.after is not None
+            else "give the end of the load as `after` where it is known"
+        )
         cure = "only what nothing holds can be switched" if held else cure
         raise RangeError(f"{', '.join(history.source)}: {found}; {cure}")
     windows = [(flight.within(history.time), flight) for flight in flights]
@@ -52,7 +64,9 @@ def last_td(end: float, margin: float) -> float:
     return not_after(sum_as_read(end, -margin)) if margin else end
 
 
-def flights_of(history: History, settings: Settings, fits: Fits | None = None) -> tuple[Flight, ...]:
+def flights_of(
+    history: History, settings: Settings, fits: Fits | None = None
+) -> tuple[Flight, ...]:
     """Find every flight of a record, ascending in time, that of the landing that is given up to there.
 
     Parameters
@@ -76,17 +90,25 @@ def flights_of(history: History, settings: Settings, fits: Fits | None = None) -
     """
     landing = settings.landing
     if landing is None:
-        return _with_given_start(history, settings, _flights_of(history, settings, fits), fits)
+        return _with_given_start(
+            history, settings, _flights_of(history, settings, fits), fits
+        )
     history.check(landing, argument="landing")
     found = _flights_of(history, replace(settings, landing=None), fits)
     last = _last_before(landing, found)
     if last and landing <= last.within(history.time)[1]:
-        found = tuple(one._replace(end=landing) if one is last else one for one in found)
+        found = tuple(
+            one._replace(end=landing) if one is last else one for one in found
+        )
         return _with_given_start(history, settings, found, fits)
     from d2rpick.choice.situation import examine
 
     before = examine(history, landing, settings, fits).flight
-    return _in_order(history, found, before) if before.end == landing and not before.refusal else found
+    return (
+        _in_order(history, found, before)
+        if before.end == landing and not before.refusal
+        else found
+    )
 
 
 def _with_given_start(
@@ -104,10 +126,16 @@ def _with_given_start(
     given = examine(history, (after + end) / 2, settings, fits).flight
     if given.source != "given" or given.refusal or given.start != after:
         return found
-    return _in_order(history, found, given if given.end is not None or end == last else given._replace(end=end))
+    return _in_order(
+        history,
+        found,
+        given if given.end is not None or end == last else given._replace(end=end),
+    )
 
 
-def _in_order(history: History, found: tuple[Flight, ...], given: Flight) -> tuple[Flight, ...]:
+def _in_order(
+    history: History, found: tuple[Flight, ...], given: Flight
+) -> tuple[Flight, ...]:
     """Give flights ascending in time, with the one that is given in place of those that it overlaps."""
     first, last = given.within(history.time)
     windows = ((one, *one.within(history.time)) for one in found)
@@ -117,18 +145,33 @@ def _in_order(history: History, found: tuple[Flight, ...], given: Flight) -> tup
 
 def _last_before(landing: float, flights: Iterable[Flight]) -> Flight | None:
     """Give the last flight that begins before a landing [time]."""
-    return max((one for one in flights if (one.start or 0.0) < landing), key=lambda one: one.start or 0.0, default=None)
+    return max(
+        (one for one in flights if (one.start or 0.0) < landing),
+        key=lambda one: one.start or 0.0,
+        default=None,
+    )
 
 
-def _flights_of(history: History, settings: Settings, fits: Fits | None) -> tuple[Flight, ...]:
+def _flights_of(
+    history: History, settings: Settings, fits: Fits | None
+) -> tuple[Flight, ...]:
     """Find them without a landing: where the energy is all there is, by what describes it, or none."""
     seen = all_seen(history)
     if seen:
         return tuple(
-            Flight(one.start, one.end if one.end_seen else None, source, one.parts, one.damping, gravity=one.gravity)
+            Flight(
+                one.start,
+                one.end if one.end_seen else None,
+                source,
+                one.parts,
+                one.damping,
+                gravity=one.gravity,
+            )
             for source, one in seen
         )
-    from d2rpick.choice.situation import looking  # not above: better evidence than the energy does without it
+    from d2rpick.choice.situation import (
+        looking,
+    )  # not above: better evidence than the energy does without it
 
     look = looking(history, settings, fits)
     if settings.replay and not witnesses(history):
@@ -137,16 +180,22 @@ def _flights_of(history: History, settings: Settings, fits: Fits | None) -> tupl
             flight = look(first + share * (float(history.time[-1]) - first)).flight
             start, end = flight.within(history.time)
             if flight.described and start < end and not flight.refusal:
-                return (flight,)  # it ends with the vibration, also if its start is given
+                return (
+                    flight,
+                )  # it ends with the vibration, also if its start is given
         look = looking(history, replace(settings, replay=False))
     found: list[Flight] = []
-    for td in sorted(moments(history.time), reverse=True):  # the last quiet time before td tells most of the flight
+    for td in sorted(
+        moments(history.time), reverse=True
+    ):  # the last quiet time before td tells most of the flight
         if found and found[-1].start is not None and td > found[-1].start:
             continue
         situation = look(td)
         flight = situation.flight
         # one that lasts into the next misses the load before that one, so its end is not known
-        lasts = found and flight.within(history.time)[1] > found[-1].within(history.time)[0]
+        lasts = (
+            found and flight.within(history.time)[1] > found[-1].within(history.time)[0]
+        )
         if situation.in_flight and not flight.refusal and not lasts:
             found.append(flight)
     return tuple(reversed(found))
@@ -160,17 +209,31 @@ def momentum_of_flight(history: History) -> dict[str, Samples]:
     """
     import numpy as np
 
-    from d2rpick.flight.momentum import all_flights, to_be_asked  # not above: most evidence is found without
+    from d2rpick.flight.momentum import (
+        all_flights,
+        to_be_asked,
+    )  # not above: most evidence is found without
 
-    asked = [one for one in to_be_asked(history.momenta) if np.array_equal(one.time, history.time)]
+    asked = [
+        one
+        for one in to_be_asked(history.momenta)
+        if np.array_equal(one.time, history.time)
+    ]
     if not asked:
         return {}
-    momenta = next((one for one in asked if all_flights(one, history.balance)), asked[0])
+    momenta = next(
+        (one for one in asked if all_flights(one, history.balance)), asked[0]
+    )
     flights, members = all_flights(momenta, history.balance), momenta.chosen
     if flights and momenta.parts:
         longest = max(flights, key=lambda flight: flight.end - flight.start)
-        members = tuple(momenta.parts.index(part) for part in longest.parts or momenta.parts)
+        members = tuple(
+            momenta.parts.index(part) for part in longest.parts or momenta.parts
+        )
     mass = momenta.mass(members)
     name = "velocity" if momenta.velocity else "momentum"
-    columns = {f"{axis}_{name}": column for axis, column in zip("xyz", momenta.of(members).T.copy(), strict=True)}
+    columns = {
+        f"{axis}_{name}": column
+        for axis, column in zip("xyz", momenta.of(members).T.copy(), strict=True)
+    }
     return columns | ({"mass": np.full(history.time.shape, mass)} if mass > 0 else {})

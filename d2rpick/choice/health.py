@@ -99,7 +99,8 @@ def assess(
     peak = _peak(balance)
     if balance.internal is not None and peak is None:
         reason = (
-            "the internal energy never exceeds a millionth of the energy of the run, so shares of it are meaningless"
+            "the internal energy never exceeds a millionth of the energy of the run, so "
+            "shares of it are meaningless"
         )
         return Health(**_ratio(balance), window=window, reason=reason, until=until)
     return Health(
@@ -107,7 +108,9 @@ def assess(
         **_worst_part(balance),
         **_ratio(balance),
         sliding_share=_share(_without_friction(balance), peak),
-        negative_sliding_share=None if balance.sliding is None else _share(-balance.sliding, peak),
+        negative_sliding_share=None
+        if balance.sliding is None
+        else _share(-balance.sliding, peak),
         eroded_share=_share(balance.eroded, peak),
         window=window,
         **(_in_window(balance, *window, locked) if window else {}),
@@ -118,7 +121,9 @@ def assess(
 
 def _too_short(balance: Balance, window: tuple[float, float]) -> str | None:
     """Say so when the work in the window is written, but in too few states to tell a load from gravity."""
-    states = int(np.count_nonzero((balance.time >= window[0]) & (balance.time <= window[1])))
+    states = int(
+        np.count_nonzero((balance.time >= window[0]) & (balance.time <= window[1]))
+    )
     if balance.external_work is None or states >= FEWEST_STATES:
         return None
     return f"the window holds {states} states: at least {FEWEST_STATES} are needed to tell a load from gravity"
@@ -140,7 +145,9 @@ def cautions_of_engine(sources: Collection[str]) -> Iterator[Caution]:
     """Say so where listings beside the files of a run show an engine that reports wrong energies."""
     if not any("T0" in name for name in sources):  # none is a leg of a Radioss run
         return
-    from d2rpick.histories.listings import wrong_energies  # not above: other histories do without it
+    from d2rpick.histories.listings import (
+        wrong_energies,
+    )  # not above: other histories do without it
 
     if found := list(wrong_energies(sources)):
         why = "OpenRadioss from before January 2026 reports a wrong internal energy after /RBODY/ON or /RBODY/OFF"
@@ -154,7 +161,11 @@ def _above(value: float | None, limit: float) -> bool:
 
 def _gains_or_loses(health: Health) -> bool:
     low, high = health.energy_ratio_min, health.energy_ratio_max
-    return low is not None and high is not None and (low < 1 - MOST_IMBALANCE or high > 1 + MOST_IMBALANCE)
+    return (
+        low is not None
+        and high is not None
+        and (low < 1 - MOST_IMBALANCE or high > 1 + MOST_IMBALANCE)
+    )
 
 
 _UNRELIABLE: Final = "do not rely on the internal energy"
@@ -191,14 +202,18 @@ def _peak(balance: Balance) -> float | None:
     """Peak of the internal energy; None where it is unknown or tiny."""
     if balance.internal is None:
         return None
-    most = largest(balance.internal, balance.kinetic, balance.total, balance.external_work)
+    most = largest(
+        balance.internal, balance.kinetic, balance.total, balance.external_work
+    )
     peak = float(balance.internal.max())
     return peak if peak > max(_FLOOR, _TINY_SHARE * most) else None
 
 
 def _share(energy: Samples | None, peak: float | None) -> float | None:
     """Highest value over the peak of the internal energy, 0 where it is never positive."""
-    return None if energy is None or peak is None else max(0.0, float(energy.max())) / peak
+    return (
+        None if energy is None or peak is None else max(0.0, float(energy.max())) / peak
+    )
 
 
 def _without_friction(balance: Balance) -> Samples | None:
@@ -208,7 +223,10 @@ def _without_friction(balance: Balance) -> Samples | None:
 
 
 def _worst_part(balance: Balance) -> dict[str, Any]:
-    least = max(_FLOOR, _SMALL_PART * max((e for _, _, e in balance.hourglass_of_parts), default=0.0))
+    least = max(
+        _FLOOR,
+        _SMALL_PART * max((e for _, _, e in balance.hourglass_of_parts), default=0.0),
+    )
     shares = [(h / e, part) for part, h, e in balance.hourglass_of_parts if e > least]
     if not shares:
         return {}
@@ -220,15 +238,24 @@ def _ratio(balance: Balance) -> dict[str, Any]:
     """Range of the energy ratio, the solver's own or that of its terms, where its reference counts."""
     ratio, total, reference = balance.ratio, _total(balance), None
     if ratio is not None and balance.total is not None:
-        reference = np.divide(balance.total, ratio, out=np.zeros_like(ratio), where=ratio != 0)
+        reference = np.divide(
+            balance.total, ratio, out=np.zeros_like(ratio), where=ratio != 0
+        )
     elif ratio is None and total is not None and balance.external_work is not None:
         reference = total[0] + balance.external_work - balance.external_work[0]
-        ratio = np.divide(total, reference, out=np.ones_like(total), where=reference != 0)
+        ratio = np.divide(
+            total, reference, out=np.ones_like(total), where=reference != 0
+        )
     if ratio is None:
         return {}
     if reference is not None:
-        ratio = ratio[np.abs(reference) >= _COUNTING_REFERENCE * float(np.abs(reference).max())]
-    return {"energy_ratio_min": float(ratio.min()), "energy_ratio_max": float(ratio.max())}
+        ratio = ratio[
+            np.abs(reference) >= _COUNTING_REFERENCE * float(np.abs(reference).max())
+        ]
+    return {
+        "energy_ratio_min": float(ratio.min()),
+        "energy_ratio_max": float(ratio.max()),
+    }
 
 
 def _total(balance: Balance) -> Samples | None:
@@ -238,20 +265,35 @@ def _total(balance: Balance) -> Samples | None:
     if balance.internal is None or balance.kinetic is None:
         return None
     others = (balance.hourglass, balance.sliding, balance.damping, balance.wall)
-    return np.asarray(balance.internal + balance.kinetic + sum(term for term in others if term is not None))
+    return np.asarray(
+        balance.internal
+        + balance.kinetic
+        + sum(term for term in others if term is not None)
+    )
 
 
-def _in_window(balance: Balance, start: float, end: float, locked: float | None) -> dict[str, Any]:
+def _in_window(
+    balance: Balance, start: float, end: float, locked: float | None
+) -> dict[str, Any]:
     """What should not happen in free flight, as shares of the energy there."""
     inside = within(balance.time, start, end)
     if locked is None and balance.internal is not None:
-        locked = float(np.mean(balance.internal[inside])) if balance.time[inside].size else None
+        locked = (
+            float(np.mean(balance.internal[inside]))
+            if balance.time[inside].size
+            else None
+        )
     if locked is None or locked <= _FLOOR:
         return {}
     found = {}
-    for name, energy in (("window_sliding", balance.sliding), ("window_eroded", balance.eroded)):
+    for name, energy in (
+        ("window_sliding", balance.sliding),
+        ("window_eroded", balance.eroded),
+    ):
         if energy is not None and energy[inside].size:
-            open_ = balance.precision.quantum(float(np.abs(energy[inside]).max()))  # by its printed digits
+            open_ = balance.precision.quantum(
+                float(np.abs(energy[inside]).max())
+            )  # by its printed digits
             found[name] = max(0.0, float(np.ptp(energy[inside])) - open_) / locked
     work = work_beyond_gravity(balance, start, end)
     if work is not None:
@@ -271,7 +313,11 @@ _NOTHING: Final = 1e-20
 
 
 def refuse_unsound(
-    history: History, settings: Settings, td: float | tuple[float, float] | None = None, *, choosing: bool = True
+    history: History,
+    settings: Settings,
+    td: float | tuple[float, float] | None = None,
+    *,
+    choosing: bool = True,
 ) -> None:
     """RangeError where no number of the run can be used, and for ``choosing`` where there is nothing to choose by.
 
@@ -281,16 +327,24 @@ def refuse_unsound(
         if choosing or one.code != "nothing-to-judge":
             raise RangeError(f"{', '.join(history.source)}: {one.message}")
     times = {"after": settings.after, "landing": settings.landing}
-    for name, time in {**times, "td_window" if isinstance(td, tuple) else "td": td}.items():
+    for name, time in {
+        **times,
+        "td_window" if isinstance(td, tuple) else "td": td,
+    }.items():
         if time is not None:
-            history.check_unit(*(time if isinstance(time, tuple) else (time,)), argument=name)
+            history.check_unit(
+                *(time if isinstance(time, tuple) else (time,)), argument=name
+            )
 
 
 def unsound(history: History) -> Iterator[Caution]:
     """Say why a run cannot be judged, with stable codes."""
     most = largest(history.energy)
     if most > LARGEST_ENERGY:
-        yield Caution("energy-too-large", f"energies up to {most:g}, at most {LARGEST_ENERGY:g} was expected")
+        yield Caution(
+            "energy-too-large",
+            f"energies up to {most:g}, at most {LARGEST_ENERGY:g} was expected",
+        )
     elif found := _blew_up(history):
         yield Caution("blew-up", found)
     elif _has_nothing(history):
@@ -301,16 +355,32 @@ def unsound(history: History) -> Iterator[Caution]:
 def _blew_up(history: History) -> str | None:
     """Name the time at which the energy exceeds all sense, and by how much; None in a sound run."""
     balance = history.balance
-    if balance is None or balance.kinetic is None or balance.internal is None or balance.time.size <= _FEWEST:
+    if (
+        balance is None
+        or balance.kinetic is None
+        or balance.internal is None
+        or balance.time.size <= _FEWEST
+    ):
         return None
-    time, kinetic, internal = balance.time, np.abs(balance.kinetic), np.abs(balance.internal)
-    earlier = np.searchsorted(time, time - _WITHIN * (time[-1] - time[0]))  # states before the twentieth up to each
-    counted = np.concatenate([[0], np.cumsum(kinetic + internal > 0)])[earlier] >= _FEWEST
+    time, kinetic, internal = (
+        balance.time,
+        np.abs(balance.kinetic),
+        np.abs(balance.internal),
+    )
+    earlier = np.searchsorted(
+        time, time - _WITHIN * (time[-1] - time[0])
+    )  # states before the twentieth up to each
+    counted = (
+        np.concatenate([[0], np.cumsum(kinetic + internal > 0)])[earlier] >= _FEWEST
+    )
     before, deformed = (
-        np.concatenate([[0.0], np.maximum.accumulate(one)])[earlier] for one in (kinetic + internal, internal)
+        np.concatenate([[0.0], np.maximum.accumulate(one)])[earlier]
+        for one in (kinetic + internal, internal)
     )
     gained = counted & (deformed > 0) & (kinetic > _GAIN * before)
-    gained &= (kinetic / _SPEED > internal) & (internal / _TORN > deformed)  # products might overflow
+    gained &= (kinetic / _SPEED > internal) & (
+        internal / _TORN > deformed
+    )  # products might overflow
     if balance.external_work is not None:
         gained &= kinetic > _GAIN * np.abs(balance.external_work)
     at = int(np.argmax(gained))

@@ -31,10 +31,14 @@ class CardRequest(NamedTuple):
     def of(self, history: History) -> tuple[str, Printing]:
         """Name the solver, and say what its card needs."""
         ids = self.printing.part or tuple(part.id for part in history.parts or ())
-        end = float(history.time[-1]) if self.printing.end is None else self.printing.end
+        end = (
+            float(history.time[-1]) if self.printing.end is None else self.printing.end
+        )
         solver = self.solver or solver_of(history.format)
         printing = self.printing._replace(part=ids, end=end)
-        return solver, _pushed(printing, history) if "contact" in SOLVERS[solver].takes else printing
+        return solver, _pushed(printing, history) if "contact" in SOLVERS[
+            solver
+        ].takes else printing
 
     def whom(self, history: History) -> tuple[int, ...]:
         """Give the parts or main nodes that the card switches; none where nobody says it."""
@@ -45,17 +49,25 @@ class CardRequest(NamedTuple):
     def by(self, settings: Settings) -> CardRequest:
         """Let the parts of each rigid body that a deck tells be merged, and what its run keeps off stay off."""
         bodies = tuple(body.parts for body in settings.bodies or ())
-        off = tuple(node for node in settings.kept_off if node not in (*self.printing.node, *self.printing.replaced))
+        off = tuple(
+            node
+            for node in settings.kept_off
+            if node not in (*self.printing.node, *self.printing.replaced)
+        )
         return self._replace(printing=self.printing._replace(bodies=bodies, off=off))
 
 
 def _pushed(printing: Printing, history: History) -> Printing:
     """Say when something pushes the parts, and how fast they come to it, as far as momenta of parts show it."""
-    from d2rpick.flight.contact_times import find_contact_times  # not above: other cards do without
+    from d2rpick.flight.contact_times import (
+        find_contact_times,
+    )  # not above: other cards do without
 
     momenta = next((one for one in history.momenta if one.parts), None)
     found = find_contact_times(momenta) if momenta else None
-    return printing._replace(pushed=found.spans, speed=found.speed) if found else printing
+    return (
+        printing._replace(pushed=found.spans, speed=found.speed) if found else printing
+    )
 
 
 class SolverInput(NamedTuple):
@@ -71,13 +83,20 @@ class SolverInput(NamedTuple):
     refusal: str | None = None
 
 
-def input_for(reference: Reference, situation: Situation, tr: float, request: CardRequest) -> SolverInput:
+def input_for(
+    reference: Reference, situation: Situation, tr: float, request: CardRequest
+) -> SolverInput:
     """Print the card of ``tr`` and the td of a situation, judged as it is printed."""
     solver, _ = request.of(situation.history)
     named = "" if solver == DEFAULT else solver, SOLVERS[solver].switches
     judge = partial(verify_of, reference, settings=situation.settings, known=situation)
     try:
-        found = judged_card([(tr, situation.td)], situation.history, judge, request.by(situation.settings))
+        found = judged_card(
+            [(tr, situation.td)],
+            situation.history,
+            judge,
+            request.by(situation.settings),
+        )
     except D2RPickError as error:
         return SolverInput(*named, refusal=str(error))
     return SolverInput(*named, found[0].text if found else None)
@@ -100,12 +119,18 @@ def judged_card(
     solver, printing = request.of(history)
     every = sorted((*done, *windows))
     plain = cards(every, printing, solver)
-    verdicts = tuple(judge(*times) for asked, times in zip(every, plain.windows, strict=True) if asked not in done)
+    verdicts = tuple(
+        judge(*times)
+        for asked, times in zip(every, plain.windows, strict=True)
+        if asked not in done
+    )
     remarks = tuple(_remarks(done, history, verdicts))
     return cards(every, printing, solver, remarks), verdicts
 
 
-def _remarks(done: Sequence[Times], history: History, verdicts: Sequence[Verdict]) -> Iterator[str]:
+def _remarks(
+    done: Sequence[Times], history: History, verdicts: Sequence[Verdict]
+) -> Iterator[str]:
     """Say which windows were not judged, whose level is not that of the parts, and what was found of the others."""
     if done:
         windows = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in done)
@@ -113,16 +138,26 @@ def _remarks(done: Sequence[Times], history: History, verdicts: Sequence[Verdict
     if history.parts is None and history.channel.replace(" ", "_") == "internal_energy":
         yield "The level is that of the whole model, whatever parts are switched."
     for verdict in verdicts:
-        which = f" {verdict.candidate.tr:.6g} to {verdict.situation.td:.6g}" if len(verdicts) > 1 else ""
+        which = (
+            f" {verdict.candidate.tr:.6g} to {verdict.situation.td:.6g}"
+            if len(verdicts) > 1
+            else ""
+        )
         yield from _judgement(verdict, which)
-    yield from dict.fromkeys(f"{caution.code}: {caution.message}." for one in verdicts for caution in one.cautions)
+    yield from dict.fromkeys(
+        f"{caution.code}: {caution.message}."
+        for one in verdicts
+        for caution in one.cautions
+    )
 
 
 def _judgement(verdict: Verdict, which: str) -> Iterator[str]:
     candidate, history = verdict.candidate, verdict.situation.history
     poor = verdict.quality is not None and verdict.quality.grade == "poor"
     held = f"{verdict.word}{', but of poor quality' * poor}"
-    result = held if verdict.verified else f"NOT verified ({'; '.join(verdict.reasons)})"
+    result = (
+        held if verdict.verified else f"NOT verified ({'; '.join(verdict.reasons)})"
+    )
     yield f"Judged by {', '.join(history.source)}, {history.channel}:{which} {result}."
     if verdict.situation.at_rest:  # no level to match: the warning says so
         return

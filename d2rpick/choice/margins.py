@@ -19,18 +19,27 @@ if TYPE_CHECKING:
 _TIMES: Final = 100
 
 
-def bodies_of(history: History, flight: Flight, settings: Settings, fits: Fits | None = None) -> Bodies | None:
+def bodies_of(
+    history: History, flight: Flight, settings: Settings, fits: Fits | None = None
+) -> Bodies | None:
     """Give how the bodies that the parts become drift in a flight, found once; None where no parts show it."""
     if flight.parts is None:
         return None
-    from d2rpick.flight.position_error import bodies_in_flight  # not above: a table has no parts
+    from d2rpick.flight.position_error import (
+        bodies_in_flight,
+    )  # not above: a table has no parts
 
     known = history.known if fits is None else fits
     told, placement = settings.bodies, settings.placement
-    return known.once(("drift", flight, told), lambda: bodies_in_flight(history, flight, told, placement))
+    return known.once(
+        ("drift", flight, told),
+        lambda: bodies_in_flight(history, flight, told, placement),
+    )
 
 
-def margin_of(history: History, flight: Flight, settings: Settings, fits: Fits | None = None) -> Margin:
+def margin_of(
+    history: History, flight: Flight, settings: Settings, fits: Fits | None = None
+) -> Margin:
     """Give the margin that is asked for, or by how much a switch in the flight may let the contact come earlier."""
     if settings.margin is not None or flight.end is None or flight.start is None:
         return margin_before_contact(history, flight, settings.margin)

@@ -10,7 +10,14 @@ import numpy as np
 from d2rpick.base.errors import Caution, FormatError, RangeError, if_written, listing
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.flights import flights_of
-from d2rpick.choice.health import Health, assess, cautions_of_engine, cautions_of_health, refuse_unsound, unsound
+from d2rpick.choice.health import (
+    Health,
+    assess,
+    cautions_of_engine,
+    cautions_of_health,
+    refuse_unsound,
+    unsound,
+)
 from d2rpick.choice.question import Reference, Settings
 from d2rpick.choice.switched_run import Times, by_the_model, rigid_times
 from d2rpick.flight.momentum import with_parts_by_number
@@ -100,7 +107,10 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
     if deck is not None:
         run, told = _in_deck(run, deck)
     first = run.databases[0]
-    notes = [*run.left_out, *(note for database in run.databases for note in _notes(database))]
+    notes = [
+        *run.left_out,
+        *(note for database in run.databases for note in _notes(database)),
+    ]
     notes += doubts(run.databases)
     notes += run.unused_energies(selection)
     states, time = None, np.empty(0)
@@ -108,8 +118,13 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
         if first.span is not None:
             time = first.time if first.channels else first.part_time
         states = int(time.size)
-    except FormatError as error:  # several columns may be the time: there is still a list of them
-        if first.format == "csv" and if_written(lambda: first.energy_channel) is not None:
+    except (
+        FormatError
+    ) as error:  # several columns may be the time: there is still a list of them
+        if (
+            first.format == "csv"
+            and if_written(lambda: first.energy_channel) is not None
+        ):
             raise  # by its one energy it is known which column is the time: the table cannot be read
         notes.append(str(error))
     steps = np.diff(time)
@@ -125,27 +140,43 @@ def survey(run: Run, selection: Selection, deck: str | None = None) -> Overview:
         time_start=float(time[0]) if time.size else None,
         time_end=float(time[-1]) if time.size else None,
         time_unit=first.time_unit,
-        sampling=Sampling(float(steps.min()), float(median(steps)), float(steps.max())) if steps.size else None,
+        sampling=Sampling(float(steps.min()), float(median(steps)), float(steps.max()))
+        if steps.size
+        else None,
         complete=all(database.complete for database in run.databases),
-        channels=tuple(dict.fromkeys(name for database in run.databases for name in database.channels)),
+        channels=tuple(
+            dict.fromkeys(
+                name for database in run.databases for name in database.channels
+            )
+        ),
         parts=tuple(_overviews(run)),
         flights=flights,
-        should_write=None if states == 0 or any(one.parts for one in run.momenta(None, None)) else _missing(run),
+        should_write=None
+        if states == 0 or any(one.parts for one in run.momenta(None, None))
+        else _missing(run),
         health=_health(run, history, [flight for _, flight in flights], rigid),
         notes=tuple(dict.fromkeys(notes)),
         alarms=(*(unsound(history) if history else ()), *_of_rigid_legs(rigid), *told),
-        contact_forces=tuple(ForceOverview(force.name, force.times) for force in run.contact_forces),
+        contact_forces=tuple(
+            ForceOverview(force.name, force.times) for force in run.contact_forces
+        ),
     )
 
 
 def _in_deck(run: Run, deck: str) -> tuple[Run, tuple[Caution, ...]]:
     """Let a deck tell what acts on a run; DeckError where it cannot be read."""
-    from d2rpick.choice.deck_of_run import doubts_of_solver, in_deck, of_another_model  # not above: few name a deck
+    from d2rpick.choice.deck_of_run import (
+        doubts_of_solver,
+        in_deck,
+        of_another_model,
+    )  # not above: few name a deck
     from d2rpick.deck import read_inventory
 
     inventory = read_inventory(deck)
     foreign = of_another_model(run, inventory)
-    return in_deck(run, inventory), (foreign,) if foreign else tuple(doubts_of_solver((), inventory))
+    return in_deck(run, inventory), (foreign,) if foreign else tuple(
+        doubts_of_solver((), inventory)
+    )
 
 
 def _missing(run: Run) -> str:
@@ -157,7 +188,9 @@ def _missing(run: Run) -> str:
         what = f"{_LS_DYNA}, with the DT of *DATABASE_GLSTAT"
     else:
         momentum = (
-            "" if run.momenta(None, None) else ", at least columns x_momentum, y_momentum, z_momentum of the model"
+            ""
+            if run.momenta(None, None)
+            else ", at least columns x_momentum, y_momentum, z_momentum of the model"
         )
         what = f"the solver's own file instead of a table (Radioss: {_RADIOSS}; LS-DYNA: {_LS_DYNA}){momentum}"
     return f"{what}: only momenta of the parts show for sure when they fly"
@@ -171,10 +204,17 @@ def _notes(database: Legs) -> tuple[str, ...]:
 
 
 def _overviews(run: Run) -> Iterator[PartOverview]:
-    energies = if_written(lambda: run.part_energies(run.parts)) if run.parts else np.empty((0, 0))
+    energies = (
+        if_written(lambda: run.part_energies(run.parts))
+        if run.parts
+        else np.empty((0, 0))
+    )
     if energies is None:  # some parts come and go, so that their columns have holes
         return (PartOverview(part, _highest(run, part)) for part in run.parts)
-    return (PartOverview(part, _most(column)) for part, column in zip(run.parts, energies.T, strict=True))
+    return (
+        PartOverview(part, _most(column))
+        for part, column in zip(run.parts, energies.T, strict=True)
+    )
 
 
 def _highest(run: Run, part: Part) -> float | None:
@@ -192,17 +232,37 @@ def _of_rigid_legs(rigid: Sequence[Times]) -> Iterator[Caution]:
         yield Caution("rigid-legs", f"parts are rigid from {when}: {told}")
 
 
-def _health(run: Run, history: History | None, flights: Sequence[FreeFlight], rigid: Sequence[Times]) -> Health | None:
-    balance = balance_of(run.databases, run.parts, known=history.balance if history else None)
+def _health(
+    run: Run,
+    history: History | None,
+    flights: Sequence[FreeFlight],
+    rigid: Sequence[Times],
+) -> Health | None:
+    balance = balance_of(
+        run.databases, run.parts, known=history.balance if history else None
+    )
     if balance is None or not balance.time.size:
         return None
     if rigid:
-        states = ~np.any([(balance.time >= start) & (balance.time <= end) for start, end in rigid], axis=0)
+        states = ~np.any(
+            [(balance.time >= start) & (balance.time <= end) for start, end in rigid],
+            axis=0,
+        )
         if not states.any():
-            return Health(reason="its legs are rigid: energies mean nothing there", until=float(balance.time[-1]))
-        return assess(replace(rows_of(balance, states), hourglass_of_parts=()), until=float(balance.time[-1]))
+            return Health(
+                reason="its legs are rigid: energies mean nothing there",
+                until=float(balance.time[-1]),
+            )
+        return assess(
+            replace(rows_of(balance, states), hourglass_of_parts=()),
+            until=float(balance.time[-1]),
+        )
     longest = max(flights, key=lambda flight: flight.end - flight.start, default=None)
-    return assess(balance, (longest.start, longest.end) if longest else None, until=float(balance.time[-1]))
+    return assess(
+        balance,
+        (longest.start, longest.end) if longest else None,
+        until=float(balance.time[-1]),
+    )
 
 
 def _history(run: Run, selection: Selection) -> History | None:
@@ -223,7 +283,15 @@ def _flights(history: History) -> tuple[tuple[str, FreeFlight], ...]:
     except RangeError:
         return ()
     return tuple(
-        (flight.source, FreeFlight(*flight.within(history.time), flight.parts, flight.end is not None, flight.damping))
+        (
+            flight.source,
+            FreeFlight(
+                *flight.within(history.time),
+                flight.parts,
+                flight.end is not None,
+                flight.damping,
+            ),
+        )
         for flight in found
         if flight.source
     )

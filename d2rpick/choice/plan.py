@@ -69,7 +69,11 @@ class Planned(NamedTuple):
         """When the parts are rigid, (tr, td) [time]; None where nothing can be recommended."""
         if self.done:
             return self.done.tr, self.done.td
-        pair = self.answer.recommended if self.answer and self.status in ("supported", "re-plan") else None
+        pair = (
+            self.answer.recommended
+            if self.answer and self.status in ("supported", "re-plan")
+            else None
+        )
         return (pair.tr, pair.td) if pair else None
 
     @property
@@ -132,7 +136,11 @@ class Plan:
     @property
     def all_windows(self) -> tuple[Times, ...]:
         """The same of every window that is not done: also those that wait for a switched run [time]."""
-        return tuple(row.window for row in self.flights if row.status in ("supported", "re-plan") and row.window)
+        return tuple(
+            row.window
+            for row in self.flights
+            if row.status in ("supported", "re-plan") and row.window
+        )
 
     @property
     def next_run(self) -> tuple[Times, ...]:
@@ -199,13 +207,21 @@ def plan_of(
     reference = reference._replace(history=history)
     fits = Fits()
     flights = flights_of(history, settings, fits)
-    earlier = before and flights_of(switched_history(before, ())[0], settings)  # it may have been switched itself
+    earlier = before and flights_of(
+        switched_history(before, ())[0], settings
+    )  # it may have been switched itself
     known = done_windows(history, flights, found, earlier)
-    judged: Iterable[Planned] = _rows(reference, flights, settings, shortest, known, fits)
+    judged: Iterable[Planned] = _rows(
+        reference, flights, settings, shortest, known, fits
+    )
     if min_rigid is None:
         judged = _without_short(list(judged))
     rows = tuple(_with_status(list(judged), known))
-    cautions = (*cautions, *cautions_of_engine(reference.run.sources), *_cautions(rows, known))
+    cautions = (
+        *cautions,
+        *cautions_of_engine(reference.run.sources),
+        *_cautions(rows, known),
+    )
     return Plan(history, settings, shortest, rows, cautions, found)
 
 
@@ -233,9 +249,13 @@ def _rows(
         elif last is not None and start < last:
             yield row._replace(reason="before the last window that is done")
         elif settings.after is not None and end <= settings.after:
-            yield row._replace(reason=f"the load ends after it, at {settings.after:.6g}")
+            yield row._replace(
+                reason=f"the load ends after it, at {settings.after:.6g}"
+            )
         elif end - margin.time - start < shortest:
-            yield row._replace(reason=_too_short(end - margin.time - start, shortest, margin))
+            yield row._replace(
+                reason=_too_short(end - margin.time - start, shortest, margin)
+            )
         else:
             yield _asked(reference, row, settings, shortest, landed, fits)
         landed = flight.end
@@ -244,11 +264,20 @@ def _rows(
 def _given(history: History, flight: Flight, after: float | None) -> Flight:
     """Let a flight in which the load is said to end begin there, as ``suggest`` does."""
     start, end = flight.within(history.time)
-    return flight if after is None or not start <= after < end else flight._replace(start=after, source="given")
+    return (
+        flight
+        if after is None or not start <= after < end
+        else flight._replace(start=after, source="given")
+    )
 
 
 def _asked(
-    reference: Reference, row: Planned, settings: Settings, shortest: float, landed: float | None, fits: Fits
+    reference: Reference,
+    row: Planned,
+    settings: Settings,
+    shortest: float,
+    landed: float | None,
+    fits: Fits,
 ) -> Planned:
     """Ask ``suggest`` for the window of a flight, which does not reach back beyond the landing of the one before.
 
@@ -270,12 +299,16 @@ def _asked(
     if answer.recommended is None:
         return row._replace(reason=answer.why_none)
     if answer.recommended.rigid_time < shortest:
-        return row._replace(reason=_too_short(answer.recommended.rigid_time, shortest, row.margin))
+        return row._replace(
+            reason=_too_short(answer.recommended.rigid_time, shortest, row.margin)
+        )
     return row._replace(status="supported")
 
 
 def _too_short(rigid: float, shortest: float, margin: Margin) -> str:
-    kept = f", with the margin {margin.time:.3g} before the contact" if margin.time else ""
+    kept = (
+        f", with the margin {margin.time:.3g} before the contact" if margin.time else ""
+    )
     return f"too short: rigid for {max(rigid, 0.0):.3g}{kept}, at least {shortest:.3g} was asked for"
 
 
@@ -284,7 +317,11 @@ def _without_short(rows: Sequence[Planned]) -> Iterator[Planned]:
     for at, row in enumerate(rows):
         rigid = row.rigid_time or 0.0
         behind = max(rows[at + 1 :], key=lambda one: one.rigid_time or 0.0, default=row)
-        if row.status != "supported" or not row.locks_in or not (behind.rigid_time or 0.0) > _LONGER * rigid:
+        if (
+            row.status != "supported"
+            or not row.locks_in
+            or not (behind.rigid_time or 0.0) > _LONGER * rigid
+        ):
             yield row
             continue
         tr, td = row.window or (0.0, 0.0)
@@ -315,9 +352,21 @@ def _with_status(rows: Sequence[Planned], known: Sequence[Done]) -> Iterator[Pla
 
 def _blocked(rows: Sequence[Planned]) -> Iterator[Caution]:
     """Say so where a short window takes the place of a longer one, which could be supported instead."""
-    first = next((row for row in rows if row.status == "supported" and row.locks_in), None)
-    longest = max((row for row in rows if row.status == "re-plan"), key=lambda row: row.rigid_time or 0, default=None)
-    if first and longest and first.rigid_time and longest.rigid_time and longest.rigid_time > first.rigid_time:
+    first = next(
+        (row for row in rows if row.status == "supported" and row.locks_in), None
+    )
+    longest = max(
+        (row for row in rows if row.status == "re-plan"),
+        key=lambda row: row.rigid_time or 0,
+        default=None,
+    )
+    if (
+        first
+        and longest
+        and first.rigid_time
+        and longest.rigid_time
+        and longest.rigid_time > first.rigid_time
+    ):
         found = f"flight {longest.number} is rigid for {longest.rigid_time:.3g}, flight {first.number} before it for"
         cure = "with a minimal rigid time between the two it would be supported instead"
         yield Caution("longer-window-later", f"{found} {first.rigid_time:.3g}: {cure}")

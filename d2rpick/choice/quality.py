@@ -35,7 +35,9 @@ ROUNDING: Final = 1e-3
 _LIKE_TIMES = 0.1
 
 
-def candidates_at(situations: Sequence[Situation], *, in_flight: bool = False) -> Iterator[Candidates]:
+def candidates_at(
+    situations: Sequence[Situation], *, in_flight: bool = False
+) -> Iterator[Candidates]:
     """Give the candidates of each td of one record, by `judged_of`, best first, one of them recommended."""
     return chain.from_iterable(map(ranked, judged_of(situations, in_flight=in_flight)))
 
@@ -53,9 +55,17 @@ def ranked(judged: Judged) -> Iterator[Candidates]:
     room = np.repeat([like_quality(one) for one in judged.situations], 3)
     places = order(group, judged.error, rigid, judged.out_of_place, room)
     kept = judged.kept[places]
-    for one, (first, last) in zip(judged.situations, pairwise(judged.ends), strict=True):
+    for one, (first, last) in zip(
+        judged.situations, pairwise(judged.ends), strict=True
+    ):
         best = np.flatnonzero(kept[first:last])
-        yield Candidates(one, judged, places[first:last], ranked=True, recommended=int(best[0]) if best.size else None)
+        yield Candidates(
+            one,
+            judged,
+            places[first:last],
+            ranked=True,
+            recommended=int(best[0]) if best.size else None,
+        )
 
 
 def like_quality(situation: Situation) -> float:
@@ -64,7 +74,11 @@ def like_quality(situation: Situation) -> float:
 
 
 def order(
-    group: NDArray[np.int32], error: Samples, rigid: Samples, off: NDArray[np.bool_], room: Samples
+    group: NDArray[np.int32],
+    error: Samples,
+    rigid: Samples,
+    off: NDArray[np.bool_],
+    room: Samples,
 ) -> NDArray[np.intp]:
     """Give the places in the order of the groups, in each the errors within its ``room`` (g,) of the smallest first.
 
@@ -74,10 +88,14 @@ def order(
     good = error <= (_extreme(np.minimum, group, error, room.size) + room)[group]
     longest = _extreme(np.maximum, group, np.where(good, rigid, -np.inf), room.size)
     near = good & (rigid >= (1 - _LIKE_TIMES) * longest[group])
-    return np.lexsort((-rigid, np.where(good, -rigid, error), near & off, good & ~near, ~good, group))
+    return np.lexsort(
+        (-rigid, np.where(good, -rigid, error), near & off, good & ~near, ~good, group)
+    )
 
 
-def _extreme(which: np.ufunc, group: NDArray[np.int32], values: Samples, groups: int) -> Samples:
+def _extreme(
+    which: np.ufunc, group: NDArray[np.int32], values: Samples, groups: int
+) -> Samples:
     """Least or greatest of the values in each of so many groups."""
     found = np.full(groups, np.inf if which is np.minimum else -np.inf)
     which.at(found, group, values)
@@ -112,7 +130,9 @@ _BAND: Final = 0.25
 # pair worse than good, or than fair (docs/validation.md).
 _HARDLY_GOOD, _HARDLY_FAIR = 0.01, 0.05
 _NOT_CERTAIN: Final = "the flight is not certain"
-_UNKNOWN_LOAD: Final = "momentum or energy changes in the flight, by gravity or by another load"
+_UNKNOWN_LOAD: Final = (
+    "momentum or energy changes in the flight, by gravity or by another load"
+)
 
 
 class Grade(NamedTuple):
@@ -150,7 +170,9 @@ class Quality(NamedTuple):
     def reasons(self) -> tuple[str, ...]:
         """Why the grade is none better."""
         both = (self.motion, self.vibration)
-        return tuple(reason for one in both if one.grade == self.grade for reason in one.reasons)
+        return tuple(
+            reason for one in both if one.grade == self.grade for reason in one.reasons
+        )
 
     @property
     def told(self) -> str:
@@ -162,7 +184,9 @@ def quality_of(situation: Situation, best: Candidate) -> Quality:
     """Grade the recommended tr of a td: its motion, and its vibration, also by what its error is worth."""
     flight = situation.flight
     uncertain = () if flight.certain else (_NOT_CERTAIN,)
-    motion = Grade.of((*situation.settings.ruined, *(_UNKNOWN_LOAD,) * flight.unknown_load), uncertain)
+    motion = Grade.of(
+        (*situation.settings.ruined, *(_UNKNOWN_LOAD,) * flight.unknown_load), uncertain
+    )
     if situation.at_rest:
         return Quality(motion, Grade("good"), Grade("good"))
     alone = Grade.of(_poor(situation, best), _fair(best))
@@ -183,7 +207,9 @@ def _weighed(alone: Grade, worth: Worth | None) -> Grade:
 def _poor(situation: Situation, best: Candidate) -> list[str]:
     found = []
     if best.residual is None:
-        found.append(f"how the deformations at tr and td lie to each other is unknown{_refusal(situation)}")
+        found.append(
+            f"how the deformations at tr and td lie to each other is unknown{_refusal(situation)}"
+        )
     elif best.residual > _MOST_FAIR:
         found.append(f"the vibration after td is off by {best.residual:.0%}")
     if situation.basis == "energy":
@@ -200,7 +226,9 @@ def _refusal(situation: Situation) -> str:
 def _of_record(situation: Situation) -> list[str]:
     """Why the samples of the flight up to td are none that a level can be read from."""
     start = situation.flight.start
-    _, energy = situation.history.between(-np.inf if start is None else start, situation.td)
+    _, energy = situation.history.between(
+        -np.inf if start is None else start, situation.td
+    )
     found = []
     if energy.size and energy.min() < MIN_PLASTIC * np.abs(energy).max():
         found.append("the record falls below zero, as no internal energy does")
@@ -216,7 +244,9 @@ def _is_loose(best: Candidate) -> bool:
     """Whether the lock-in error may be above what is good, as far as tr is known."""
     if best.tr_high is None or best.timing_tolerance is None:
         return False
-    return TOLERATED_GROWTH * (best.tr_high - best.tr) > _MOST_GOOD * best.timing_tolerance
+    return (
+        TOLERATED_GROWTH * (best.tr_high - best.tr) > _MOST_GOOD * best.timing_tolerance
+    )
 
 
 def _fair(best: Candidate) -> list[str]:

@@ -33,7 +33,9 @@ class Reference(NamedTuple):
     def of(cls, run: Run, selection: Selection = _DEFAULT) -> Reference:
         """Read what is selected of a run that is open; FormatError when it is not there."""
         if selection.parts:
-            from d2rpick.flight.momentum import with_parts_by_number  # not above: a table has no parts
+            from d2rpick.flight.momentum import (
+                with_parts_by_number,
+            )  # not above: a table has no parts
 
             selection = with_parts_by_number(run, selection)
         return cls(run, run.history(selection))
@@ -43,10 +45,14 @@ class Reference(NamedTuple):
         ids = tuple(str(part.id) for part in self.history.parts or ())
         springs = tuple(str(part.id) for part in self.history.springs)
         run = run.within(self.run.surroundings)
-        return Reference.of(run, selection._replace(parts=ids, springs=springs) if ids else selection)
+        return Reference.of(
+            run, selection._replace(parts=ids, springs=springs) if ids else selection
+        )
 
 
-def read(names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto") -> Reference:
+def read(
+    names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto"
+) -> Reference:
     """Open the files of a run and read what is selected; arguments and errors as of `open_run`."""
     return Reference.of(open_run(names, selection, input_format), selection)
 
@@ -94,4 +100,8 @@ class Settings:
     def run_time_share(self, rigid_fraction: float) -> float | None:
         """Give the expected run time over that of the reference [-]; None where the cost share is not known."""
         share = self.cost_share
-        return None if share is None else run_time_share(rigid_fraction, share, self.step_ratio)
+        return (
+            None
+            if share is None
+            else run_time_share(rigid_fraction, share, self.step_ratio)
+        )

@@ -23,7 +23,13 @@ from d2rpick.choice.deck_of_run import (
     of_another_model,
 )
 from d2rpick.choice.question import Reference
-from d2rpick.choice.switchable_parts import PartRow, RunFacts, facts_of, rows_of, step_growth
+from d2rpick.choice.switchable_parts import (
+    PartRow,
+    RunFacts,
+    facts_of,
+    rows_of,
+    step_growth,
+)
 from d2rpick.choice.warnings import out_of_place
 from d2rpick.deck.geometry import Placement
 from d2rpick.flight.momentum import with_parts_by_number
@@ -155,13 +161,22 @@ def parts_of(
     comparison = _Comparison(run, settings, model, rows)
     sets: list[PartSet] = []
     for one in _sets(rows, given):
-        td = next((other.window[1] for other in sets if other.window), None)  # the same for all, to be compared
+        td = next(
+            (other.window[1] for other in sets if other.window), None
+        )  # the same for all, to be compared
         sets.append(comparison.of(one, times or td))
-        left = tuple(part for part in one.parts if part not in sets[-1].moving) if one.name == _ALL else ()
+        left = (
+            tuple(part for part in one.parts if part not in sets[-1].moving)
+            if one.name == _ALL
+            else ()
+        )
         if left and sets[-1].moving:  # they may fly longer without what moves
             sets.append(comparison.of(PartSet(_STILL, left), times))
     found = tuple(_with_recommendation(_distinct(sets)))
-    cautions = (*((foreign,) if foreign else ()), *_cautions(run, facts, model, rows, found))
+    cautions = (
+        *((foreign,) if foreign else ()),
+        *_cautions(run, facts, model, rows, found),
+    )
     inventory, weights = (model.inventory, model.weights) if model else (None, None)
     return Parts(run, inventory, weights, settings, facts, rows, found, cautions)
 
@@ -178,19 +193,29 @@ def given_parts(run: Run, names: Sequence[str]) -> tuple[int, ...]:
         return ()
     if asks_for_recommended(names, run.parts):
         what = "name a set that it is compared with, by numbers or titles of parts, 'flying' or 'all'"
-        raise FormatError(f"{run.name}: the recommended set is what is looked for here; {what}")
+        raise FormatError(
+            f"{run.name}: the recommended set is what is looked for here; {what}"
+        )
     numbers = with_parts_by_number(run, Selection(parts=tuple(names))).parts
     return tuple(part.id for part in select_parts(numbers, run.parts, run.name))
 
 
-def recommended_parts(run: Run, settings: Settings, model: CostModel) -> tuple[int, ...]:
+def recommended_parts(
+    run: Run, settings: Settings, model: CostModel
+) -> tuple[int, ...]:
     """Give the parts of the recommended set; FormatError where none can be recommended."""
     found = parts_of(run, settings, model)
     if found.recommended is None:
         if found.facts.reason:
             raise FormatError(found.facts.reason)
-        absent = [one.message for one in found.cautions if one.code == "parts-not-in-deck"]
-        why = "; ".join(dict.fromkeys([*absent, *(reason for one in found.sets for reason in one.reasons)]))
+        absent = [
+            one.message for one in found.cautions if one.code == "parts-not-in-deck"
+        ]
+        why = "; ".join(
+            dict.fromkeys(
+                [*absent, *(reason for one in found.sets for reason in one.reasons)]
+            )
+        )
         raise FormatError(
             f"{run.name}: no set of parts can be recommended ({why or 'no part may be switched'}); name the parts"
         )
@@ -199,7 +224,11 @@ def recommended_parts(run: Run, settings: Settings, model: CostModel) -> tuple[i
 
 def _distinct(sets: Sequence[PartSet]) -> list[PartSet]:
     """Leave out what is there already under another name."""
-    return [one for at, one in enumerate(sets) if one.parts not in [other.parts for other in sets[:at]]]
+    return [
+        one
+        for at, one in enumerate(sets)
+        if one.parts not in [other.parts for other in sets[:at]]
+    ]
 
 
 def _sets(rows: Sequence[PartRow], given: Sequence[int]) -> Iterator[PartSet]:
@@ -212,7 +241,11 @@ def _sets(rows: Sequence[PartRow], given: Sequence[int]) -> Iterator[PartSet]:
         "heavy": _heavy(movable),
         "given": [row for row in rows if row.id in given],
     }
-    yield from (PartSet(name, tuple(row.id for row in members)) for name, members in named.items() if members)
+    yield from (
+        PartSet(name, tuple(row.id for row in members))
+        for name, members in named.items()
+        if members
+    )
 
 
 def _heavy(movable: Sequence[PartRow]) -> list[PartRow]:
@@ -253,19 +286,28 @@ class _Comparison:
         except (FormatError, RangeError) as error:
             reasons.append(str(error))
         if one.rigid_fraction is not None and one.cost_share is not None:
-            run_time = run_time_share(one.rigid_fraction, one.cost_share, self.settings.step_ratio)
+            run_time = run_time_share(
+                one.rigid_fraction, one.cost_share, self.settings.step_ratio
+            )
             one = one._replace(run_time_share=run_time)
-        return one._replace(reasons=tuple(reason for reason in (*reasons, *one.reasons) if reason))
+        return one._replace(
+            reasons=tuple(reason for reason in (*reasons, *one.reasons) if reason)
+        )
 
     def _with_cost(self, one: PartSet, inventory: Inventory, share: Share) -> PartSet:
-        within = {part: counts.total() for part, counts in inventory.elements_within(one.parts).items()}
+        within = {
+            part: counts.total()
+            for part, counts in inventory.elements_within(one.parts).items()
+        }
         whole = {part: counts.total() for part, counts in inventory.counts.items()}
         rigid = {part for part, count in within.items() if count == whole[part]}
         return one._replace(
             bodies=inventory.bodies(one.parts),
             moving=self._loose(inventory, one.parts),
             elements=sum(within.values()),
-            element_fraction=sum(within.values()) / sum(whole.values()) if whole else None,
+            element_fraction=sum(within.values()) / sum(whole.values())
+            if whole
+            else None,
             mass_fraction=self._mass_fraction(one.parts),
             cost_share=share.value,
             step_growth=step_growth(self.rows, {*one.parts, *rigid}),
@@ -273,16 +315,26 @@ class _Comparison:
 
     def _mass_fraction(self, parts: Sequence[int]) -> float | None:
         """Share of the mass of all parts that fly; None where one is not known."""
-        masses = {row.id: row.mass for row in self.rows if row.flight and row.flight.flies}
+        masses = {
+            row.id: row.mass for row in self.rows if row.flight and row.flight.flies
+        }
         known = {part: mass for part, mass in masses.items() if mass is not None}
-        if len(known) < len(masses) or not set(parts) <= known.keys() or not sum(known.values()):
+        if (
+            len(known) < len(masses)
+            or not set(parts) <= known.keys()
+            or not sum(known.values())
+        ):
             return None
         return sum(known[part] for part in parts) / sum(known.values())
 
     def _loose(self, inventory: Inventory, parts: Sequence[int]) -> frozenset[int]:
         """Parts of other rigid bodies than the heaviest; none where ties that are not followed may join these."""
         masses = {row.id: row.mass or 0.0 for row in self.rows}
-        main = max(inventory.bodies(parts), key=lambda body: sum(masses.get(part, 0.0) for part in body), default=())
+        main = max(
+            inventory.bodies(parts),
+            key=lambda body: sum(masses.get(part, 0.0) for part in body),
+            default=(),
+        )
         return frozenset() if inventory.ties else frozenset(parts) - {*main}
 
     def _with_window(self, one: PartSet, times: Times | float | None) -> PartSet:
@@ -297,16 +349,25 @@ class _Comparison:
             answer = suggest_of(reference, times, settings, with_better=False)
             if answer.recommended is None:
                 raise RangeError(answer.why_none)
-            situation, (tr, td) = answer.situation, (answer.recommended.tr, answer.recommended.td)
+            situation, (tr, td) = (
+                answer.situation,
+                (answer.recommended.tr, answer.recommended.td),
+            )
         time = reference.history.time
-        one = one._replace(window=(tr, td), rigid_fraction=(td - tr) / float(time[-1] - time[0]))
+        one = one._replace(
+            window=(tr, td), rigid_fraction=(td - tr) / float(time[-1] - time[0])
+        )
         return _with_position(one, situation, tr)
 
 
 def _with_position(one: PartSet, situation: Situation, tr: float) -> PartSet:
     """Add how far the body that is off most is out of place at td since its parts moved against each other before."""
     told = ("several-bodies", "moves-apart")
-    why = tuple(caution.message for caution in out_of_place(situation, tr) if caution.code in told)
+    why = tuple(
+        caution.message
+        for caution in out_of_place(situation, tr)
+        if caution.code in told
+    )
     bodies = situation.bodies
     worst = bodies.worst(tr, situation.td) if bodies else None
     if bodies is None or worst is None:
@@ -322,7 +383,11 @@ def _with_position(one: PartSet, situation: Situation, tr: float) -> PartSet:
         angle_error=None if np.isnan(angle) else angle,
         position_is_lower_bound=worst.at_least,
     )
-    return placed._replace(moving=one.moving | {*worst.drift.moving}) if placed.out_of_place else placed
+    return (
+        placed._replace(moving=one.moving | {*worst.drift.moving})
+        if placed.out_of_place
+        else placed
+    )
 
 
 def _with_recommendation(sets: Sequence[PartSet]) -> Iterator[PartSet]:
@@ -340,23 +405,43 @@ def _with_recommendation(sets: Sequence[PartSet]) -> Iterator[PartSet]:
 
 
 def _cautions(
-    run: Run, facts: RunFacts, model: CostModel | None, rows: Sequence[PartRow], sets: Sequence[PartSet]
+    run: Run,
+    facts: RunFacts,
+    model: CostModel | None,
+    rows: Sequence[PartRow],
+    sets: Sequence[PartSet],
 ) -> Iterator[Caution]:
     if facts.reason:
         yield Caution("no-part-history", facts.reason)
     if model is None:
-        yield Caution("no-deck", "without a deck the cost and most verdicts stay open; name the main deck of the run")
+        yield Caution(
+            "no-deck",
+            "without a deck the cost and most verdicts stay open; name the main deck of the run",
+        )
         return
     yield from doubts_of((fact.part for fact in facts.parts.values()), model.inventory)
-    yield from doubts_of_bodies([row.id for row in rows if row.movable], model.inventory)
+    yield from doubts_of_bodies(
+        [row.id for row in rows if row.movable], model.inventory
+    )
     yield from doubts_of_solver((), model.inventory)
     yield from left_rigid_in(run, model.inventory)
     yield from doubts_of_cost(model)
-    if missing := [row.id for row in rows if row.elements is None and row.id in facts.parts]:
-        yield Caution("parts-not-in-deck", f"{name_units(missing)} of the history {are(missing)} not in the deck")
+    if missing := [
+        row.id for row in rows if row.elements is None and row.id in facts.parts
+    ]:
+        yield Caution(
+            "parts-not-in-deck",
+            f"{name_units(missing)} of the history {are(missing)} not in the deck",
+        )
     if not any(row.movable for row in rows):
-        yield Caution("nothing-to-switch", "no part may be switched; the reasons are listed in the rows")
+        yield Caution(
+            "nothing-to-switch",
+            "no part may be switched; the reasons are listed in the rows",
+        )
     elif not any(one.recommended for one in sets):
-        yield Caution("no-set", "no set of parts can be recommended; the reasons are listed with the sets")
+        yield Caution(
+            "no-set",
+            "no set of parts can be recommended; the reasons are listed with the sets",
+        )
     if sets and all(one.angle_error is None for one in sets):
         yield Caution("no-angle", _NO_ANGLE)

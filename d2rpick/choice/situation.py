@@ -21,8 +21,20 @@ from d2rpick.flight.flight import Flight, Seen, seen_flight
 from d2rpick.flight.internal_energy import largest, quiet_time, round_off
 from d2rpick.histories.digits import sum_as_read
 from d2rpick.vibration import find_models
-from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD, Identification, identify, judge_given
-from d2rpick.vibration.model import Evidence, Vibration, describing, doubtful, energy_at, model_at
+from d2rpick.vibration.identify import (
+    MIN_SAMPLES_PER_PERIOD,
+    Identification,
+    identify,
+    judge_given,
+)
+from d2rpick.vibration.model import (
+    Evidence,
+    Vibration,
+    describing,
+    doubtful,
+    energy_at,
+    model_at,
+)
 from d2rpick.vibration.span import Fits, Span, described_span, hidden_share, span_of
 
 if TYPE_CHECKING:
@@ -48,7 +60,9 @@ _MOST_OF_RECORD: Final = 0.5
 _BEFORE_CONTACT: Final = 0.03
 
 
-def nothing_vibrates(history: History, flight: tuple[float, float | None], td: float, *, deformed: bool) -> bool:
+def nothing_vibrates(
+    history: History, flight: tuple[float, float | None], td: float, *, deformed: bool
+) -> bool:
     """Whether the energy is round-off all through ``flight`` [time], or swings by no more than can be told from noise.
 
     Free flight excites nothing: what vibrates in any part of it has done so from its start.  So all of it is asked,
@@ -60,7 +74,9 @@ def nothing_vibrates(history: History, flight: tuple[float, float | None], td: f
     _, inside = history.between(start, last)
     if inside.size < MIN_SAMPLES_PER_PERIOD:  # between so few a vibration is not seen
         return False
-    least = round_off(history)  # 0 where no energy is written at all: that tells nothing
+    least = round_off(
+        history
+    )  # 0 where no energy is written at all: that tells nothing
     if least > 0 and float(np.abs(inside).max()) <= least:
         return True
     if deformed or float(inside.min()) < 0 or history.energy_at(td) <= 0:
@@ -149,13 +165,17 @@ class Situation:
     def kinetic_share(self) -> float | None:
         """K, or None on basis "energy" and at rest [-]."""
         share = self.vibration.kinetic_share
-        return None if share is None or self.at_rest else share  # where nothing vibrates there is no share
+        return (
+            None if share is None or self.at_rest else share
+        )  # where nothing vibrates there is no share
 
     @property
     def earliest_tr(self) -> float | None:
         """Start of the flight with the margin, or None when unknown [time]."""
         start = self.flight.start
-        return None if start is None else sum_as_read(start, self.settings.margin or 0.0)
+        return (
+            None if start is None else sum_as_read(start, self.settings.margin or 0.0)
+        )
 
     @property
     def latest_td(self) -> float:
@@ -196,7 +216,11 @@ class Situation:
 
     def position_errors(self, times: Samples) -> Samples:
         """How far a body is out of place at td when it is frozen at each of ``times`` [length]; NaN where unknown."""
-        return np.broadcast_to(np.nan, times.shape) if self.bodies is None else self.bodies.errors(times, self.td)
+        return (
+            np.broadcast_to(np.nan, times.shape)
+            if self.bodies is None
+            else self.bodies.errors(times, self.td)
+        )
 
     def errors(self, times: Samples) -> Samples:
         """What a tolerance is held against, of the shape of ``times`` [-]: at rest nothing, else the vibration's."""
@@ -211,7 +235,10 @@ class Situation:
     @property
     def in_flight(self) -> bool:
         """Whether td lies in a known flight, with the margin."""
-        return self.earliest_tr is not None and self.earliest_tr < self.td <= self.latest_td
+        return (
+            self.earliest_tr is not None
+            and self.earliest_tr < self.td <= self.latest_td
+        )
 
     def peaks(self, start: float, end: float) -> tuple[float, ...]:
         """Times in (start, end], ascending, where the energy peaks: of an oscillator, of the samples without one."""
@@ -227,7 +254,12 @@ class Situation:
 
 
 def examine(
-    history: History, td: float, settings: Settings, fits: Fits | None = None, *, quick: bool = False
+    history: History,
+    td: float,
+    settings: Settings,
+    fits: Fits | None = None,
+    *,
+    quick: bool = False,
 ) -> Situation:
     """Find the flight around ``td`` and the oscillator in it.
 
@@ -238,8 +270,14 @@ def examine(
     RangeError when td, ``after`` or the fit window lie outside the record, or it has fewer than 3 states.
     """
     if history.time.size < 3:
-        found = "1 state was" if history.time.size == 1 else f"{history.time.size} states were"
-        raise RangeError(f"{', '.join(history.source)}: {found} found, choosing needs at least 3")
+        found = (
+            "1 state was"
+            if history.time.size == 1
+            else f"{history.time.size} states were"
+        )
+        raise RangeError(
+            f"{', '.join(history.source)}: {found} found, choosing needs at least 3"
+        )
     history.energy_at(td, "td")
     if settings.after is not None:
         history.check(settings.after, argument="after")
@@ -248,13 +286,21 @@ def examine(
     seen = seen_flight(history, td)
     flying = None if seen.refusal else seen.flight
     # where nothing flies at td, the oscillator of the nearest flight tells the pairs that there are in it
-    at = (seen.flight.start + seen.flight.end) / 2 if seen.refusal and seen.flight else td
+    at = (
+        (seen.flight.start + seen.flight.end) / 2
+        if seen.refusal and seen.flight
+        else td
+    )
     fits = Fits() if fits is None else fits
     fit, span = _oscillator(history, at, settings, seen, fits, quick=quick)
-    described = _settled(history, fit, span) or _described_by_modes(history, td, settings, seen, fits)
+    described = _settled(history, fit, span) or _described_by_modes(
+        history, td, settings, seen, fits
+    )
     flight = _flight_at(history, td, settings, seen, described)
     given = settings.oscillator is not None
-    evidence = Evidence(fit, span, given, prescribed=given or settings.fit_window is not None)
+    evidence = Evidence(
+        fit, span, given, prescribed=given or settings.fit_window is not None
+    )
     situation = Situation(history, td, settings, flight, evidence, fits)
     if not settings.replay:
         return situation
@@ -265,24 +311,47 @@ def examine(
     within = settled = None
     if flight.start is not None:
         within = Span(flight.start, flight.end or last)
-        settled = within if flight.settled is None else within._replace(start=flight.settled)
+        settled = (
+            within if flight.settled is None else within._replace(start=flight.settled)
+        )
     if within is not None and flight.source == "energy":
-        from d2rpick.vibration.modal_span import inner_window  # not above: better evidence does without it
+        from d2rpick.vibration.modal_span import (
+            inner_window,
+        )  # not above: better evidence does without it
 
         inner = inner_window(history, within)
         within = inner if inner.start < td <= inner.end else within
-    models = find_models(history, around, within, settled, lambda: doubtful(situation.whole), fits, situation.together)
-    return replace(situation, evidence=evidence._replace(models=models)) if models else situation
+    models = find_models(
+        history,
+        around,
+        within,
+        settled,
+        lambda: doubtful(situation.whole),
+        fits,
+        situation.together,
+    )
+    return (
+        replace(situation, evidence=evidence._replace(models=models))
+        if models
+        else situation
+    )
 
 
 def looking(
-    history: History, settings: Settings, fits: Fits | None = None, since: float | None = None, *, quick: bool = True
+    history: History,
+    settings: Settings,
+    fits: Fits | None = None,
+    since: float | None = None,
+    *,
+    quick: bool = True,
 ) -> Look:
     """Give what examines a record once for each td, by ``fits`` of an earlier look with the same settings.
 
     No flight is taken to begin before ``since`` [time].  ``quick`` as for `examine`.
     """
-    look = partial(examine, history, settings=settings, fits=fits or Fits(), quick=quick)
+    look = partial(
+        examine, history, settings=settings, fits=fits or Fits(), quick=quick
+    )
     return cache(look if since is None else lambda td: _beginning(look(td), since))
 
 
@@ -294,7 +363,13 @@ def _beginning(situation: Situation, since: float) -> Situation:
     return replace(situation, flight=flight._replace(start=since))
 
 
-def _flight_at(history: History, td: float, settings: Settings, seen: Seen, described: Described | None) -> Flight:
+def _flight_at(
+    history: History,
+    td: float,
+    settings: Settings,
+    seen: Seen,
+    described: Described | None,
+) -> Flight:
     """Give the flight around td by the evidence, or as the user gives it; what is held does not fly in either case."""
     flight = find_flight(history, td, seen, described)
     if seen.held:
@@ -312,17 +387,29 @@ def _between_supports(history: History, flight: Flight, td: float) -> Flight:
         return flight
     start, end = history.surroundings.free(history.parts, td) or (-inf, inf)
     end = min(end, inf if flight.end is None else flight.end)
-    return flight._replace(start=max(start, flight.start), end=None if end == inf else end)
+    return flight._replace(
+        start=max(start, flight.start), end=None if end == inf else end
+    )
 
 
 def _oscillator(
-    history: History, td: float, settings: Settings, seen: Seen, fits: Fits, *, quick: bool
+    history: History,
+    td: float,
+    settings: Settings,
+    seen: Seen,
+    fits: Fits,
+    *,
+    quick: bool,
 ) -> tuple[Identification | None, Span | None]:
     """Find the oscillator, given or identified, and the window around td that it describes."""
     if not settings.replay:
         return None, None
     whole = bool(seen.flight or seen.refusal)
-    bounds = Span(*seen.flight[:2]) if seen.flight else Span(float(history.time[0]), float(history.time[-1]))
+    bounds = (
+        Span(*seen.flight[:2])
+        if seen.flight
+        else Span(float(history.time[0]), float(history.time[-1]))
+    )
     if settings.after is not None:
         bounds = bounds._replace(start=min(settings.after, td))
     if settings.landing is not None:
@@ -349,28 +436,42 @@ def _oscillator(
     return fit, span
 
 
-def _described_by_modes(history: History, td: float, settings: Settings, seen: Seen, fits: Fits) -> Described | None:
+def _described_by_modes(
+    history: History, td: float, settings: Settings, seen: Seen, fits: Fits
+) -> Described | None:
     """Find a window whose modes go on by themselves, if nothing but the energy can tell a flight."""
     if seen.flight or seen.refusal or not settings.replay:
         return None
-    from d2rpick.vibration.modal_span import find_described  # not above: most records need none
+    from d2rpick.vibration.modal_span import (
+        find_described,
+    )  # not above: most records need none
 
     quiet, last = quiet_time(history, td), float(history.time[-1])
-    guess = None if quiet is None else Span(quiet.start, last if quiet.end is None else quiet.end)
+    guess = (
+        None
+        if quiet is None
+        else Span(quiet.start, last if quiet.end is None else quiet.end)
+    )
     found = find_described(history, td, guess, fits)
     return Described(*found.span, found.vibration.vibration_energy) if found else None
 
 
-def _with_hidden_share(history: History, fit: Identification, fits: Fits) -> Identification:
+def _with_hidden_share(
+    history: History, fit: Identification, fits: Fits
+) -> Identification:
     """Add to an accepted fit what a further mode may hold in what the oscillator leaves over."""
     if not fit.describes_record or fit.mode is None:
         return fit
     window, mode = history.between(fit.start, fit.end), fit.mode
-    hidden = fits.once(("hidden", fit.start, fit.end, fit.rms), lambda: hidden_share(*window, mode))
+    hidden = fits.once(
+        ("hidden", fit.start, fit.end, fit.rms), lambda: hidden_share(*window, mode)
+    )
     return fit._replace(hidden_share=max(fit.hidden_share, hidden))
 
 
-def _settled(history: History, fit: Identification | None, span: Span | None) -> Described | None:
+def _settled(
+    history: History, fit: Identification | None, span: Span | None
+) -> Described | None:
     """Give the window of an oscillator without its first quarter of a period, unless the record begins with it.
 
     While the deformation passes through zero its energy hardly shows that a load still moves it, by a tenth of its
@@ -379,4 +480,9 @@ def _settled(history: History, fit: Identification | None, span: Span | None) ->
     if span is None or fit is None or fit.mode is None:
         return None
     quarter = np.pi / 2 / fit.mode.omega if span.start > history.time[0] else 0.0
-    return Described(min(span.start + quarter, span.end), span.end, fit.mode.vibration_energy, fit.mode.alpha)
+    return Described(
+        min(span.start + quarter, span.end),
+        span.end,
+        fit.mode.vibration_energy,
+        fit.mode.alpha,
+    )

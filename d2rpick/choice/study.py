@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base import __version__
-from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, Caution, D2RPickError, RangeError, listing, one_line
+from d2rpick.base.errors import (
+    FORESEEN,
+    INTERNAL_ERROR,
+    Caution,
+    D2RPickError,
+    RangeError,
+    listing,
+    one_line,
+)
 from d2rpick.choice.answers import suggest_of
 from d2rpick.choice.quality import EQUALLY_GOOD
 from d2rpick.choice.question import read
@@ -37,7 +45,13 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 # A run has one of these; the first two were judged.
-OK, NONE, UNREADABLE, OUT_OF_RANGE, FAILED = "ok", "none", "unreadable", "out-of-range", "failed"
+OK, NONE, UNREADABLE, OUT_OF_RANGE, FAILED = (
+    "ok",
+    "none",
+    "unreadable",
+    "out-of-range",
+    "failed",
+)
 # Tukey's fences: so many times the distance of the quartiles beyond them.
 _FENCE: Final = 1.5
 # Runs that a sentence names.
@@ -180,10 +194,16 @@ def ask(question: Question, source: str) -> StudyRow:
     try:
         reference = read([source], question.selection, question.input_format)
         end = float(reference.history.time[-1])
-        answer = suggest_of(reference, question.td, question.settings, with_better=False)
+        answer = suggest_of(
+            reference, question.td, question.settings, with_better=False
+        )
     except (D2RPickError, OSError) as error:
         status = OUT_OF_RANGE if isinstance(error, RangeError) else UNREADABLE
-        text = f"{source}: {error.strerror}" if isinstance(error, OSError) and error.strerror else str(error)
+        text = (
+            f"{source}: {error.strerror}"
+            if isinstance(error, OSError) and error.strerror
+            else str(error)
+        )
         return StudyRow(source, status, text, files=files, record_end=end)
     time, energy = reference.history.time, reference.history.energy
     curve = outline(time, energy, _STRETCHES) if question.curve else None
@@ -193,7 +213,10 @@ def ask(question: Question, source: str) -> StudyRow:
 def row_of(source: str, answer: Suggestion) -> StudyRow:
     """Keep of the answer for one run what a study needs."""
     best, situation = answer.chosen, answer.situation
-    acceptable = clear_of_td(situation, acceptable_windows(situation, answer.candidates, best.tr if best else None))
+    acceptable = clear_of_td(
+        situation,
+        acceptable_windows(situation, answer.candidates, best.tr if best else None),
+    )
     said = {caution.code: caution.message for caution in answer.cautions}
     row = StudyRow(
         source=source,
@@ -205,12 +228,21 @@ def row_of(source: str, answer: Suggestion) -> StudyRow:
         time_unit=situation.history.time_unit,
         td=situation.td,
         acceptable=acceptable,
-        alike=alike_windows(situation, answer.candidates, best, acceptable) if best else acceptable,
+        alike=alike_windows(situation, answer.candidates, best, acceptable)
+        if best
+        else acceptable,
         profile=error_profile(situation, answer.candidates, acceptable),
     )
     if best is None:
         return row
-    return replace(row, status=OK, tr=best.tr, tr_low=best.tr_low, tr_high=best.tr_high, residual=best.residual)
+    return replace(
+        row,
+        status=OK,
+        tr=best.tr,
+        tr_low=best.tr_low,
+        tr_high=best.tr_high,
+        residual=best.residual,
+    )
 
 
 def failed(source: str, error: BaseException) -> StudyRow:
@@ -222,20 +254,26 @@ def failed(source: str, error: BaseException) -> StudyRow:
 def stamps(source: str) -> tuple[Stamp, ...]:
     """Size and time of the files of a run as they are now, under their absolute names; none where there is no run."""
     try:
-        found = [(os.path.realpath(name), Path(name).stat()) for name in expand([source])]
+        found = [
+            (os.path.realpath(name), Path(name).stat()) for name in expand([source])
+        ]
     except (D2RPickError, OSError):  # told by whoever reads it
         return ()
     return tuple(Stamp(path, state.st_size, state.st_mtime_ns) for path, state in found)
 
 
-def summarise(td: float | tuple[float, float] | None, rows: Sequence[StudyRow]) -> Study:
+def summarise(
+    td: float | tuple[float, float] | None, rows: Sequence[StudyRow]
+) -> Study:
     """Hold the rows of a study against each other; ``td`` as it was asked for."""
     times, low, high = _known(rows)
     spread = Spread(min(times), median(times), max(times)) if times else None
     agree = low <= high if times else None
     common = common_tr(rows)
     one, window = (None, td) if isinstance(td, tuple) else (td, None)
-    return Study(one, window, tuple(rows), spread, agree, common, tuple(_cautions(rows, common)))
+    return Study(
+        one, window, tuple(rows), spread, agree, common, tuple(_cautions(rows, common))
+    )
 
 
 def _known(rows: Sequence[StudyRow]) -> tuple[list[float], float, float]:
@@ -250,7 +288,11 @@ def cut_runs(rows: Sequence[StudyRow]) -> list[StudyRow]:
     """Give the runs that were cut: their files end within a state, or their record before that of most runs."""
     read_to = [(row, row.record_end) for row in rows if row.record_end is not None]
     whole = median_high(end for _, end in read_to) if read_to else 0.0
-    return [row for row, end in read_to if end < _WHOLE * whole or "truncated-input" in row.warnings]
+    return [
+        row
+        for row, end in read_to
+        if end < _WHOLE * whole or "truncated-input" in row.warnings
+    ]
 
 
 def _cautions(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
@@ -259,26 +301,43 @@ def _cautions(rows: Sequence[StudyRow], common: Common) -> Iterator[Caution]:
     left = [row.source for row in rows if not row.judged]
     if left and judged:
         found = f"{len(left)} of {runs_of(len(rows))} could not be judged"
-        yield Caution("runs-left-out", f"{found} and are left out: {listing(left, most=NAMED)}")
+        yield Caution(
+            "runs-left-out", f"{found} and are left out: {listing(left, most=NAMED)}"
+        )
     if cut := [f"{row.source} (at {row.record_end:g})" for row in cut_runs(rows)]:
-        yield Caution("cut-runs", f"{len(cut)} of {runs_of(len(rows))} were cut: {listing(cut, most=NAMED)}")
+        yield Caution(
+            "cut-runs",
+            f"{len(cut)} of {runs_of(len(rows))} were cut: {listing(cut, most=NAMED)}",
+        )
     if common.keeps_tolerance is False:
         found = f"tr = {common.tr:g} is acceptable in all runs, but no tr is within the timing tolerance of each"
-        yield Caution("timing-tolerance", f"{found}: the error of a run grows by more than 0.05")
+        yield Caution(
+            "timing-tolerance", f"{found}: the error of a run grows by more than 0.05"
+        )
     for code, what, kinds in (
         (
             "mixed-units",
             "the times of the runs have different units, td has only one",
             [row.time_unit for row in judged],
         ),
-        ("mixed-bases", "the basis of the choice differs between the runs", [row.basis for row in judged]),
+        (
+            "mixed-bases",
+            "the basis of the choice differs between the runs",
+            [row.basis for row in judged],
+        ),
     ):
         counted = Counter(kind or "not named" for kind in kinds)
         if len(counted) > 1:
-            yield Caution(code, f"{what}: {', '.join(f'{kind} in {runs_of(n)}' for kind, n in counted.most_common())}")
+            yield Caution(
+                code,
+                f"{what}: {', '.join(f'{kind} in {runs_of(n)}' for kind, n in counted.most_common())}",
+            )
     for code in dict.fromkeys(code for row in judged for code in row.warnings):
         named = [row.source for row in judged if code in row.warnings]
-        yield Caution(code, f"in {len(named)} of {runs_of(len(judged))}: {listing(named, most=NAMED)}")
+        yield Caution(
+            code,
+            f"in {len(named)} of {runs_of(len(judged))}: {listing(named, most=NAMED)}",
+        )
 
 
 def common_tr(rows: Sequence[StudyRow]) -> Common:
@@ -301,7 +360,9 @@ def common_tr(rows: Sequence[StudyRow]) -> Common:
     if tr is None:
         tr = fewest_digits(low, min(high, low + _ROUNDED * (td - low)))
     (window,) = shared[(shared[:, 0] <= tr) & (tr <= shared[:, 1])].tolist()
-    errors = tuple(None if row.profile is None else error_at(row.profile, tr) for row in rows)
+    errors = tuple(
+        None if row.profile is None else error_at(row.profile, tr) for row in rows
+    )
     return Common(tr, tuple(window), None, bool(keeping.size), errors)
 
 
@@ -317,8 +378,16 @@ def _agreed(judged: Sequence[StudyRow], keeping: Samples) -> float | None:
 def _least_loss(judged: Sequence[StudyRow], shared: Samples) -> tuple[float, float]:
     """Give the first stretch of the shared windows in which no run loses more than 0.02 above what one must lose."""
     profiles = [row.profile for row in judged if row.profile is not None]
-    times = np.unique(np.concatenate([shared.ravel(), *(profile[0] for profile in profiles)]))
-    times = times[(np.searchsorted(shared[:, 0], times, "right") - np.searchsorted(shared[:, 1], times)) > 0]
+    times = np.unique(
+        np.concatenate([shared.ravel(), *(profile[0] for profile in profiles)])
+    )
+    times = times[
+        (
+            np.searchsorted(shared[:, 0], times, "right")
+            - np.searchsorted(shared[:, 1], times)
+        )
+        > 0
+    ]
     worst = np.full(times.size, -np.inf)
     for row, profile in zip(judged, profiles, strict=True):
         own = 0.0 if row.tr is None else error_at(profile, row.tr)
@@ -353,7 +422,11 @@ def _why_none(judged: Sequence[StudyRow]) -> str:
     """Say which tr suits most runs, and which runs it does not suit."""
     stretches, counts = coverage([row.acceptable for row in judged])
     if not counts.size:
-        which = f"any of {runs_of(len(judged))}" if len(judged) > 1 else "the run that was judged"
+        which = (
+            f"any of {runs_of(len(judged))}"
+            if len(judged) > 1
+            else "the run that was judged"
+        )
         return f"no tr is acceptable in {which}"
     tr = fewest_digits(*stretches[np.argmax(counts)])
     left = [row.source for row in judged if not _holds(row.acceptable, tr)]
@@ -376,7 +449,13 @@ def outliers(rows: Sequence[StudyRow]) -> tuple[StudyRow, ...]:
     chosen = [(row, row.tr) for row in rows if row.tr is not None]
     if not chosen:
         return tuple(without)
-    low, middle, high = np.quantile([tr for _, tr in chosen], [0.25, 0.5, 0.75]).tolist()
+    low, middle, high = np.quantile(
+        [tr for _, tr in chosen], [0.25, 0.5, 0.75]
+    ).tolist()
     reach = _FENCE * (high - low)
-    far = [(row, abs(tr - middle)) for row, tr in chosen if not low - reach <= tr <= high + reach]
+    far = [
+        (row, abs(tr - middle))
+        for row, tr in chosen
+        if not low - reach <= tr <= high + reach
+    ]
     return (*without, *(row for row, _ in sorted(far, key=lambda one: -one[1])))

@@ -50,21 +50,36 @@ def longest_rigid_times(situation: Situation, times: Samples) -> Samples:
     time, energy = np.append(start, time), np.append(history.energy_at(start), energy)
     extremes = np.minimum.accumulate(energy), np.maximum.accumulate(energy)
     level, tolerance = history.energies_at(times), situation.settings.tolerance
-    passed = time[np.minimum(_reached(*extremes, level, np.full(times.shape, -ROUNDING)), time.size - 1)]
-    turns = np.searchsorted(history.turns, times) - np.searchsorted(history.turns, passed, side="right")
+    passed = time[
+        np.minimum(
+            _reached(*extremes, level, np.full(times.shape, -ROUNDING)), time.size - 1
+        )
+    ]
+    turns = np.searchsorted(history.turns, times) - np.searchsorted(
+        history.turns, passed, side="right"
+    )
     passes = (turns >= 2) & (level > ROUNDING * np.abs(history.energy).max())
     near = np.where(passes, min(tolerance, LIKE_LEVELS), tolerance) + ROUNDING
-    entered = time[np.maximum(_reached(*extremes, level, near) - 1, 0)]  # or since, but after the state before
-    return np.asarray(np.maximum(times - np.where(level <= round_off(history), start, entered), 0.0))
+    entered = time[
+        np.maximum(_reached(*extremes, level, near) - 1, 0)
+    ]  # or since, but after the state before
+    return np.asarray(
+        np.maximum(times - np.where(level <= round_off(history), start, entered), 0.0)
+    )
 
 
-def _reached(lowest: Samples, highest: Samples, level: Samples, near: Samples) -> Samples:
+def _reached(
+    lowest: Samples, highest: Samples, level: Samples, near: Samples
+) -> Samples:
     """Index of the first state by which the energy has been in the band about each level; their number where none is.
 
     ``lowest`` and ``highest`` are its extremes up to each state.  The band holds the level errors up to ``near``; of a
     negative one both sides of the level have been met.
     """
-    low, high = (np.maximum(level, 0.0) * np.maximum(1 + sign * near, 0.0) ** 2 for sign in (-1, 1))
+    low, high = (
+        np.maximum(level, 0.0) * np.maximum(1 + sign * near, 0.0) ** 2
+        for sign in (-1, 1)
+    )
     fallen = lowest.size - np.searchsorted(lowest[::-1], high, side="right")
     return np.asarray(np.maximum(fallen, np.searchsorted(highest, low, side="left")))
 
@@ -101,7 +116,11 @@ class Chosen(NamedTuple):
         """Give the longest pair where it is rigid for much longer than the one that is recommended."""
         much = _MUCH * (self.inside[1] - self.inside[0])
         found = self.longest
-        return found if found and pair and found.rigid_time - pair.rigid_time > much else None
+        return (
+            found
+            if found and pair and found.rigid_time - pair.rigid_time > much
+            else None
+        )
 
 
 def choose_td(
@@ -138,14 +157,31 @@ def choose_td(
         last = _last_at_rest(situation, inside)
         td = last if last > inside[0] and look(last).at_rest else td
     elif chosen is not None:
-        times = offered_times(situation, inside, STEPS)[0].tolist() if times is None else times
+        times = (
+            offered_times(situation, inside, STEPS)[0].tolist()
+            if times is None
+            else times
+        )
         earliest = float(history.time[0]) if since is None else since
-        td = _unbeaten(td, times, earliest, look, looking(history, replace(settings, replay=False), since=since))
+        td = _unbeaten(
+            td,
+            times,
+            earliest,
+            look,
+            looking(history, replace(settings, replay=False), since=since),
+        )
     pair = _longest(_acceptable([look(longest)])) if longest is not None else None
-    return Chosen(looking(history, settings, fits, since, quick=False)(td), window, inside, pair[1] if pair else None)
+    return Chosen(
+        looking(history, settings, fits, since, quick=False)(td),
+        window,
+        inside,
+        pair[1] if pair else None,
+    )
 
 
-def offered_times(situation: Situation, window: tuple[float, float], steps: int) -> tuple[Samples, set[float]]:
+def offered_times(
+    situation: Situation, window: tuple[float, float], steps: int
+) -> tuple[Samples, set[float]]:
     """Grid of td and peaks of the energy, ascending, and which of them are peaks."""
     grid = np.linspace(*window, steps + 1)[1:]  # nothing can be rigid before the first
     peaks = np.array(situation.peaks(*window))
@@ -155,7 +191,9 @@ def offered_times(situation: Situation, window: tuple[float, float], steps: int)
         highest = order[np.diff(place[order], prepend=-1) > 0]
         peaks, grid = peaks[highest], np.delete(grid, place[highest])
     times = union(grid, peaks)
-    return times[times < situation.history.time[-1]], set(peaks.tolist())  # a run that ends at td is no use
+    return times[times < situation.history.time[-1]], set(
+        peaks.tolist()
+    )  # a run that ends at td is no use
 
 
 def error_of(situation: Situation, best: Pair | None) -> float | None:
@@ -167,7 +205,11 @@ def error_of(situation: Situation, best: Pair | None) -> float | None:
     if best.residual is not None:
         return best.residual
     mean = mean_in_flight(situation)
-    error = np.inf if mean is None else float(shortfall(np.array(situation.energy_td), mean))
+    error = (
+        np.inf
+        if mean is None
+        else float(shortfall(np.array(situation.energy_td), mean))
+    )
     return error if error < np.inf else None
 
 
@@ -176,7 +218,9 @@ def as_printed(error: float | None) -> float:
     return np.inf if error is None else round(error, _READ)
 
 
-def _unbeaten(td: float, times: Iterable[float], earliest: float, look: Look, at_level: Look) -> float:
+def _unbeaten(
+    td: float, times: Iterable[float], earliest: float, look: Look, at_level: Look
+) -> float:
     """Give ``td``, or the one of ``times`` with the longest rigid time whose pair beats its: no worse, and better.
 
     Peaks were compared as one of them knows the flight; the energy alone shows another one to each td.  Where only
@@ -190,8 +234,12 @@ def _unbeaten(td: float, times: Iterable[float], earliest: float, look: Look, at
     first = at_level if seen is look and own[0].basis == "energy" else seen
     error = as_printed(error_of(*own))
     late = (time for time in times if time - earliest >= own[1].rigid_time)
-    better = _beating(own, [seen(time) for time in late if _may_beat(first(time), own, error)])
-    for there, _ in sorted(better, key=lambda one: (-one[1].rigid_time, as_printed(error_of(*one)))):
+    better = _beating(
+        own, [seen(time) for time in late if _may_beat(first(time), own, error)]
+    )
+    for there, _ in sorted(
+        better, key=lambda one: (-one[1].rigid_time, as_printed(error_of(*one)))
+    ):
         if _beating(own, [look(there.td)]):
             return there.td
     return td
@@ -212,15 +260,22 @@ def _may_beat(there: Situation, own: Choice, error: float) -> bool:
 def _beating(own: Choice, situations: Iterable[Situation]) -> list[Choice]:
     """Give the choices there that are better than one in error or rigid time and worse in neither, as they are read."""
     error, rigid = as_printed(error_of(*own)), own[1].rigid_time
-    found = ((there, best, as_printed(error_of(there, best))) for there, best in _acceptable(situations))
+    found = (
+        (there, best, as_printed(error_of(there, best)))
+        for there, best in _acceptable(situations)
+    )
     return [
         (there, best)
         for there, best, its in found
-        if its <= error and best.rigid_time >= rigid and (its, best.rigid_time) != (error, rigid)
+        if its <= error
+        and best.rigid_time >= rigid
+        and (its, best.rigid_time) != (error, rigid)
     ]
 
 
-def within_flight(look: Look, history: History, window: tuple[float, float]) -> tuple[Situation, tuple[float, float]]:
+def within_flight(
+    look: Look, history: History, window: tuple[float, float]
+) -> tuple[Situation, tuple[float, float]]:
     """Give the situation that is known best in ``window``, and the part of it that keeps the margin [time].
 
     RangeError when the window lies outside the record.
@@ -243,9 +298,15 @@ def _latest(situation: Situation, window: tuple[float, float]) -> float:
 def _last_at_rest(situation: Situation, window: tuple[float, float]) -> float:
     """Last td in a window where nothing vibrates: before the last state, and as far from the contact as it may move."""
     history, flight = situation.history, situation.flight
-    last = min(window[1], not_after(float(history.time[-2])))  # a run that ends at td is no use
+    last = min(
+        window[1], not_after(float(history.time[-2]))
+    )  # a run that ends at td is no use
     spread = situation.expected_margin.spread
-    return last if flight.end is None or not spread else min(last, not_after(flight.end - _HIDDEN * spread))
+    return (
+        last
+        if flight.end is None or not spread
+        else min(last, not_after(flight.end - _HIDDEN * spread))
+    )
 
 
 def _flying(look: Look, window: tuple[float, float]) -> Situation:
@@ -264,18 +325,28 @@ def _certainty(situation: Situation) -> tuple[bool, int]:
     return not situation.in_flight, SOURCES.index(situation.flight.source)
 
 
-def _by_residual(situation: Situation, window: tuple[float, float], look: Look) -> tuple[float | None, float | None]:
+def _by_residual(
+    situation: Situation, window: tuple[float, float], look: Look
+) -> tuple[float | None, float | None]:
     """Give the td of the longest rigid window among those alike in residual, and among all acceptable ones."""
     peaks = situation.peaks(*window)
-    highest = sorted(peaks, key=lambda t: -situation.vibration.whole.energy(t))[:_MOST_PEAKS]
-    pairs = _acceptable(look(td) for td in dict.fromkeys((*highest, *peaks[-_MOST_PEAKS:])))
+    highest = sorted(peaks, key=lambda t: -situation.vibration.whole.energy(t))[
+        :_MOST_PEAKS
+    ]
+    pairs = _acceptable(
+        look(td) for td in dict.fromkeys((*highest, *peaks[-_MOST_PEAKS:]))
+    )
     pairs = pairs or _acceptable(map(look, window))
-    limit = min((best.error for _, best in pairs), default=0.0) + like_quality(situation)
+    limit = min((best.error for _, best in pairs), default=0.0) + like_quality(
+        situation
+    )
     alike = [pair for pair in pairs if pair[1].error <= limit]
     return _td(_longest(alike)), _td(_longest(pairs))
 
 
-def _by_modes(situation: Situation, window: tuple[float, float], look: Look) -> tuple[float | None, float | None]:
+def _by_modes(
+    situation: Situation, window: tuple[float, float], look: Look
+) -> tuple[float | None, float | None]:
     """Give the same for many modes: the td of the least residuals of long windows, wherever the energy stands there."""
     start, compared = situation.earliest_tr, situation.vibration.compared
     if start is None or compared is None or compared.profile is None:
@@ -288,18 +359,31 @@ def _by_modes(situation: Situation, window: tuple[float, float], look: Look) -> 
         return _by_residual(situation, window, look)
     times = times[:: -(-times.size // _MOST_TD)]
     shares = np.maximum(kinetic_share(compared.deformation, times), 0.0)
-    squares = np.array([_least_error(compared.profile(td), first, td - least_rigid) ** 2 for td in times.tolist()])
+    squares = np.array(
+        [
+            _least_error(compared.profile(td), first, td - least_rigid) ** 2
+            for td in times.tolist()
+        ]
+    )
     squares += shares
-    inner = np.flatnonzero((squares[1:-1] <= squares[:-2]) & (squares[1:-1] < squares[2:])) + 1
+    inner = (
+        np.flatnonzero((squares[1:-1] <= squares[:-2]) & (squares[1:-1] < squares[2:]))
+        + 1
+    )
     best = inner[np.argsort(squares[inner], kind="stable")[:_MOST_PEAKS]]
     candidates = [
         *vertices(times, squares, best)[0].tolist(),
         *vertices(times, squares, inner[-_MOST_PEAKS:])[0].tolist(),
     ]
-    pairs = _acceptable(look(td) for td in dict.fromkeys((*candidates, float(times[np.argmin(squares)]))))
+    pairs = _acceptable(
+        look(td)
+        for td in dict.fromkeys((*candidates, float(times[np.argmin(squares)])))
+    )
     long = [pair for pair in pairs if pair[1].rigid_time >= least_rigid] or pairs
     limit = min((best.error for _, best in long), default=0.0) + like_quality(situation)
-    return _td(_longest(pair for pair in long if pair[1].error <= limit)), _td(_longest(pairs))
+    return _td(_longest(pair for pair in long if pair[1].error <= limit)), _td(
+        _longest(pairs)
+    )
 
 
 def _least_error(profile: Profile, first: float, last: float) -> float:
@@ -308,7 +392,9 @@ def _least_error(profile: Profile, first: float, last: float) -> float:
     return float(profile.error[rows].min(initial=np.inf))
 
 
-def _by_level(situation: Situation, window: tuple[float, float], look: Look) -> tuple[float | None, float | None]:
+def _by_level(
+    situation: Situation, window: tuple[float, float], look: Look
+) -> tuple[float | None, float | None]:
     """Give the same where only the level is known: the closer to all vibration energy, 2 <E>, the better."""
     mean = mean_in_flight(situation)
     peaks = situation.peaks(*window)
@@ -317,13 +403,17 @@ def _by_level(situation: Situation, window: tuple[float, float], look: Look) -> 
     levels = situation.history.energies_at(np.array(peaks))
     falls = dict(zip(peaks, shortfall(levels, mean).tolist(), strict=True))
     below = sorted((td for td in peaks if falls[td] < 1), key=falls.__getitem__)
-    best = next((td for td in below if _acceptable([situation.at(td)])), None)  # no oscillator is sought again
+    best = next(
+        (td for td in below if _acceptable([situation.at(td)])), None
+    )  # no oscillator is sought again
     if best is None:
         return None, None
     limit = falls[best] + situation.settings.tolerance
     alike = _longest(_shortening(situation, [td for td in below if falls[td] <= limit]))
     chosen = look(alike[0].td) if alike else None
-    return _td(alike if chosen and _acceptable([chosen]) else None), _td(_longest(_shortening(situation, below)))
+    return _td(alike if chosen and _acceptable([chosen]) else None), _td(
+        _longest(_shortening(situation, below))
+    )
 
 
 def _shortening(situation: Situation, times: Iterable[float]) -> Iterator[Choice]:
@@ -341,7 +431,11 @@ def _shortening(situation: Situation, times: Iterable[float]) -> Iterator[Choice
 
 def _acceptable(situations: Iterable[Situation]) -> list[Choice]:
     """What is recommended in each situation, where that saves something."""
-    return [(one.situation, one.saving) for one in candidates_at([*situations], in_flight=True) if one.saving]
+    return [
+        (one.situation, one.saving)
+        for one in candidates_at([*situations], in_flight=True)
+        if one.saving
+    ]
 
 
 def _longest(pairs: Iterable[Choice]) -> Choice | None:

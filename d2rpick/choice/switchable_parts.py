@@ -105,11 +105,16 @@ def facts_of(run: Run, settings: Settings) -> RunFacts:
     try:
         history, members = _history(run)
     except FormatError as error:  # nothing ever deforms
-        still = {part.id: PartFacts(part, masses.get(part.id), has_energy=False) for part in run.parts}
+        still = {
+            part.id: PartFacts(part, masses.get(part.id), has_energy=False)
+            for part in run.parts
+        }
         return RunFacts(still, reason=str(error))
     flights = flights_of(history, settings)
     spans = tuple(flight.within(history.time) for flight in flights)
-    longest = max(range(len(spans)), key=lambda at: spans[at][1] - spans[at][0], default=None)
+    longest = max(
+        range(len(spans)), key=lambda at: spans[at][1] - spans[at][0], default=None
+    )
     moment = float(history.time[-1]) if longest is None else sum(spans[longest]) / 2
     known = {
         part.id: PartFacts(
@@ -117,14 +122,18 @@ def facts_of(run: Run, settings: Settings) -> RunFacts:
             masses.get(part.id),
             bool(energies[:, at].any()),
             tuple(
-                _in_flight(history.time, energies[:, at], span, _flies(part, flight, members))
+                _in_flight(
+                    history.time, energies[:, at], span, _flies(part, flight, members)
+                )
                 for span, flight in zip(spans, flights, strict=True)
             ),
             run.surroundings.held([part], moment),
         )
         for at, part in enumerate(run.parts)
     }
-    return RunFacts(known, spans, longest, None if flights else "no flight is seen in the history")
+    return RunFacts(
+        known, spans, longest, None if flights else "no flight is seen in the history"
+    )
 
 
 def _history(run: Run) -> tuple[History, Sequence[Part] | None]:
@@ -142,27 +151,43 @@ def _flies(part: Part, flight: Flight, members: Sequence[Part] | None) -> bool |
     return part.id in {one.id for one in together}
 
 
-def _in_flight(time: Samples, energy: Samples, span: tuple[float, float], flies: bool | None) -> InFlight:
+def _in_flight(
+    time: Samples, energy: Samples, span: tuple[float, float], flies: bool | None
+) -> InFlight:
     inside = energy[window(time, *span)]
     if not inside.size or not inside.any():
         return InFlight(flies)
     mean = float(inside.mean())
     scatter = float(inside.std()) / mean if mean > 0 else None
-    return InFlight(flies, mean, float(inside[-1] - inside[0]), scatter, _landing(time, energy, span))
+    return InFlight(
+        flies,
+        mean,
+        float(inside[-1] - inside[0]),
+        scatter,
+        _landing(time, energy, span),
+    )
 
 
 def _landing(time: Samples, energy: Samples, span: tuple[float, float]) -> float | None:
     """What the part takes up at the beginning of the landing after a flight; None where the record ends in it."""
     start, end = span
     after = energy[window(time, end, end + _LANDING * (end - start))]
-    return float(after[-1] - after[0]) if end < float(time[-1]) and after.size > 1 else None
+    return (
+        float(after[-1] - after[0])
+        if end < float(time[-1]) and after.size > 1
+        else None
+    )
 
 
 def _masses(run: Run) -> dict[int, float]:
     """Masses by part, of those that are known."""
     if (found := run.masses) is None:
         return {}
-    return {part.id: mass for part, mass in zip(run.parts, found.tolist(), strict=True) if np.isfinite(mass)}
+    return {
+        part.id: mass
+        for part, mass in zip(run.parts, found.tolist(), strict=True)
+        if np.isfinite(mass)
+    }
 
 
 SWITCH, MERGE, KEEP, UNKNOWN = "switch", "merge", "keep", "unknown"
@@ -205,7 +230,9 @@ class PartRow(NamedTuple):
 
 
 def rows_of(
-    facts: RunFacts, model: CostModel | None, printed: Mapping[int, tuple[float, str]] = MappingProxyType({})
+    facts: RunFacts,
+    model: CostModel | None,
+    printed: Mapping[int, tuple[float, str]] = MappingProxyType({}),
 ) -> tuple[PartRow, ...]:
     """Judge every part of a deck or history, ascending by number.
 
@@ -221,7 +248,10 @@ def rows_of(
     inventory = model.inventory if model else None
     ids = sorted({*facts.parts, *(inventory.parts if inventory else ())})
     sizes = masses_and_steps(inventory) if inventory else {}
-    rows = [_described(part, facts, model, sizes.get(part, (None, None)), printed) for part in ids]
+    rows = [
+        _described(part, facts, model, sizes.get(part, (None, None)), printed)
+        for part in ids
+    ]
     alone = landing_alone(rows)
     judged = [_judged(row, facts, inventory, alone) for row in rows]
     return tuple(_merged(judged, inventory)) if inventory else tuple(judged)
@@ -240,24 +270,36 @@ def _described(
     counts = inventory.counts.get(part, Counter()) if inventory and data else None
     if inventory and not counts and not inventory.complete:
         counts = None  # they may be in a file that was not read
-    step, source = printed.get(part, (None, None)) if by_deck[1] is None else (by_deck[1], "deck")
+    step, source = (
+        printed.get(part, (None, None)) if by_deck[1] is None else (by_deck[1], "deck")
+    )
     mass = fact.mass if fact and fact.mass is not None else by_deck[0]
     title = data.title if data and data.title else fact.part.title if fact else ""
     return PartRow(
         id=part,
         title=title,
         elements=counts,
-        formulations=tuple(inventory.formulation(part, kind).name for kind in counts) if inventory and counts else (),
+        formulations=tuple(inventory.formulation(part, kind).name for kind in counts)
+        if inventory and counts
+        else (),
         material=data.material.name if data and data.material else None,
         kind=_kind(data, counts),
         mass=mass,
-        mass_source=None if mass is None else "history" if fact and fact.mass is not None else "deck",
+        mass_source=None
+        if mass is None
+        else "history"
+        if fact and fact.mass is not None
+        else "deck",
         flights=fact.flights if fact else (),
-        flight=fact.flights[facts.longest] if fact and facts.longest is not None and fact.flights else None,
+        flight=fact.flights[facts.longest]
+        if fact and facts.longest is not None and fact.flights
+        else None,
         cost_share=model.share_of(part).value if model and counts is not None else None,
         smallest_step=step,
         step_source=source,
-        shares_nodes=tuple(sorted(inventory.neighbours.get(part, ()))) if inventory and data else None,
+        shares_nodes=tuple(sorted(inventory.neighbours.get(part, ())))
+        if inventory and data
+        else None,
     )
 
 
@@ -272,7 +314,9 @@ def _kind(data: PartData | None, counts: Mapping[str, int] | None) -> str | None
     return data.material.kind if data.material else None
 
 
-def _judged(row: PartRow, facts: RunFacts, inventory: Inventory | None, alone: int | None) -> PartRow:
+def _judged(
+    row: PartRow, facts: RunFacts, inventory: Inventory | None, alone: int | None
+) -> PartRow:
     fact = facts.parts.get(row.id)
     data = inventory.parts.get(row.id) if inventory else None
     kept = tuple(_to_keep(row, fact, data, alone)) or tuple(_in_pieces(row, inventory))
@@ -281,7 +325,9 @@ def _judged(row: PartRow, facts: RunFacts, inventory: Inventory | None, alone: i
     open_ = tuple(_not_known(row, facts, inventory, data))
     if open_:
         return row._replace(verdict=UNKNOWN, reasons=open_)
-    return row._replace(verdict=SWITCH, reasons=(*_to_switch(row, fact, data), *_joined(row, inventory)))
+    return row._replace(
+        verdict=SWITCH, reasons=(*_to_switch(row, fact, data), *_joined(row, inventory))
+    )
 
 
 def _joined(row: PartRow, inventory: Inventory | None) -> Iterator[str]:
@@ -292,7 +338,9 @@ def _joined(row: PartRow, inventory: Inventory | None) -> Iterator[str]:
         yield f"joined to {name_units(others)} ({kinds})"
 
 
-def _to_keep(row: PartRow, fact: PartFacts | None, data: PartData | None, alone: int | None) -> Iterator[str]:
+def _to_keep(
+    row: PartRow, fact: PartFacts | None, data: PartData | None, alone: int | None
+) -> Iterator[str]:
     """Reasons not to switch a part."""
     if row.kind == "rigid" and not (fact and fact.has_energy):
         yield "already rigid"
@@ -303,9 +351,11 @@ def _to_keep(row: PartRow, fact: PartFacts | None, data: PartData | None, alone:
             yield "with dampers, whose work only grows in its energy"
         return
     if row.kind in ("airbag", "void", "particles"):
-        yield {"airbag": "airbag fabric", "void": "void material, without stiffness", "particles": "particles"}[
-            row.kind
-        ]
+        yield {
+            "airbag": "airbag fabric",
+            "void": "void material, without stiffness",
+            "particles": "particles",
+        }[row.kind]
         return
     if row.elements is not None and not row.elements:
         yield "no elements"
@@ -326,14 +376,21 @@ def _to_keep(row: PartRow, fact: PartFacts | None, data: PartData | None, alone:
 
 def _in_pieces(row: PartRow, inventory: Inventory | None) -> Iterator[str]:
     """Say so where LS-DYNA, which switches parts, would make one rigid body of what nothing joins."""
-    if inventory is None or inventory.solver != "ls-dyna" or inventory.ties or not inventory.complete:
+    if (
+        inventory is None
+        or inventory.solver != "ls-dyna"
+        or inventory.ties
+        or not inventory.complete
+    ):
         return
     pieces = pieces_of(inventory, [row.id], among=inventory.parts.keys())
     if pieces > 1:
         yield f"{pieces} pieces that nothing joins, of which one rigid body would be made"
 
 
-def _not_known(row: PartRow, facts: RunFacts, inventory: Inventory | None, data: PartData | None) -> Iterator[str]:
+def _not_known(
+    row: PartRow, facts: RunFacts, inventory: Inventory | None, data: PartData | None
+) -> Iterator[str]:
     """Say what would have to be known to judge a part that nothing speaks against."""
     if inventory is None:
         yield "without a deck it is not known whether it is discrete, already rigid, or shares nodes"
@@ -351,12 +408,19 @@ def _not_known(row: PartRow, facts: RunFacts, inventory: Inventory | None, data:
         yield "no momenta of parts show whether it flies with the rest"
 
 
-def _to_switch(row: PartRow, fact: PartFacts | None, data: PartData | None) -> Iterator[str]:
+def _to_switch(
+    row: PartRow, fact: PartFacts | None, data: PartData | None
+) -> Iterator[str]:
     if row.kind == "rigid":
         yield "rigid in the deck, but it has internal energy in the history"
     if row.flight and row.flight.deforms is not None:
         yield "still deforms" if row.flight.deforms else "has stopped deforming"
-    if data and data.section.formulations.keys() & {"solid", "tetrahedron", "pentahedron", "thick shell"}:
+    if data and data.section.formulations.keys() & {
+        "solid",
+        "tetrahedron",
+        "pentahedron",
+        "thick shell",
+    }:
         yield "solids: solvers may misreport their energy while they are rigid"
     if fact and fact.has_energy is None:
         yield "its energy is not written"
@@ -367,7 +431,9 @@ def step_growth(rows: Sequence[PartRow], switched: Collection[int]) -> float | N
 
     None where the step of a part that stays deformable is not known; infinite where none of them does.
     """
-    computed = [row for row in rows if row.elements and row.kind not in ("rigid", "void")]
+    computed = [
+        row for row in rows if row.elements and row.kind not in ("rigid", "void")
+    ]
     left = [row.smallest_step for row in computed if row.id not in switched]
     known = [step for step in left if step is not None]
     steps = [row.smallest_step for row in computed if row.smallest_step is not None]
@@ -378,7 +444,11 @@ def step_growth(rows: Sequence[PartRow], switched: Collection[int]) -> float | N
 
 def landing_alone(rows: Sequence[PartRow]) -> int | None:
     """Find the part that takes nearly all of the first energy of the landing after the longest flight."""
-    taken = {row.id: row.flight.landing for row in rows if row.flight and row.flight.landing is not None}
+    taken = {
+        row.id: row.flight.landing
+        for row in rows
+        if row.flight and row.flight.landing is not None
+    }
     total = sum(value for value in taken.values() if value > 0)
     for row in rows:
         if row.cost_share is None or row.cost_share > _CHEAP or row.kind == "spring":
@@ -394,6 +464,8 @@ def _merged(rows: Sequence[PartRow], inventory: Inventory) -> Iterator[PartRow]:
     lead = {part: body[0] for body in bodies for part in body[1:]}
     for row in rows:
         if row.id in lead:
-            yield row._replace(verdict=MERGE, merge_with=lead[row.id], reasons=row.reasons)
+            yield row._replace(
+                verdict=MERGE, merge_with=lead[row.id], reasons=row.reasons
+            )
         else:
             yield row

@@ -65,9 +65,17 @@ class Done(NamedTuple):
     @property
     def took_off(self) -> float | None:
         """When a contact ended in which the parts were rigid from tr on; None where the flight had begun [time]."""
-        if self.flight is None or self.flight.start is None or self.flight.source not in _SHARP:
+        if (
+            self.flight is None
+            or self.flight.start is None
+            or self.flight.source not in _SHARP
+        ):
             return None
-        return self.flight.start if self.flight.start - self.tr > _SAME_STATES * self.step else None
+        return (
+            self.flight.start
+            if self.flight.start - self.tr > _SAME_STATES * self.step
+            else None
+        )
 
     @property
     def rigid_in_contact(self) -> bool:
@@ -77,7 +85,11 @@ class Done(NamedTuple):
     @property
     def moved(self) -> float | None:
         """How much later the run landed than planned [time]."""
-        return None if self.landing is None or self.planned is None else self.landing - self.planned
+        return (
+            None
+            if self.landing is None or self.planned is None
+            else self.landing - self.planned
+        )
 
     @property
     def told(self) -> str:
@@ -129,10 +141,18 @@ def switched_history(
             history.energy_at(time)
         cautions += _partly_rigid(reference, tr, td)
     absent = _absent_times(reference)
-    new = [one for one in absent if not any(tr < one.end and one.start < td for tr, td in done)]
+    new = [
+        one
+        for one in absent
+        if not any(tr < one.end and one.start < td for tr, td in done)
+    ]
     cautions += [one.caution for one in new]
     more = tuple((one.start, one.end) for one in new if one.whole)
-    return by_the_model(history) if absent else history, tuple(sorted((*done, *more))), tuple(cautions)
+    return (
+        by_the_model(history) if absent else history,
+        tuple(sorted((*done, *more))),
+        tuple(cautions),
+    )
 
 
 def by_the_model(history: History) -> History:
@@ -140,7 +160,9 @@ def by_the_model(history: History) -> History:
 
     Energies of solids are garbage while they are rigid: nothing but the momentum is asked whether the model flies.
     """
-    whole = tuple(replace(one, flying=one.chosen) for one in history.momenta if one.parts is None)
+    whole = tuple(
+        replace(one, flying=one.chosen) for one in history.momenta if one.parts is None
+    )
     return replace(history, evidence=Given(whole, history.balance))
 
 
@@ -152,28 +174,55 @@ def rigid_times(reference: Reference) -> tuple[Times, ...]:
     found = tuple((one.start, one.end) for one in _absent_times(reference))
     history, run = reference.history, reference.run
     of_parts = next((one for one in history.momenta if one.parts is not None), None)
-    whole = next((one for one in history.momenta if one.parts is None and not one.velocity), None)
-    if found or of_parts is None or whole is None or of_parts.masses is None or believed(of_parts, whole):
+    whole = next(
+        (one for one in history.momenta if one.parts is None and not one.velocity), None
+    )
+    if (
+        found
+        or of_parts is None
+        or whole is None
+        or of_parts.masses is None
+        or believed(of_parts, whole)
+    ):
         return found
     energies = if_written(lambda: np.abs(run.part_energies(run.parts)).max(axis=0))
-    void = energies is not None and bool(((of_parts.masses == 0) & (energies > 0)).any())
+    void = energies is not None and bool(
+        ((of_parts.masses == 0) & (energies > 0)).any()
+    )
     moved = float(np.abs(of_parts.values.sum(axis=1)).max())
     rigid = void or moved < _HARDLY * float(np.abs(whole.values).max())
     return ((float(history.time[0]), float(history.time[-1])),) if rigid else ()
 
 
 def done_windows(
-    history: History, flights: Sequence[Flight], windows: Sequence[Times], planned: Sequence[Flight] | None
+    history: History,
+    flights: Sequence[Flight],
+    windows: Sequence[Times],
+    planned: Sequence[Flight] | None,
 ) -> tuple[Done, ...]:
     """Find when the flights of windows that are done have landed, and when they landed in the run before."""
     found = []
     for tr, td in windows:
-        flight, before = _around(history, flights, tr, td), _around(history, planned or (), tr, td)
-        found.append(Done(tr, td, flight, flight.end if flight else None, before.end if before else None, history.step))
+        flight, before = (
+            _around(history, flights, tr, td),
+            _around(history, planned or (), tr, td),
+        )
+        found.append(
+            Done(
+                tr,
+                td,
+                flight,
+                flight.end if flight else None,
+                before.end if before else None,
+                history.step,
+            )
+        )
     return tuple(found)
 
 
-def _around(history: History, flights: Sequence[Flight], tr: float, td: float) -> Flight | None:
+def _around(
+    history: History, flights: Sequence[Flight], tr: float, td: float
+) -> Flight | None:
     """Give the flight that shares most time with a window, None where none does."""
 
     def shared(flight: Flight) -> float:
@@ -191,15 +240,23 @@ def _partly_rigid(reference: Reference, tr: float, td: float) -> Iterator[Cautio
     if rigid is None:
         return
     if rigid.any():
-        names = [part.name for part, one in zip(parts, rigid.tolist(), strict=True) if not one]
+        names = [
+            part.name
+            for part, one in zip(parts, rigid.tolist(), strict=True)
+            if not one
+        ]
         if names and history.parts:
             found = f"from {tr:.6g} to {td:.6g} these parts were not rigid: {listing(names)}"
-            yield Caution("partly-rigid", f"{found}; the window counts as done for the others")
+            yield Caution(
+                "partly-rigid", f"{found}; the window counts as done for the others"
+            )
         return
     if float(np.abs(history.between(tr, td)[1]).max(initial=0.0)) <= round_off(history):
         return  # a free fall looks the same
     where = f"{', '.join(history.source)}: the parts deform from {tr:.6g} to {td:.6g}"
-    raise RangeError(f"{where}, a window that is said to be done; give the run that was switched so")
+    raise RangeError(
+        f"{where}, a window that is said to be done; give the run that was switched so"
+    )
 
 
 class _Absent(NamedTuple):
@@ -224,7 +281,11 @@ class _Absent(NamedTuple):
 def _absent_times(reference: Reference) -> tuple[_Absent, ...]:
     """Times in which parts have no kinetic energy although the run moves: a rigid body has it instead."""
     parts, balance = _deformable(reference), reference.history.balance
-    kinetic = if_written(lambda: reference.run.part_kinetic_energies(parts)) if parts else None
+    kinetic = (
+        if_written(lambda: reference.run.part_kinetic_energies(parts))
+        if parts
+        else None
+    )
     if kinetic is None or balance is None or balance.kinetic is None:
         return ()
     time, least = reference.history.time, round_off(reference.history)
@@ -235,37 +296,58 @@ def _absent_times(reference: Reference) -> tuple[_Absent, ...]:
         start, end = time[states][[0, -1]].tolist()
         rigid = rigid_parts(reference.run, parts, time, start, end)
         rigid = (kinetic[states] == 0).all(axis=0) if rigid is None else rigid
-        names = [part.title or f"part {part.id}" for part, one in zip(parts, rigid.tolist(), strict=True) if one]
+        names = [
+            part.title or f"part {part.id}"
+            for part, one in zip(parts, rigid.tolist(), strict=True)
+            if one
+        ]
         deform = ~rigid & (np.ptp(energies[states], axis=0) > least)
         found.append(_Absent(start, end, listing(names), not deform.any()))
     return tuple(found)
 
 
-def _deformable(reference: Reference, among: Sequence[Part] | None = None) -> tuple[Part, ...]:
+def _deformable(
+    reference: Reference, among: Sequence[Part] | None = None
+) -> tuple[Part, ...]:
     """Give the chosen parts, or all, that have internal energy at the times of the history, also ``among`` others."""
     run, history = reference
-    there = {part.id for part in run.parts if among is None} | {part.id for part in among or ()}
+    there = {part.id for part in run.parts if among is None} | {
+        part.id for part in among or ()
+    }
     parts = [part for part in history.parts or run.parts if part.id in there]
     if not parts:
         return ()
     energies = run.part_energies(parts)
     if len(energies) != history.time.size:
         return ()
-    return tuple(part for part, energy in zip(parts, energies.T, strict=True) if energy.any())
+    return tuple(
+        part for part, energy in zip(parts, energies.T, strict=True) if energy.any()
+    )
 
 
-def rigid_parts(run: Run, parts: Sequence[Part], time: Samples, tr: float, td: float) -> NDArray[np.bool_] | None:
+def rigid_parts(
+    run: Run, parts: Sequence[Part], time: Samples, tr: float, td: float
+) -> NDArray[np.bool_] | None:
     """Tell which of the parts were rigid from tr to td, shape (parts,); None where their states do not tell.
 
     ``time`` are the times of the parts' states (n,).
     """
     inside = window(time, np.nextafter(tr, td), np.nextafter(td, tr))
-    inside = slice(inside.start + 1, max(inside.start + 1, inside.stop - 1))  # switched at the first step after tr
+    inside = slice(
+        inside.start + 1, max(inside.start + 1, inside.stop - 1)
+    )  # switched at the first step after tr
     if not parts or len(time[inside]) < FEWEST:
         return None
-    energies, kinetic = run.part_energies(parts)[inside], if_written(lambda: run.part_kinetic_energies(parts))
+    energies, kinetic = (
+        run.part_energies(parts)[inside],
+        if_written(lambda: run.part_kinetic_energies(parts)),
+    )
     still = np.ptp(energies, axis=0) <= SAME * np.abs(energies).max(axis=0)
-    absent = (kinetic[inside] == 0).all(axis=0) if kinetic is not None else np.zeros(len(parts), dtype=bool)
+    absent = (
+        (kinetic[inside] == 0).all(axis=0)
+        if kinetic is not None
+        else np.zeros(len(parts), dtype=bool)
+    )
     return np.asarray(still | absent)
 
 
@@ -306,27 +388,35 @@ def same_parts(without: Reference, switched: Reference, pair: Times) -> SamePart
         return as_read
 
 
-def _judged(without: Reference, switched: Reference, pair: Times, parts: tuple[Part, ...]) -> SameParts:
+def _judged(
+    without: Reference, switched: Reference, pair: Times, parts: tuple[Part, ...]
+) -> SameParts:
     history = without.history
     rigid = rigid_parts(switched.run, parts, switched.run.part_time, *pair)
     some = rigid is not None and bool(rigid.any()) and not rigid.all()
     objections, notes = list[str](), list[str]()
     chosen = parts
     if some and rigid is not None:
-        still = tuple(part for part, one in zip(parts, rigid.tolist(), strict=True) if one)
+        still = tuple(
+            part for part, one in zip(parts, rigid.tolist(), strict=True) if one
+        )
         if history.parts is None:
             chosen = still
             notes.append(f"judged by the parts that were rigid: {_names(still)}")
         else:
             others = (part for part in parts if part not in still)
-            objections.append(f"not rigid from tr {pair[0]:g} to td {pair[1]:g} in the switched run: {_names(others)}")
+            objections.append(
+                f"not rigid from tr {pair[0]:g} to td {pair[1]:g} in the switched run: {_names(others)}"
+            )
     wrong = _reported_wrong(without, switched.run, chosen, pair)
     if not wrong and chosen is parts:
         return SameParts(history, switched.history, tuple(objections))
     left = tuple(part for part in chosen if part not in wrong)
     if not left:
         who = f"the energies of {_names(wrong)}"
-        objections.append(f"{who} are reported wrongly after td: nothing is left to compare but the motion")
+        objections.append(
+            f"{who} are reported wrongly after td: nothing is left to compare but the motion"
+        )
     elif wrong:
         found = f"left out of the comparison: {_names(wrong)}, whose energy is reported wrongly after td"
         notes.append(f"{found}; some solvers do so with solids that were rigid")
@@ -338,15 +428,21 @@ def _judged(without: Reference, switched: Reference, pair: Times, parts: tuple[P
     return SameParts(*energies, tuple(objections), tuple(notes), known=bool(left))
 
 
-def _reported_wrong(without: Reference, switched: Run, parts: tuple[Part, ...], pair: Times) -> tuple[Part, ...]:
+def _reported_wrong(
+    without: Reference, switched: Run, parts: tuple[Part, ...], pair: Times
+) -> tuple[Part, ...]:
     """Give the parts whose energy after td is further off that at tr than it can be, beyond round-off."""
     time, energies = switched.part_time, switched.part_energies(parts)
-    first = int(np.searchsorted(time, pair[1])) + 1  # the first state from td on may still be rigid
+    first = (
+        int(np.searchsorted(time, pair[1])) + 1
+    )  # the first state from td on may still be rigid
     last = int(np.searchsorted(time, pair[0], side="right")) - 1
     if last < 0 or first >= time.size:
         return ()
     largest = np.abs(without.run.part_energies(parts)).max(axis=0)
-    off = np.abs(energies[first] - energies[last]) > np.maximum(largest, round_off(without.history))
+    off = np.abs(energies[first] - energies[last]) > np.maximum(
+        largest, round_off(without.history)
+    )
     return tuple(part for part, one in zip(parts, off.tolist(), strict=True) if one)
 
 

@@ -21,7 +21,9 @@ class Together:
     @cached_property
     def beside(self) -> Beside:
         """Parts that vibrate with the chosen ones and were not chosen."""
-        from d2rpick.flight.vibrating import vibrating_beside  # not above: an oscillator does without it
+        from d2rpick.flight.vibrating import (
+            vibrating_beside,
+        )  # not above: an oscillator does without it
 
         return vibrating_beside(self._history, self._flight)
 
@@ -33,6 +35,8 @@ class Together:
     @property
     def kinetic(self) -> tuple[Samples, Samples] | None:
         """Kinetic energy of what vibrates together, at times in the flight; None if it is not written."""
-        from d2rpick.flight.vibrating import kinetic_energy_of  # not above: an oscillator does without it
+        from d2rpick.flight.vibrating import (
+            kinetic_energy_of,
+        )  # not above: an oscillator does without it
 
         return kinetic_energy_of(self._history, self._flight)

@@ -16,7 +16,13 @@ from d2rpick.choice.flights import longest_flight
 from d2rpick.choice.health import refuse_unsound
 from d2rpick.choice.quality import EQUALLY_GOOD, candidates_at, ranked
 from d2rpick.choice.situation import OfTd, Situation, looking
-from d2rpick.choice.suggest_td import STEPS, as_printed, error_of, offered_times, within_flight
+from d2rpick.choice.suggest_td import (
+    STEPS,
+    as_printed,
+    error_of,
+    offered_times,
+    within_flight,
+)
 from d2rpick.choice.warnings import cautions_of
 from d2rpick.histories.digits import as_read
 from d2rpick.vibration.span import Fits
@@ -84,7 +90,9 @@ class Offer(OfTd):
     @cached_property
     def answer(self) -> Suggestion:
         """What ``suggest`` says: of windows by all candidates, of why there is none by those before the flight too."""
-        known = self.candidates if self.pair else None  # of a td without a pair all are looked at again
+        known = (
+            self.candidates if self.pair else None
+        )  # of a td without a pair all are looked at again
         if known and self.basis == "energy":
             known = next(candidates_at([self.situation], in_flight=True))
         return suggest_at(self.situation, with_better=False, ranked=known)
@@ -100,12 +108,20 @@ class Offer(OfTd):
         return self.answer.kept
 
 
-def offers_of(situations: Sequence[Situation], peaks: Container[float]) -> Iterator[Offer]:
+def offers_of(
+    situations: Sequence[Situation], peaks: Container[float]
+) -> Iterator[Offer]:
     """Give what ``suggest`` says of each td; ``peaks`` are the times where the energy peaks."""
     for judged in judged_of(situations, in_flight=True):
         found = [*ranked(judged)]
-        kept = [one.order[: 0 if one.recommended is None else one.recommended + 1] for one in found]
-        few, ends = judged.at(np.concatenate(kept)), accumulate(rows.size for rows in kept)  # noise makes many
+        kept = [
+            one.order[: 0 if one.recommended is None else one.recommended + 1]
+            for one in found
+        ]
+        few, ends = (
+            judged.at(np.concatenate(kept)),
+            accumulate(rows.size for rows in kept),
+        )  # noise makes many
         for one, rows, end in zip(found, kept, ends, strict=True):
             best = replace(one, judged=few, order=np.arange(end - rows.size, end))
             yield Offer(one.situation, best, one.situation.td in peaks)
@@ -170,23 +186,38 @@ def explore_of(
     history, fits = reference.history, Fits()
     refuse_unsound(history, settings, td)
     record = float(history.time[0]), float(history.time[-1])
-    window = td_window or longest_flight(history, settings, fits, otherwise=None if td is None else record)
+    window = td_window or longest_flight(
+        history, settings, fits, otherwise=None if td is None else record
+    )
     look = looking(history, settings, fits, since)
     known_best, inside = within_flight(look, history, window)
     offered, peaks = offered_times(known_best, inside, steps)
     times = offered.tolist() if td is None else [*offered.tolist(), td]
-    suggestion = suggest_of(reference, window, settings, fits=fits, since=since, times=times)
+    suggestion = suggest_of(
+        reference, window, settings, fits=fits, since=since, times=times
+    )
     chosen = suggestion.recommended.td if suggestion.recommended else None
     fully = looking(history, settings, fits, since, quick=False)
     asked_at = map(look, sorted({*times, *([] if chosen is None else [chosen])}))
-    situations = [one if one.evidence.span else fully(one.td) for one in asked_at]  # why none is seen is told of each
-    offers = [replace(one, recommended=one.td == chosen) for one in _marked([*offers_of(situations, peaks)])]
+    situations = [
+        one if one.evidence.span else fully(one.td) for one in asked_at
+    ]  # why none is seen is told of each
+    offers = [
+        replace(one, recommended=one.td == chosen)
+        for one in _marked([*offers_of(situations, peaks)])
+    ]
     asked = next((one for one in offers if one.td == td), None)
     situation = fully(known_best.td)
-    told = suggestion.situation  # the first td of the flight has too little before it to tell of a vibration
+    told = (
+        suggestion.situation
+    )  # the first td of the flight has too little before it to tell of a vibration
     if td is not None and look(td).in_flight:
-        situation = told = fully(td)  # the energy alone shows another flight to each td: that of suggest is shown
-    start = asked or max(filter(_found, offers), key=lambda one: one.rigid_time or 0.0, default=None)
+        situation = told = fully(
+            td
+        )  # the energy alone shows another flight to each td: that of suggest is shown
+    start = asked or max(
+        filter(_found, offers), key=lambda one: one.rigid_time or 0.0, default=None
+    )
     return TradeOff(
         situation=situation,
         suggestion=suggestion,
@@ -209,12 +240,20 @@ def _marked(offers: Sequence[Offer]) -> Iterator[Offer]:
     """Mark the offers that nothing beats; errors of deformations and of energies are not compared."""
     unbeaten = set()
     for known in (True, False):
-        group = [one for one in offers if _found(one) and (one.basis != "energy") == known]
+        group = [
+            one for one in offers if _found(one) and (one.basis != "energy") == known
+        ]
         least, longest = np.inf, np.inf
-        read = {one.td: (-as_read(one.rigid_time or 0.0), as_printed(one.error)) for one in group}
+        read = {
+            one.td: (-as_read(one.rigid_time or 0.0), as_printed(one.error))
+            for one in group
+        }
         for one in sorted(group, key=lambda one: read[one.td]):
             rigid, error = read[one.td]
-            if error < least or (error, rigid) == (least, longest):  # equal pairs do not beat each other
+            if error < least or (error, rigid) == (
+                least,
+                longest,
+            ):  # equal pairs do not beat each other
                 unbeaten.add(one.td)
                 least, longest = error, rigid
     return (replace(one, unbeaten=one.td in unbeaten) for one in offers)
@@ -224,24 +263,47 @@ def _step(start: Offer, offers: Sequence[Offer]) -> Offer | None:
     """Give the nearest unbeaten td with half the error, else the recommended one where it has less, else None."""
     error = np.inf if start.error is None else start.error
     kept = _LEAST_KEPT * (start.rigid_time or 0.0)
-    alike = [one for one in offers if start.pair is None or (one.basis == "energy") == (start.basis == "energy")]
-    less = [one for one in alike if _found(one) and (one.error or 0.0) < error - EQUALLY_GOOD]
-    halved = [one for one in less if one.unbeaten and (one.error or 0.0) <= _MUCH_LESS * error]
+    alike = [
+        one
+        for one in offers
+        if start.pair is None or (one.basis == "energy") == (start.basis == "energy")
+    ]
+    less = [
+        one
+        for one in alike
+        if _found(one) and (one.error or 0.0) < error - EQUALLY_GOOD
+    ]
+    halved = [
+        one for one in less if one.unbeaten and (one.error or 0.0) <= _MUCH_LESS * error
+    ]
     near = [one for one in halved if (one.rigid_time or 0.0) >= kept]
-    return min(near, key=lambda one: abs(one.td - start.td), default=next((o for o in less if o.recommended), None))
+    return min(
+        near,
+        key=lambda one: abs(one.td - start.td),
+        default=next((o for o in less if o.recommended), None),
+    )
 
 
 def _cautions(
-    situation: Situation, window: tuple[float, float], inside: tuple[float, float], offers: Sequence[Offer]
+    situation: Situation,
+    window: tuple[float, float],
+    inside: tuple[float, float],
+    offers: Sequence[Offer],
 ) -> Iterator[Caution]:
     """What to be aware of in all of the window; of a single td the offer tells."""
     of_td = {"poor-td", "td-in-load", "td-after-contact", "no-energy", "at-rest"}
     yield from (one for one in cautions_of(situation) if one.code not in of_td)
     if inside[1] < window[1]:
         kept = window[1] - inside[1]
-        yield Caution("margin-kept", f"td up to {inside[1]:.6g}: {kept:.3g} are kept clear up to {window[1]:.6g}")
+        yield Caution(
+            "margin-kept",
+            f"td up to {inside[1]:.6g}: {kept:.3g} are kept clear up to {window[1]:.6g}",
+        )
     if not any(map(_found, offers)):
-        yield Caution("no-candidate", "no td in the window has an acceptable tr that saves anything")
+        yield Caution(
+            "no-candidate",
+            "no td in the window has an acceptable tr that saves anything",
+        )
 
 
 # td on the grid of a page: some pixels of a screen apart, and finer than anybody drags.
@@ -252,12 +314,20 @@ _FEWEST_STEPS: Final = 40
 
 def explored_flights(reference: Reference, plan: Plan) -> tuple[TradeOff, ...]:
     """Find what other td cost than those of a plan, for each of its flights; its grids are the coarser the more."""
-    answers = {row.number: row.answer for row in plan.flights if row.answer and row.window}
+    answers = {
+        row.number: row.answer for row in plan.flights if row.answer and row.window
+    }
     landings = {row.number: row.flight.end for row in plan.flights}
     reference = reference._replace(history=plan.history)
     steps = max(_STEPS_OF_PAGE // max(len(answers), 1), _FEWEST_STEPS)
     found = (
-        explored_around(reference, one.situation, one.td_window, steps=steps, since=landings.get(number - 1))
+        explored_around(
+            reference,
+            one.situation,
+            one.td_window,
+            steps=steps,
+            since=landings.get(number - 1),
+        )
         for number, one in answers.items()
     )
     return tuple(one for one in found if one)
@@ -295,6 +365,13 @@ def explored_around(
         return None
     try:
         span = window or flight.within(situation.history.time)
-        return explore_of(reference, situation.settings, span, td=situation.td, steps=steps, since=since)
+        return explore_of(
+            reference,
+            situation.settings,
+            span,
+            td=situation.td,
+            steps=steps,
+            since=since,
+        )
     except RangeError:  # the window holds no state
         return None

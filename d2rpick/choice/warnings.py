@@ -41,7 +41,10 @@ _NOTABLE_PLASTIC = 0.05
 def cautions_of(situation: Situation) -> Iterator[Caution]:
     """Everything to be aware of in a situation, the input first."""
     if not situation.history.complete:
-        yield Caution("truncated-input", "the input ends within a state; only complete states were used")
+        yield Caution(
+            "truncated-input",
+            "the input ends within a state; only complete states were used",
+        )
     yield from _of_energy(situation)
     yield from cautions_of_few_states(situation)
     yield from _of_parts(situation)
@@ -49,7 +52,11 @@ def cautions_of(situation: Situation) -> Iterator[Caution]:
 
 
 def _of_energy(situation: Situation) -> Iterator[Caution]:
-    td, mode, share = situation.td, situation.vibration.whole.mode, situation.kinetic_share
+    td, mode, share = (
+        situation.td,
+        situation.vibration.whole.mode,
+        situation.kinetic_share,
+    )
     if situation.at_rest:
         found = f"nothing vibrates from {situation.earliest_tr:.6g} to td = {td:.6g}"
         right = "" if situation.flight.unknown_load else "any tr there is right, and "
@@ -57,13 +64,22 @@ def _of_energy(situation: Situation) -> Iterator[Caution]:
         return
     if situation.energy_td <= 0:
         found = f"the energy at td = {td:.6g} is {situation.energy_td:.6g}"
-        yield Caution("no-energy", f"{found}; a level to lock in needs a positive energy")
+        yield Caution(
+            "no-energy", f"{found}; a level to lock in needs a positive energy"
+        )
     if share is not None and share > POOR_KINETIC_SHARE:
         lost = f"{share:.0%} of the vibration energy is kinetic at td = {td:.6g}"
         yield Caution("poor-td", f"{lost} and no tr can keep it")
-    if mode and (mode.preload or abs(mode.energy_plastic) > _NOTABLE_PLASTIC * float(mode.vibration_energy(td))):
+    if mode and (
+        mode.preload
+        or abs(mode.energy_plastic)
+        > _NOTABLE_PLASTIC * float(mode.vibration_energy(td))
+    ):
         found = f"plastic work {mode.energy_plastic:.4g} and a preload energy of {mode.preload**2:.4g} fit the record"
-        yield Caution("plastic-or-preload", f"{found}; the energy alone cannot tell one from the other")
+        yield Caution(
+            "plastic-or-preload",
+            f"{found}; the energy alone cannot tell one from the other",
+        )
 
 
 def _of_parts(situation: Situation) -> Iterator[Caution]:
@@ -71,9 +87,15 @@ def _of_parts(situation: Situation) -> Iterator[Caution]:
     states = situation.evidence.states_per_period
     if vibration.basis == "modal" and states is not None and states < _FEW_STATES:
         found = f"the fastest strong vibration of the energy has {states:.2g} states per period"
-        yield Caution("coarse-record", f"{found}, and a still faster one is not seen; let the run write more states")
+        yield Caution(
+            "coarse-record",
+            f"{found}, and a still faster one is not seen; let the run write more states",
+        )
     if vibration.estimated:
-        yield Caution("kinetic-share-estimated", f"the kinetic share is what {vibration.estimated}")
+        yield Caution(
+            "kinetic-share-estimated",
+            f"the kinetic share is what {vibration.estimated}",
+        )
     for part in vibration.signed.unsigned if vibration.signed else ():
         yield Caution("part-without-sign", f"{part.name} was left out: {part.reason}")
 
@@ -87,33 +109,51 @@ def _of_flight(situation: Situation) -> Iterator[Caution]:
     yield from _of_evidence(situation)
     if flight.source == "energy":
         found = f"the end of the load, {flight.start:.6g}, was found from the energy alone, which is not certain"
-        if flight.settled is not None and flight.start is not None and flight.settled < flight.start:
+        if (
+            flight.settled is not None
+            and flight.start is not None
+            and flight.settled < flight.start
+        ):
             found += f": {flight.start - flight.settled:.3g} from {flight.settled:.6g} on are left unused for safety"
-        yield Caution("flight-from-energy", f"{found}; give it as `after` where it is known")
+        yield Caution(
+            "flight-from-energy", f"{found}; give it as `after` where it is known"
+        )
     if earliest is None:
         found = "nothing in the record shows when the load is over"
         given = situation.settings.after is not None or flight.refusal
-        yield Caution("no-flight", found if given else f"{found}; give that time as `after`")
+        yield Caution(
+            "no-flight", found if given else f"{found}; give that time as `after`"
+        )
     elif td <= earliest:
         yield Caution(
-            "td-in-load", f"td = {td:.6g} lies {'at' if td == earliest else 'before'} {end_of_load(situation)}"
+            "td-in-load",
+            f"td = {td:.6g} lies {'at' if td == earliest else 'before'} {end_of_load(situation)}",
         )
     yield from _of_grazing(situation)
     if td > situation.latest_td:
-        yield Caution("td-after-contact", f"td = {td:.6g} lies after {end_of_flight(situation)}")
+        yield Caution(
+            "td-after-contact", f"td = {td:.6g} lies after {end_of_flight(situation)}"
+        )
 
 
 def _of_grazing(situation: Situation) -> Iterator[Caution]:
     """Say so where the body only grazes what it touches at the end of the flight, and how early it may do so."""
     flight = situation.flight
     margin = situation.expected_margin
-    if flight.end is None or flight.start is None or flight.refusal or margin.source != "grazing":
+    if (
+        flight.end is None
+        or flight.start is None
+        or flight.refusal
+        or margin.source != "grazing"
+    ):
         return
     grazed = f"the force of the contact at {flight.end:.6g} stays below 1 % of the largest one at first"
     early = min(margin.time, flight.end - flight.start)
     moved = f"the body grazes it, and if it is out of place at td, that contact comes up to {early:.2g} earlier"
     kept = (
-        f"keep td before {not_after(flight.end - early):.6g}" if early < flight.end - flight.start else "no td is safe"
+        f"keep td before {not_after(flight.end - early):.6g}"
+        if early < flight.end - flight.start
+        else "no td is safe"
     )
     yield Caution("grazing-contact", f"{grazed}: {moved}; {kept}")
 
@@ -125,16 +165,24 @@ def _of_evidence(situation: Situation) -> Iterator[Caution]:
         return
     if flight.source == "momentum":
         found = "the momentum changes at a constant rate in the flight, which was taken for gravity"
-        yield Caution("gravity-assumed", f"{found}; the mass, or kinetic and internal energy, would show whether it is")
+        yield Caution(
+            "gravity-assumed",
+            f"{found}; the mass, or kinetic and internal energy, would show whether it is",
+        )
         return
     if flight.source == "contact-force":
         found = "contacts whose forces are not written, and other loads, do not show in those that are"
-        yield Caution("flight-uncertain", f"{found}; momenta of the parts would make the flight sure")
+        yield Caution(
+            "flight-uncertain",
+            f"{found}; momenta of the parts would make the flight sure",
+        )
         return
     found = "nothing but energies shows the flight, and a fixed wall does no work"
     if flight.unknown_load:
         found = "nothing but energies shows the flight, in which gravity or another load works"
-    yield Caution("flight-uncertain", f"{found}; momenta of the parts would make it sure")
+    yield Caution(
+        "flight-uncertain", f"{found}; momenta of the parts would make it sure"
+    )
 
 
 def out_of_place(situation: Situation, tr: float) -> Iterator[Caution]:
@@ -149,16 +197,33 @@ def out_of_place(situation: Situation, tr: float) -> Iterator[Caution]:
     worst = bodies.worst(tr, situation.td)
     if worst is None or worst.error <= bodies.limit:
         return
-    drift, which = worst.drift, f" of {name_units(worst.body.parts)}" if worst.body else ""
-    share, last = worst.error / float(drift.path[-1]), float(drift.time[-1] - drift.time[0])
-    found = f"{drift.part.name} is frozen elsewhere than it is at td = {situation.td:.6g}"
+    drift, which = (
+        worst.drift,
+        f" of {name_units(worst.body.parts)}" if worst.body else "",
+    )
+    share, last = (
+        worst.error / float(drift.path[-1]),
+        float(drift.time[-1] - drift.time[0]),
+    )
+    found = (
+        f"{drift.part.name} is frozen elsewhere than it is at td = {situation.td:.6g}"
+    )
     least = "at least " * worst.at_least
     off = f"there the body{which} is off by {least}{worst.error:.3g}, {share:.1%} of its path in the flight"
     taken = "; this holds if the parts become one rigid body" if worst.assumed else ""
-    taken += ", which `deck` tells" if worst.assumed and situation.settings.bodies is None else ""
-    contact = margin_before_contact(situation.history, situation.flight, place=worst.error).spread
+    taken += (
+        ", which `deck` tells"
+        if worst.assumed and situation.settings.bodies is None
+        else ""
+    )
+    contact = margin_before_contact(
+        situation.history, situation.flight, place=worst.error
+    ).spread
     moved = f"; the next contact may move by {share * last if contact is None else contact:.2g}"
-    yield Caution("out-of-place", f"{found}: {off}{moved if situation.flight.end is not None else ''}{taken}")
+    yield Caution(
+        "out-of-place",
+        f"{found}: {off}{moved if situation.flight.end is not None else ''}{taken}",
+    )
 
 
 def _moves_apart(parts: Sequence[Part]) -> str:
@@ -169,7 +234,10 @@ def _moves_apart(parts: Sequence[Part]) -> str:
 
 def _not_predicted(told: Sequence[RigidBody], unknown: Sequence[RigidBody]) -> str:
     """Name the first body whose error is not known, and why."""
-    first, more = unknown[0], f", and of {len(unknown) - 1} more" if len(unknown) > 1 else ""
+    first, more = (
+        unknown[0],
+        f", and of {len(unknown) - 1} more" if len(unknown) > 1 else "",
+    )
     why = "" if first.whole else "; its pieces do not hang together"
     which = f"that of {name_units(first.parts)}{more}"
     return f"{len(told)} rigid bodies: how far {which} is out of place is not predicted{why}"
@@ -197,7 +265,11 @@ def _nearest_flight(situation: Situation) -> str:
     if flight.end is None:
         return f"; the next flight begins at {flight.start:.6g}"
     margin = _margin(situation.margin)
-    last = f",{margin} its last td is {not_after(situation.latest_td):.6g}" if margin else "; td must lie in it"
+    last = (
+        f",{margin} its last td is {not_after(situation.latest_td):.6g}"
+        if margin
+        else "; td must lie in it"
+    )
     return f"; the nearest flight lasts from {window_as_read(flight.start, flight.end)}{last}"
 
 
@@ -282,9 +354,15 @@ def means_of(situation: Situation) -> Means | None:
     lowest = max(0.0, float(energy.min()))
     resting = _AT_REST * lowest
     # what damping leaves of them is nothing where the decay has no double any more
-    decay = np.exp(np.minimum(-situation.flight.damping * (time - situation.td), _LARGEST_EXPONENT))
+    decay = np.exp(
+        np.minimum(-situation.flight.damping * (time - situation.td), _LARGEST_EXPONENT)
+    )
     after = resting + (mean - resting) / float(decay.mean())
-    return Means(mean, lowest, resting, after) if after > round_off(situation.history) else None
+    return (
+        Means(mean, lowest, resting, after)
+        if after > round_off(situation.history)
+        else None
+    )
 
 
 def most_energy(situation: Situation) -> float:
@@ -321,7 +399,9 @@ def mean_in_flight(situation: Situation) -> float | None:
 def _flight(situation: Situation) -> tuple[Samples, Samples]:
     """Times and energies of the flight, up to td where its end is not known; empty where its start is not."""
     start, end = situation.flight.start, situation.flight.end
-    return situation.history.between(np.inf if start is None else start, situation.td if end is None else end)
+    return situation.history.between(
+        np.inf if start is None else start, situation.td if end is None else end
+    )
 
 
 def shortfall(energy: Samples, mean: float) -> Samples:
@@ -334,7 +414,9 @@ def shortfall(energy: Samples, mean: float) -> Samples:
     >>> shortfall(np.array([0.5, 2.0, 3.0]), 1.0)
     array([0.5, 0. , inf])
     """
-    return np.where(energy <= 2 * mean, 1 - np.sqrt(np.maximum(energy, 0.0) / (2 * mean)), np.inf)
+    return np.where(
+        energy <= 2 * mean, 1 - np.sqrt(np.maximum(energy, 0.0) / (2 * mean)), np.inf
+    )
 
 
 class Objection(NamedTuple):
@@ -348,7 +430,10 @@ class Objection(NamedTuple):
 
 
 def objections(
-    situations: Sequence[Situation], place: NDArray[np.int32], tr: Samples, columns: Columns
+    situations: Sequence[Situation],
+    place: NDArray[np.int32],
+    tr: Samples,
+    columns: Columns,
 ) -> Iterator[Objection]:
     """Give every reason against some of the candidates.
 
@@ -363,24 +448,39 @@ def objections(
     columns : mapping of arrays of shape (n,)
         By their names: the measures, ``energy`` and ``level_error``.
     """
-    begun = np.array([np.nan if one.earliest_tr is None else first_as_read(one.earliest_tr) for one in situations])
+    begun = np.array(
+        [
+            np.nan if one.earliest_tr is None else first_as_read(one.earliest_tr)
+            for one in situations
+        ]
+    )
     yield Objection(~(tr >= begun[place]), partial(_tell_in_load, situations, place))
     refused = np.array([any(True for _ in against_td(one)) for one in situations])
     yield Objection(refused[place], partial(_tell_against_td, situations, place))
     moves = np.array([not one.at_rest for one in situations])[place]
     compared = measures.compared(columns)
-    described = compared | np.array([bool(one.vibration.unknown) for one in situations])[place]
+    described = (
+        compared | np.array([bool(one.vibration.unknown) for one in situations])[place]
+    )
     modal = np.array([one.basis == "modal" for one in situations])[place]
     same_sign = (columns["sign_match"] != 0) | modal
     yield Objection(moves & ~described, partial(_tell_undescribed, situations, place))
-    yield Objection(moves & ~same_sign, partial(_tell_always, "opposite sign of the deformation"))
-    error, judged = np.where(compared, columns["lock_in_error"], columns["level_error"]), moves & described & same_sign
+    yield Objection(
+        moves & ~same_sign, partial(_tell_always, "opposite sign of the deformation")
+    )
+    error, judged = (
+        np.where(compared, columns["lock_in_error"], columns["level_error"]),
+        moves & described & same_sign,
+    )
     nothing = "the energy is not positive here, so there is nothing to compare"
     yield Objection(judged & np.isnan(error), partial(_tell_always, nothing))
     most = np.array([one.most_error for one in situations])[place]
     too_much = judged & (error > most)
     yield Objection(too_much & ~modal, partial(_tell_error, error, most))
-    yield Objection(too_much & modal, partial(_tell_keeps_nothing, situations, place, columns["residual"]))
+    yield Objection(
+        too_much & modal,
+        partial(_tell_keeps_nothing, situations, place, columns["residual"]),
+    )
     # beyond its end the flight tells nothing of what comes after td
     means = [means_of(one) if one.td <= one.latest_td else None for one in situations]
     if any(means):
@@ -389,15 +489,21 @@ def objections(
         yield Objection(more, partial(_tell_above_the_reference, means, place, energy))
 
 
-def _tell_in_load(situations: Sequence[Situation], place: NDArray[np.int32], candidate: int) -> list[str]:
+def _tell_in_load(
+    situations: Sequence[Situation], place: NDArray[np.int32], candidate: int
+) -> list[str]:
     return [_in_load(situations[place[candidate]])]
 
 
-def _tell_against_td(situations: Sequence[Situation], place: NDArray[np.int32], candidate: int) -> Iterator[str]:
+def _tell_against_td(
+    situations: Sequence[Situation], place: NDArray[np.int32], candidate: int
+) -> Iterator[str]:
     return against_td(situations[place[candidate]])
 
 
-def _tell_undescribed(situations: Sequence[Situation], place: NDArray[np.int32], candidate: int) -> list[str]:
+def _tell_undescribed(
+    situations: Sequence[Situation], place: NDArray[np.int32], candidate: int
+) -> list[str]:
     return [situations[place[candidate]].vibration.undescribed]
 
 
@@ -411,20 +517,28 @@ def _tell_error(error: Samples, most: Samples, candidate: int) -> list[str]:
 
 
 def _tell_keeps_nothing(
-    situations: Sequence[Situation], place: NDArray[np.int32], residual: Samples, candidate: int
+    situations: Sequence[Situation],
+    place: NDArray[np.int32],
+    residual: Samples,
+    candidate: int,
 ) -> list[str]:
     return [_keeps_nothing(situations[place[candidate]], residual[candidate])]
 
 
 def _tell_above_the_reference(
-    means: Sequence[Means | None], place: NDArray[np.int32], energy: Samples, candidate: int
+    means: Sequence[Means | None],
+    place: NDArray[np.int32],
+    energy: Samples,
+    candidate: int,
 ) -> Iterator[str]:
     return _above_the_reference(means[place[candidate]], energy[candidate])
 
 
 def _in_load(situation: Situation) -> str:
     if situation.earliest_tr is None:
-        return situation.flight.refusal or "unknown: nothing shows when the load is over"
+        return (
+            situation.flight.refusal or "unknown: nothing shows when the load is over"
+        )
     return f"before {end_of_load(situation)}"
 
 

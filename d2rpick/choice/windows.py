@@ -26,7 +26,9 @@ _END_HALVINGS: Final = 20
 _BELOW = 1e-12
 
 
-def acceptable_windows(situation: Situation, candidates: Candidates, recommended: float | None) -> Samples:
+def acceptable_windows(
+    situation: Situation, candidates: Candidates, recommended: float | None
+) -> Samples:
     """Find the windows in which a tr is acceptable.
 
     Every end and middle was judged by the rule of ``verify``; ends lie inside.  In between the rule cannot change:
@@ -50,12 +52,21 @@ def acceptable_windows(situation: Situation, candidates: Candidates, recommended
     if situation.at_rest:  # any tr before td is right, unless td itself is wrong
         widest = grid[np.newaxis, [0, -1]]
     else:
-        widest = _windows_below(situation, grid, min(situation.most_error, _residual_left(situation)))
-    judged = judge(situation, np.append(widest, widest.mean(axis=1, keepdims=True), axis=1).ravel().tolist())
+        widest = _windows_below(
+            situation, grid, min(situation.most_error, _residual_left(situation))
+        )
+    judged = judge(
+        situation,
+        np.append(widest, widest.mean(axis=1, keepdims=True), axis=1).ravel().tolist(),
+    )
     kept = widest[judged.kept.reshape(-1, 3).all(axis=1)]
     if situation.at_rest:
         return kept
-    if kept.size and kept[-1, 1] >= grid[-1] and not (recommended is not None and kept[-1, 0] <= recommended):
+    if (
+        kept.size
+        and kept[-1, 1] >= grid[-1]
+        and not (recommended is not None and kept[-1, 0] <= recommended)
+    ):
         kept = kept[:-1]
     return kept
 
@@ -69,7 +80,9 @@ def clear_of_td(situation: Situation, windows: Samples) -> Samples:
     return np.stack([kept[:, 0], np.minimum(kept[:, 1], end)], axis=1)
 
 
-def alike_windows(situation: Situation, candidates: Candidates, chosen: Candidate, acceptable: Samples) -> Samples:
+def alike_windows(
+    situation: Situation, candidates: Candidates, chosen: Candidate, acceptable: Samples
+) -> Samples:
     """Find where in the acceptable windows a tr keeps the timing tolerance: its error is at most 0.05 above the chosen.
 
     The timing tolerance of a candidate is how far it may be off before its lock-in error grows by 0.05; on the energy
@@ -90,10 +103,17 @@ def alike_windows(situation: Situation, candidates: Candidates, chosen: Candidat
         First and last time of each window, ascending [time].
     """
     level = float(situation.errors(np.array([chosen.tr]))[0]) + TOLERATED_GROWTH
-    return common_windows([acceptable, _windows_below(situation, monotone_grid(situation, candidates), level)])
+    return common_windows(
+        [
+            acceptable,
+            _windows_below(situation, monotone_grid(situation, candidates), level),
+        ]
+    )
 
 
-def coverage(runs: Sequence[Samples]) -> tuple[Samples, np.ndarray[tuple[int], np.dtype[np.intp]]]:
+def coverage(
+    runs: Sequence[Samples],
+) -> tuple[Samples, np.ndarray[tuple[int], np.dtype[np.intp]]]:
     """Count in how many runs times lie in a window.
 
     Parameters
@@ -116,11 +136,15 @@ def coverage(runs: Sequence[Samples]) -> tuple[Samples, np.ndarray[tuple[int], n
     ends = np.concatenate([np.zeros((0, 2)), *runs])
     times = ends.T.ravel()
     steps = np.repeat([1, -1], len(ends))
-    order = np.lexsort((-steps, times))  # at one time windows begin before others end: ends are included
+    order = np.lexsort(
+        (-steps, times)
+    )  # at one time windows begin before others end: ends are included
     counts = np.cumsum(steps[order])[:-1]
     stretches = np.stack([times[order][:-1], times[order][1:]], axis=1)
     # between two windows that begin, or end, at the same time lies nothing that one would miss
-    lasting = (stretches[:, 0] < stretches[:, 1]) | ((steps[order][:-1] > 0) & (steps[order][1:] < 0))
+    lasting = (stretches[:, 0] < stretches[:, 1]) | (
+        (steps[order][:-1] > 0) & (steps[order][1:] < 0)
+    )
     seen = lasting & (counts > 0)
     return stretches[seen], counts[seen]
 
@@ -145,8 +169,12 @@ def monotone_grid(situation: Situation, candidates: Candidates) -> Samples:
         return np.zeros(0)
     ends = [start, np.nextafter(td, -np.inf)]
     # what may be locked in at most is passed between the samples, and is just kept there in doubles too
-    most = find_crossings(history.time, history.energy, (1 - _BELOW) * most_energy(situation))[0]
-    times = np.concatenate([history.time, candidates.tr, most, situation.vibration.knots(), ends])
+    most = find_crossings(
+        history.time, history.energy, (1 - _BELOW) * most_energy(situation)
+    )[0]
+    times = np.concatenate(
+        [history.time, candidates.tr, most, situation.vibration.knots(), ends]
+    )
     return union(times[(times >= max(start, history.time[0])) & (times < td)])
 
 
@@ -157,7 +185,9 @@ def _residual_left(situation: Situation) -> float:
         return np.inf
     if share is None or sqrt(share) > limit:
         return -1.0
-    return sqrt(limit - sqrt(share)) * sqrt(limit + sqrt(share))  # the square of a large limit is no number
+    return sqrt(limit - sqrt(share)) * sqrt(
+        limit + sqrt(share)
+    )  # the square of a large limit is no number
 
 
 def _windows_below(situation: Situation, grid: Samples, level: float) -> Samples:
@@ -165,7 +195,9 @@ def _windows_below(situation: Situation, grid: Samples, level: float) -> Samples
     most = most_energy(situation)
 
     def keeps(times: Samples) -> NDArray[np.bool_]:
-        return (situation.errors(times) <= level) & (situation.vibration.whole.energies(times) <= most)
+        return (situation.errors(times) <= level) & (
+            situation.vibration.whole.energies(times) <= most
+        )
 
     inside = np.pad(keeps(grid), 1)
     first = np.flatnonzero(inside[1:-1] & ~inside[:-2])
@@ -174,7 +206,9 @@ def _windows_below(situation: Situation, grid: Samples, level: float) -> Samples
     if not within.size:
         return within
     beyond = grid[np.clip([first - 1, last + 1], 0, grid.size - 1).T]
-    return narrow(lambda t: keeps(t.ravel()).reshape(t.shape), within, beyond, steps=_END_HALVINGS).within
+    return narrow(
+        lambda t: keeps(t.ravel()).reshape(t.shape), within, beyond, steps=_END_HALVINGS
+    ).within
 
 
 # What a straight line between two points may be off by [-]: half of the last digit that is shown.
@@ -184,7 +218,9 @@ _EXACT: Final = 5e-4
 _HALVINGS: Final = 20
 
 
-def error_profile(situation: Situation, candidates: Candidates, windows: Samples) -> Samples:
+def error_profile(
+    situation: Situation, candidates: Candidates, windows: Samples
+) -> Samples:
     """Give the error of a tr in windows as points between which it is a straight line, to within 0.0005.
 
     Parameters
@@ -208,7 +244,13 @@ def error_profile(situation: Situation, candidates: Candidates, windows: Samples
     for _ in range(_HALVINGS):
         middles = (times[1:] + times[:-1]) / 2
         middles = middles[_inside(middles, windows)]
-        bent = np.abs(_errors(situation, middles) - np.interp(middles, times, _errors(situation, times))) > _EXACT / 2
+        bent = (
+            np.abs(
+                _errors(situation, middles)
+                - np.interp(middles, times, _errors(situation, times))
+            )
+            > _EXACT / 2
+        )
         if not bent.any():
             break
         times = union(times, middles[bent])
@@ -222,7 +264,9 @@ def error_at(profile: Samples, time: float) -> float:
 
 def _errors(situation: Situation, times: Samples) -> Samples:
     """Residuals, or level errors on the energy alone, of the shape of ``times`` [-]."""
-    return np.asarray(np.sqrt(situation.errors(times) ** 2 + (situation.kinetic_share or 0.0)))
+    return np.asarray(
+        np.sqrt(situation.errors(times) ** 2 + (situation.kinetic_share or 0.0))
+    )
 
 
 def _inside(times: Samples, windows: Samples) -> Samples:
@@ -236,7 +280,9 @@ def _thinned(times: Samples, errors: Samples, windows: Samples) -> Samples:
     kept = np.flatnonzero(np.isin(times, windows))
     while True:
         off = np.abs(errors - np.interp(times, times[kept], errors[kept]))
-        worst = np.repeat(np.maximum.reduceat(off, kept), np.diff(kept, append=times.size))
+        worst = np.repeat(
+            np.maximum.reduceat(off, kept), np.diff(kept, append=times.size)
+        )
         new = np.flatnonzero((off == worst) & (off > _EXACT / 2))
         if not new.size:
             return np.stack([times[kept], errors[kept]])

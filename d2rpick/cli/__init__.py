@@ -31,7 +31,10 @@ _WORK: Final = {
     "parts": ("one_run", "Say which parts may be switched, and what that saves."),
     "verify": ("one_run", "Judge a pair of times, or a finished switched run."),
     "study": ("study", "Choose tr for many runs, and one tr for all."),
-    "follow": ("running", "Watch a run while it is computed: when it flies, when to switch."),
+    "follow": (
+        "running",
+        "Watch a run while it is computed: when it flies, when to switch.",
+    ),
     "extract": ("one_run", "Write the chosen energy as csv or hdf5."),
     "card": ("decks", "Print solver input for switching windows."),
     "first": ("running", "Write a deck whose first run switches itself."),
@@ -70,14 +73,29 @@ class Documented(click.Command):
 
     @cached_property
     def _help(self) -> click.Option:
-        flag: Any = {"is_flag": True, "is_eager": True, "expose_value": False, "allow_from_autoenv": False}
-        return click.Option(["-h", "--help"], **flag, callback=_show_help, help="Show this message and exit.")
+        flag: Any = {
+            "is_flag": True,
+            "is_eager": True,
+            "expose_value": False,
+            "allow_from_autoenv": False,
+        }
+        return click.Option(
+            ["-h", "--help"],
+            **flag,
+            callback=_show_help,
+            help="Show this message and exit.",
+        )
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """Write the examples no wider than the help."""
-        from d2rpick.report.tables import continued  # not above: most of what is typed does without it
+        from d2rpick.report.tables import (
+            continued,
+        )  # not above: most of what is typed does without it
 
-        lines = [continued(f"  {line}", formatter.width) for line in (self.epilog or "").split("\n")]
+        lines = [
+            continued(f"  {line}", formatter.width)
+            for line in (self.epilog or "").split("\n")
+        ]
         formatter.write("\n" + "\n".join(lines) + "\n")
 
 
@@ -87,23 +105,37 @@ class _Group(Documented, click.Group):
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002  click's signature
         return list(COMMANDS)
 
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
+    def format_commands(
+        self,
+        ctx: click.Context,  # noqa: ARG002
+        formatter: click.HelpFormatter,
+    ) -> None:
         for title, commands in (("Commands", _WORK), ("Experiments", _EXPERIMENTS)):
             with formatter.section(title):
-                formatter.write_dl([(name, line) for name, (_, line) in commands.items()])
+                formatter.write_dl(
+                    [(name, line) for name, (_, line) in commands.items()]
+                )
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:  # noqa: ARG002
         if name not in COMMANDS:
             return None
-        command: click.Command = getattr(importlib.import_module(f"d2rpick.cli.{COMMANDS[name][0]}"), name)
+        command: click.Command = getattr(
+            importlib.import_module(f"d2rpick.cli.{COMMANDS[name][0]}"), name
+        )
         return command
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
-        if not (args[0] in COMMANDS or args[0].startswith("-") or ctx.resilient_parsing):
+        if not (
+            args[0] in COMMANDS or args[0].startswith("-") or ctx.resilient_parsing
+        ):
             import difflib
 
             close = difflib.get_close_matches(args[0], COMMANDS, n=1)
-            hint = f"Did you mean {close[0]!r}?" if close else f"The commands are {', '.join(COMMANDS)}."
+            hint = (
+                f"Did you mean {close[0]!r}?"
+                if close
+                else f"The commands are {', '.join(COMMANDS)}."
+            )
             raise click.UsageError(f"No such command {args[0]!r}. {hint}", ctx)
         return super().resolve_command(ctx, args)
 
@@ -126,9 +158,16 @@ class _Group(Documented, click.Group):
                 raise click.Abort from None
             from d2rpick.cli.output import explained
 
-            raise click.ClickException(explained(error, ctx.meta.get("d2rpick.history", ()))) from error
+            raise click.ClickException(
+                explained(error, ctx.meta.get("d2rpick.history", ()))
+            ) from error
 
-    def main(self, args: Sequence[str] | None = None, prog_name: str | None = None, **extra: Any) -> NoReturn:  # type: ignore[override]
+    def main(  # type: ignore[override]
+        self,
+        args: Sequence[str] | None = None,
+        prog_name: str | None = None,
+        **extra: Any,
+    ) -> NoReturn:
         extra["standalone_mode"] = False
         try:
             code = super().main(args, prog_name or "d2rpick", **extra)
@@ -167,7 +206,9 @@ def _tell_error(message: str) -> None:
     tell(f"d2rpick: {message}")
 
 
-_VERSIONS: Final = "Show the version, and those of the libraries it stands on, and exit."
+_VERSIONS: Final = (
+    "Show the version, and those of the libraries it stands on, and exit."
+)
 
 
 def _versions(ctx: click.Context, _: click.Parameter, value: bool) -> None:
@@ -191,10 +232,14 @@ def documented(cls: type[_Made], **settings: Any) -> Callable[[Any], _Made]:
     """Make a command of a function, whose docstring is the help, with the examples at its end."""
 
     def made(function: Any) -> _Made:
-        told, _, examples = cleandoc(function.__doc__).partition("\n\nExamples\n--------\n")
+        told, _, examples = cleandoc(function.__doc__).partition(
+            "\n\nExamples\n--------\n"
+        )
         lines = examples.replace("\\\n    ", "").split("\n")  # each command in one line
         epilog = "\n".join(["Examples:", *(f"  {line}" for line in lines)])
-        return click.command(function.__name__, cls=cls, help=told, epilog=epilog, **settings)(function)
+        return click.command(
+            function.__name__, cls=cls, help=told, epilog=epilog, **settings
+        )(function)
 
     return made
 
@@ -203,7 +248,14 @@ def documented(cls: type[_Made], **settings: Any) -> Callable[[Any], _Made]:
     _Group,
     context_settings={"auto_envvar_prefix": "D2RPICK", "max_content_width": 100},
 )
-@click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=_versions, help=_VERSIONS)
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_versions,
+    help=_VERSIONS,
+)
 def d2rpick() -> None:
     """Choose the times of deformable-to-rigid switching from the internal energy of one reference run.
 

@@ -34,7 +34,12 @@ if TYPE_CHECKING:
     },
 )
 def card(
-    tr: tuple[float, ...], td: tuple[float, ...], windows: str | None, request: Request, cards: Cards, output: Output
+    tr: tuple[float, ...],
+    td: tuple[float, ...],
+    windows: str | None,
+    request: Request,
+    cards: Cards,
+    output: Output,
 ) -> None:
     """Print solver input for switching windows, ready to be pasted.
 
@@ -61,28 +66,40 @@ def card(
     output.finish(objection=not found.verified)
 
 
-def _windows(tr: Sequence[float], td: Sequence[float], file: str | None) -> Sequence[tuple[float, float]]:
+def _windows(
+    tr: Sequence[float], td: Sequence[float], file: str | None
+) -> Sequence[tuple[float, float]]:
     """Pair the times, or read them from the file; UsageError where they do not say windows."""
     if file is not None:
         if tr or td:
             raise click.UsageError("--windows excludes --tr and --td")
         return options.windows_in(file)
     if not tr or not td:
-        raise click.UsageError(f"a card needs {'--td' if tr else '--tr'}; or --windows, a file with lines 'tr td'")
+        raise click.UsageError(
+            f"a card needs {'--td' if tr else '--tr'}; or --windows, a file with lines 'tr td'"
+        )
     if len(tr) != len(td):
-        raise click.UsageError(f"{len(tr)} --tr and {len(td)} --td were given, a --td for each --tr was expected")
+        raise click.UsageError(
+            f"{len(tr)} --tr and {len(td)} --td were given, a --td for each --tr was expected"
+        )
     return list(zip(tr, td, strict=True))
 
 
 @options.command
-@click.argument("deck", metavar="DECK...", nargs=-1, required=True, type=click_type("file"))
+@click.argument(
+    "deck", metavar="DECK...", nargs=-1, required=True, type=click_type("file")
+)
 @options.takes(*REFERENCE)
 @click.option(
     "--select", metavar="IDS", multiple=True, type=click_type("rules"),
     help="Check only these rules, by id or its beginning: D2R101,D2R2.  [default: by d2rpick.toml or pyproject.toml]",
 )  # fmt: skip
 @click.option(
-    "--ignore", metavar="IDS", multiple=True, type=click_type("rules"), help="Skip these rules; overrules --select."
+    "--ignore",
+    metavar="IDS",
+    multiple=True,
+    type=click_type("rules"),
+    help="Skip these rules; overrules --select.",
 )
 @click.option(
     "--fail-on", type=click.Choice(["error", "warning"]), default="error", show_default=True,
@@ -114,9 +131,16 @@ def check(
     run = options.judging_run(request)
     output = output.beside(*deck, *(run.sources if run else ()))
     found = findings_of(deck, run, request, _ids(select), _ids(ignore), fail_on)
-    output.spare(file for many in (found.results, found.failed) for one in many for file in one.files)
+    output.spare(
+        file
+        for many in (found.results, found.failed)
+        for one in many
+        for file in one.files
+    )
     notes_before = click.get_current_context().meta["d2rpick.unused"]
-    output.notes([note for note in found.notes if note not in notes_before], found.cautions)
+    output.notes(
+        [note for note in found.notes if note not in notes_before], found.cautions
+    )
     for one in found.failed:
         tell(f"d2rpick: {explained(one.error, [one.deck])}")
     form = output.output_format
@@ -128,7 +152,12 @@ def check(
 
 
 def _ids(texts: Sequence[str]) -> tuple[str, ...]:
-    return tuple(name.strip().upper() for text in texts for name in text.split(",") if name.strip())
+    return tuple(
+        name.strip().upper()
+        for text in texts
+        for name in text.split(",")
+        if name.strip()
+    )
 
 
 @options.command

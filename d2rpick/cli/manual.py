@@ -22,14 +22,31 @@ def manual() -> str:
         ".SH NAME",
         f"d2rpick \\- {_text((d2rpick.help or '').partition('.')[0].lower())}",
     ]
-    lines += [".SH SYNOPSIS", ".B d2rpick", r"\fICOMMAND\fR [\fIOPTIONS\fR]...", ".SH DESCRIPTION"]
+    lines += [
+        ".SH SYNOPSIS",
+        ".B d2rpick",
+        r"\fICOMMAND\fR [\fIOPTIONS\fR]...",
+        ".SH DESCRIPTION",
+    ]
     lines += _described(d2rpick, context)
     for name in d2rpick.list_commands(context):
         command = d2rpick.get_command(context, name)
         assert command is not None
-        lines += [f".SH d2rpick {name}", *_described(command, click.Context(command, context, f"d2rpick {name}"))]
-    lines += [".SH EXIT STATUS", *_item("0", "done"), *_item("1", "ran, and the answer is an objection")]
-    lines += [*_item("2", "could not run: wrong usage, unreadable input, a time outside the record")]
+        lines += [
+            f".SH d2rpick {name}",
+            *_described(command, click.Context(command, context, f"d2rpick {name}")),
+        ]
+    lines += [
+        ".SH EXIT STATUS",
+        *_item("0", "done"),
+        *_item("1", "ran, and the answer is an objection"),
+    ]
+    lines += [
+        *_item(
+            "2",
+            "could not run: wrong usage, unreadable input, a time outside the record",
+        )
+    ]
     return "\n".join(lines) + "\n"
 
 
@@ -41,12 +58,23 @@ def _described(command: click.Command, context: click.Context) -> Iterator[str]:
     for paragraph in (command.help or "").split("\n\n"):
         yield from (".PP", _text(" ".join(paragraph.split())))
     for option in command.get_params(context):
-        record = option.get_help_record(context) if isinstance(option, click.Option) else None
+        record = (
+            option.get_help_record(context)
+            if isinstance(option, click.Option)
+            else None
+        )
         if record:
             yield from _item(*record)
     if command.epilog:
         examples = [line.strip() for line in command.epilog.splitlines()]
-        yield from (".PP", _text(examples[0]), ".PP", ".nf", *map(_text, examples[1:]), ".fi")
+        yield from (
+            ".PP",
+            _text(examples[0]),
+            ".PP",
+            ".nf",
+            *map(_text, examples[1:]),
+            ".fi",
+        )
 
 
 def _item(name: str, text: str) -> tuple[str, ...]:

@@ -28,7 +28,9 @@ _NEEDED: Final = {"required": True}
     *options_of(Motion), of=[Motion],
     stiffness=_NEEDED, mass=_NEEDED, alpha={"default": 0.0}, t_end=_NEEDED, dt=_NEEDED,
 )  # fmt: skip
-@options.takes("plot", *FILES, plot="Draw displacements and energies to FILE (png, svg, pdf).")
+@options.takes(
+    "plot", *FILES, plot="Draw displacements and energies to FILE (png, svg, pdf)."
+)
 def replay(motion: Motion, output: Output) -> None:
     r"""Compute the floating oscillator in closed form, with or without switching.
 
@@ -51,7 +53,10 @@ def replay(motion: Motion, output: Output) -> None:
     if output.plot:
         from d2rpick.report import figures, figures_models
 
-        output.write(output.plot, figures.render(figures_models.draw_replay(found, switched), output.plot))
+        output.write(
+            output.plot,
+            figures.render(figures_models.draw_replay(found, switched), output.plot),
+        )
     if output.output_file or not output.plot:
         output.content(OSCILLATOR_WRITERS[form](found, motion.oscillator))
 
@@ -99,7 +104,9 @@ def _run(box: Box, output: Output) -> None:
         from d2rpick.report import figures, figures_models
 
         reference, switched = (box.simulated(), record) if windows else (record, None)
-        drawn = figures_models.draw_rollover(box.parameters, reference, switched, windows)
+        drawn = figures_models.draw_rollover(
+            box.parameters, reference, switched, windows
+        )
         output.write(plot, figures.render(drawn, plot))
     if output.output_file or not plot:
         output.content(BOX_WRITERS[form](record))
@@ -116,7 +123,9 @@ def _scan(box: Box, output: Output) -> None:
         from d2rpick.report import figures, figures_models
 
         output.write(plot, figures.render(figures_models.draw_scan(*found[:3]), plot))
-    output.result(write("rollover", output.output_format or "table", found, output.shown()))
+    output.result(
+        write("rollover", output.output_format or "table", found, output.shown())
+    )
     output.finish(objection=found.answer.recommended is None)
 
 
@@ -133,7 +142,13 @@ _ABSENT = (
 
 
 @options.command
-@options.file("--output-dir", "Folder for figures and tables; created if missing.", "DIR", kind="output", required=True)
+@options.file(
+    "--output-dir",
+    "Folder for figures and tables; created if missing.",
+    "DIR",
+    kind="output",
+    required=True,
+)
 @click.option(
     "--section", type=click.Choice(SECTIONS), multiple=True,
     help="Only the figures of this section of the paper; repeatable.  1: the setting, early switches of the box; 2: "
@@ -145,8 +160,12 @@ _ABSENT = (
     f"{', or '.join(', '.join(columns) for columns in SOLVER.values())}; repeatable.",
     many=True,
 )
-@options.takes("report", *RESULT, report="Write all of it to one HTML page.", forms=PLAIN)
-def reproduce(output_dir: str, section: Sequence[str], solver: Sequence[str], output: Output) -> None:
+@options.takes(
+    "report", *RESULT, report="Write all of it to one HTML page.", forms=PLAIN
+)
+def reproduce(
+    output_dir: str, section: Sequence[str], solver: Sequence[str], output: Output
+) -> None:
     """Reproduce the published results as figures (svg, png) and tables (csv), section by section.
 
     Each figure stands with what the paper shows there, what is found here, and whether the two agree; the table puts

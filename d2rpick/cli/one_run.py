@@ -22,7 +22,16 @@ from d2rpick.api.request import (
 )
 from d2rpick.base.errors import ArgumentError, DeckError, printable
 from d2rpick.cli import options
-from d2rpick.cli.options import ANSWER, DECK, DECK_OF_PARTS, FILES, HISTORY, ONE_RUN, RESULT, WINDOW
+from d2rpick.cli.options import (
+    ANSWER,
+    DECK,
+    DECK_OF_PARTS,
+    FILES,
+    HISTORY,
+    ONE_RUN,
+    RESULT,
+    WINDOW,
+)
 from d2rpick.cli.output import IN_WORDS, Output, check_switched, in_words, opened
 from d2rpick.cli.progress import reading
 from d2rpick.cli.values import CARDS
@@ -90,10 +99,25 @@ def extract(write_as: str | None, request: Request, output: Output) -> None:
 
 
 @options.command
-@options.time("--td", "Switch back to deformable at this time.", instead_of=("td_window",))
-@options.time("--td-window", "Choose the time to switch back within this window.", instead_of=("td",), pair=True)
-@options.takes("limit", *ONE_RUN, *ANSWER, deck=DECK_OF_PARTS, forms=[*FORMATS["suggestion"], "card"])
-def suggest(td: float | None, td_window: WINDOW, request: Request, cards: Cards, output: Output) -> None:
+@options.time(
+    "--td", "Switch back to deformable at this time.", instead_of=("td_window",)
+)
+@options.time(
+    "--td-window",
+    "Choose the time to switch back within this window.",
+    instead_of=("td",),
+    pair=True,
+)
+@options.takes(
+    "limit",
+    *ONE_RUN,
+    *ANSWER,
+    deck=DECK_OF_PARTS,
+    forms=[*FORMATS["suggestion"], "card"],
+)
+def suggest(
+    td: float | None, td_window: WINDOW, request: Request, cards: Cards, output: Output
+) -> None:
     """Rank the times tr at which the parts of HISTORY can be made rigid until td, or choose both times.
 
     Without --td both are chosen, in --td-window or in the longest flight.
@@ -121,24 +145,47 @@ def suggest(td: float | None, td_window: WINDOW, request: Request, cards: Cards,
     with opened(request, output) as (run, output):
         asked = ask(run, request, merge=cards.merge)
     answer = suggested(asked, wanted)
-    told = [one for one in answer.cautions if one.code != "no-candidate" or output.output_format not in IN_WORDS]
+    told = [
+        one
+        for one in answer.cautions
+        if one.code != "no-candidate" or output.output_format not in IN_WORDS
+    ]
     output.notes(asked.reference.history.notes, told)
-    output.beside_answer(answer, lambda: answer.page(options.repeat(), request.judging(), cards))
+    output.beside_answer(
+        answer, lambda: answer.page(options.repeat(), request.judging(), cards)
+    )
     if card:
         found = answer.printed(cards)
-        told = [] if found is None else [one for one in all_cautions(found) if one not in answer.cautions]
-        return output.finish(objection=not output.card(found, told), grade=answer.quality and answer.quality.grade)
+        told = (
+            []
+            if found is None
+            else [one for one in all_cautions(found) if one not in answer.cautions]
+        )
+        return output.finish(
+            objection=not output.card(found, told),
+            grade=answer.quality and answer.quality.grade,
+        )
     output.answer(answer)
-    return output.finish(objection=answer.recommended is None, grade=answer.quality and answer.quality.grade)
+    return output.finish(
+        objection=answer.recommended is None,
+        grade=answer.quality and answer.quality.grade,
+    )
 
 
 @options.command
 @options.time("--td", "A time to switch back that others are compared with.")
 @options.time(
-    "--td-window", "Explore the times to switch back within this window.  [default: the longest flight]", pair=True
+    "--td-window",
+    "Explore the times to switch back within this window.  [default: the longest flight]",
+    pair=True,
 )
 @options.option(
-    "steps", Option("Number of evenly spaced td; peaks of the energy come on top.", range(1, 100_001)), default=200
+    "steps",
+    Option(
+        "Number of evenly spaced td; peaks of the energy come on top.",
+        range(1, 100_001),
+    ),
+    default=200,
 )
 @options.takes(
     *("limit", *ONE_RUN, *ANSWER),
@@ -149,7 +196,14 @@ def suggest(td: float | None, td_window: WINDOW, request: Request, cards: Cards,
     deck=DECK_OF_PARTS,
     forms=FORMATS["trade_off"],
 )
-def explore(td: float | None, td_window: WINDOW, steps: int, request: Request, cards: Cards, output: Output) -> None:
+def explore(
+    td: float | None,
+    td_window: WINDOW,
+    steps: int,
+    request: Request,
+    cards: Cards,
+    output: Output,
+) -> None:
     """Show what each time td to switch back costs: the best tr for it, its error, and what it saves.
 
     A grid of td over --td-window or the longest flight, and every peak of the energy, each as `suggest --td` answers
@@ -172,21 +226,37 @@ def explore(td: float | None, td_window: WINDOW, steps: int, request: Request, c
         asked = ask(run, request, merge=cards.merge)
     answer = explored(asked, td, td_window, steps)
     output.notes(asked.reference.history.notes, answer.cautions)
-    output.beside_answer(answer, lambda: answer.page(options.repeat(), request.judging(), cards))
+    output.beside_answer(
+        answer, lambda: answer.page(options.repeat(), request.judging(), cards)
+    )
     output.answer(answer)
     chosen = answer.recommended
-    output.finish(objection=chosen is None, grade=chosen.quality.grade if chosen and chosen.quality else None)
+    output.finish(
+        objection=chosen is None,
+        grade=chosen.quality.grade if chosen and chosen.quality else None,
+    )
 
 
 @options.command
-@options.time("--tr", "Switch to rigid at this time.  [with --switched: read off that run]")
-@options.time("--td", "Switch back to deformable at this time.  [with --switched: read off that run]")
+@options.time(
+    "--tr", "Switch to rigid at this time.  [with --switched: read off that run]"
+)
+@options.time(
+    "--td",
+    "Switch back to deformable at this time.  [with --switched: read off that run]",
+)
 @options.file(
-    "--switched", "Compare a finished switched run with the reference: file, folder or glob; repeatable.", many=True
+    "--switched",
+    "Compare a finished switched run with the reference: file, folder or glob; repeatable.",
+    many=True,
 )
 @options.option(
     "min_mean_energy",
-    Option("Mean energy after td over the reference's, at least; it may be as far above 1 as below.", FRACTION, "E"),
+    Option(
+        "Mean energy after td over the reference's, at least; it may be as far above 1 as below.",
+        FRACTION,
+        "E",
+    ),
     default=MIN_MEAN_ENERGY,
 )
 @options.takes(*ONE_RUN, *ANSWER, deck=DECK_OF_PARTS, forms=FORMATS["verdict"])
@@ -221,16 +291,33 @@ def verify(
         output.spare(other.sources)
     answer = judged(asked, tr, td, other, min_mean_energy)
     output.notes(asked.reference.history.notes, answer.cautions)
-    output.beside_answer(answer, lambda: answer.page(options.repeat(), request.judging(), cards))
+    output.beside_answer(
+        answer, lambda: answer.page(options.repeat(), request.judging(), cards)
+    )
     output.answer(answer)
-    output.finish(objection=not answer.verified, grade=answer.quality and answer.quality.grade)
+    output.finish(
+        objection=not answer.verified, grade=answer.quality and answer.quality.grade
+    )
 
 
 @options.command
 @options.time("--tr", "With --td: compare the sets in this window.")
-@options.time("--td", "Compare the sets in a window that ends here.  [default: at the end of the longest flight]")
+@options.time(
+    "--td",
+    "Compare the sets in a window that ends here.  [default: at the end of the longest flight]",
+)
 @options.takes(
-    *("deck", "no_deck", "weights", HISTORY, *READING, *LIMITS, "step_ratio", "report", *RESULT),
+    *(
+        "deck",
+        "no_deck",
+        "weights",
+        HISTORY,
+        *READING,
+        *LIMITS,
+        "step_ratio",
+        "report",
+        *RESULT,
+    ),
     deck=f"{DECK}.",
     step_ratio="Time step while rigid over that before, 1 or more.",
     report="Write everything to one HTML page to read and sign.",
@@ -253,7 +340,9 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
 
     check_times(tr, td)
     if request.energy:
-        raise ArgumentError("`energy` names one energy for the whole model; parts compares those of its parts")
+        raise ArgumentError(
+            "`energy` names one energy for the whole model; parts compares those of its parts"
+        )
     with opened(request, output) as (run, output):
         answer = tabled(run, request, tr, td)
     output.notes(run.notes, answer.cautions)
@@ -288,7 +377,18 @@ def parts(tr: float | None, td: float | None, request: Request, output: Output) 
     kind="output",
 )
 @options.takes(
-    *("deck", "no_deck", "weights", HISTORY, *READING, *CHOOSING, "plot", "report", *CARDS, *RESULT),
+    *(
+        "deck",
+        "no_deck",
+        "weights",
+        HISTORY,
+        *READING,
+        *CHOOSING,
+        "plot",
+        "report",
+        *CARDS,
+        *RESULT,
+    ),
     deck=DECK_OF_PARTS,
     forms=[*FORMATS["plan"], "card"],
 )
@@ -319,23 +419,37 @@ def plan(
 
     form = output.output_format
     if every and form not in ("value", "card") and not write_deck:
-        raise click.UsageError("--all belongs to -f value, -f card and --write-deck; other forms hold every window")
+        raise click.UsageError(
+            "--all belongs to -f value, -f card and --write-deck; other forms hold every window"
+        )
     _check_deck(request, cards, form, write_deck)
     output.check(cards, by_itself=bool(write_deck))
     with opened(request, output, done, *before) as (run, output):
         asked = ask(run, request, merge=cards.merge)
-        if write_deck and (foreign := [one for one in asked.cautions if one.code == "deck-of-another-model"]):
+        if write_deck and (
+            foreign := [
+                one for one in asked.cautions if one.code == "deck-of-another-model"
+            ]
+        ):
             raise DeckError(f"{request.deck}: {foreign[0].message}")
         earlier = open_run(request, before) if before else None
-    answer = planned(asked, min_rigid, options.windows_in(done) if done else (), earlier)
+    answer = planned(
+        asked, min_rigid, options.windows_in(done) if done else (), earlier
+    )
     output.notes(answer.history.notes, answer.cautions)
     output.beside_answer(answer, lambda: answer.page(options.repeat(), (), cards))
     found = answer.printed(cards, every=every) if form == "card" or write_deck else None
-    checked, passed = _write_and_check(found, answer, write_deck, output) if found and write_deck else ("", True)
+    checked, passed = (
+        _write_and_check(found, answer, write_deck, output)
+        if found and write_deck
+        else ("", True)
+    )
     if checked and form != "table":
         click.echo(checked, err=True)
     if form == "card":
-        return output.finish(objection=not (output.card(found, _untold(found, answer)) and passed))
+        return output.finish(
+            objection=not (output.card(found, _untold(found, answer)) and passed)
+        )
     if found:
         output.notes(found.card.notes, ())
     output.answer(answer, checked if form == "table" else "", every=every)
@@ -347,18 +461,26 @@ def _untold(card: JudgedCard | None, plan: Plan) -> list[Caution]:
     if card is None:
         return []
     failed = tuple(verdict for verdict in card.verdicts if not verdict.verified)
-    return [caution for caution in all_cautions(card._replace(verdicts=failed)) if caution not in plan.cautions]
+    return [
+        caution
+        for caution in all_cautions(card._replace(verdicts=failed))
+        if caution not in plan.cautions
+    ]
 
 
 def _check_deck(request: Request, cards: Cards, form: str, folder: str | None) -> None:
     """Refuse to copy no deck, and a card that switches nobody, before a file is opened."""
     if folder is not None and request.deck is None:
-        raise ArgumentError("--write-deck needs `deck`, the deck that is copied with the cards")
+        raise ArgumentError(
+            "--write-deck needs `deck`, the deck that is copied with the cards"
+        )
     if form == "card" or folder:
         check_switched("-f card" if form == "card" else "--write-deck", request, cards)
 
 
-def _write_and_check(card: JudgedCard, plan: Plan, folder: str, output: Output) -> tuple[str, bool]:
+def _write_and_check(
+    card: JudgedCard, plan: Plan, folder: str, output: Output
+) -> tuple[str, bool]:
     """Write the copy, and check it by the history.
 
     Returns
@@ -372,4 +494,6 @@ def _write_and_check(card: JudgedCard, plan: Plan, folder: str, output: Output) 
 
     names, checked = written(plan, card, folder, overwrite=output.overwrite)
     listed = [f"written  {printable(name)}" for name in names]
-    return "\n".join([*listed, "", checked.text("table", output.shown())]), checked.passed
+    return "\n".join(
+        [*listed, "", checked.text("table", output.shown())]
+    ), checked.passed

@@ -10,7 +10,17 @@ import click
 from click.core import ParameterSource
 
 from d2rpick.api.cards import Cards
-from d2rpick.api.request import CHOOSING, JUDGING, OSCILLATOR, READING, TIME, Option, Request, dashed, options_of
+from d2rpick.api.request import (
+    CHOOSING,
+    JUDGING,
+    OSCILLATOR,
+    READING,
+    TIME,
+    Option,
+    Request,
+    dashed,
+    options_of,
+)
 from d2rpick.base.errors import ArgumentError
 from d2rpick.base.settings import nearest_settings
 from d2rpick.cli import Documented, documented
@@ -35,17 +45,47 @@ DECK: Final = (
     "Main deck of the run (LS-DYNA, or a starter or engine file of Radioss): gives the cost of the parts, "
     "and which of them become one rigid body"
 )
-DECK_OF_PARTS: Final = f"{DECK}; `--part recommended` stands for the set that d2rpick parts recommends."
+DECK_OF_PARTS: Final = (
+    f"{DECK}; `--part recommended` stands for the set that d2rpick parts recommends."
+)
 # Sections of the help, behind the options of a command that are in none.
 GROUPS: Final[dict[str, tuple[str, ...]]] = {
     "Times": (
-        *("tr", "td", "td_window", "steps", "min_rigid", "after", "landing", "margin", "wait"),
-        *("tolerance", "max_kinetic_share", "max_residual", "min_mean_energy", "strict", "keep_vibration"),
+        *(
+            "tr",
+            "td",
+            "td_window",
+            "steps",
+            "min_rigid",
+            "after",
+            "landing",
+            "margin",
+            "wait",
+        ),
+        *(
+            "tolerance",
+            "max_kinetic_share",
+            "max_residual",
+            "min_mean_energy",
+            "strict",
+            "keep_vibration",
+        ),
     ),
     "What to read": ("history", "switched", "from", *READING, "done", "before"),
     "Deck and cost": ("deck", "no_deck", "weights", "write_deck"),
     "Cards": CARDS,
-    "Output": ("all", "limit", "plot", "report", "min_quality", *RESULT, "verbose", "show_settings", "debug", "help"),
+    "Output": (
+        "all",
+        "limit",
+        "plot",
+        "report",
+        "min_quality",
+        *RESULT,
+        "verbose",
+        "show_settings",
+        "debug",
+        "help",
+    ),
     "Advanced": (*OSCILLATOR, "fit_window", "no_verify", "cost_share", "step_ratio"),
 }
 # Options that write files, which the same command would find the next time.
@@ -67,7 +107,9 @@ class Command(Documented):
         table, source, ctx.meta["d2rpick.unused"] = nearest_settings(os.curdir)
         ctx.meta["d2rpick.settings"] = source
         if table:
-            without = click.Context(self, ctx.parent, ctx.info_name, resilient_parsing=True)
+            without = click.Context(
+                self, ctx.parent, ctx.info_name, resilient_parsing=True
+            )
             super().parse_args(without, list(args))
             ctx.default_map = settings_of(ctx, without, table, source)
         rest = super().parse_args(ctx, args)
@@ -75,12 +117,19 @@ class Command(Documented):
             ctx.meta["d2rpick.command"] = inserted(ctx.meta["d2rpick.command"], words)
         return rest
 
-    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+    def format_options(
+        self, ctx: click.Context, formatter: click.HelpFormatter
+    ) -> None:
         """Write the options in groups, each where it is looked for."""
         shown = (one for one in self.get_params(ctx) if isinstance(one, click.Option))
-        records = {spelled(one).replace("-", "_"): one.get_help_record(ctx) for one in shown}
+        records = {
+            spelled(one).replace("-", "_"): one.get_help_record(ctx) for one in shown
+        }
         grouped = {name for names in GROUPS.values() for name in names}
-        for title, names in {"Options": [one for one in records if one not in grouped], **GROUPS}.items():
+        for title, names in {
+            "Options": [one for one in records if one not in grouped],
+            **GROUPS,
+        }.items():
             if rows := [record for name in names if (record := records.get(name))]:
                 with formatter.section(title):
                     formatter.write_dl(rows)
@@ -113,10 +162,15 @@ class Either(click.Option):
         super().__init__(*args, **kwargs)
         self.instead_of = instead_of
 
-    def consume_value(self, ctx: click.Context, opts: Any) -> tuple[Any, ParameterSource]:
+    def consume_value(
+        self, ctx: click.Context, opts: Any
+    ) -> tuple[Any, ParameterSource]:
         """Find the value and its source; click has done so before for all that is on the command line."""
         value, source = super().consume_value(ctx, opts)
-        typed = (ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE for name in self.instead_of)
+        typed = (
+            ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE
+            for name in self.instead_of
+        )
         if source is ParameterSource.ENVIRONMENT and any(typed):
             return self.get_default(ctx), ParameterSource.DEFAULT
         return value, source
@@ -147,7 +201,11 @@ def takes(
     if HISTORY in names:
         tables[Request].append("history")
     if choices := list(forms):
-        about = {"type": click.Choice(choices), "default": choices[0], "show_default": True}
+        about = {
+            "type": click.Choice(choices),
+            "default": choices[0],
+            "show_default": True,
+        }
         other["output_format"] = about
 
     def decorate(function: Decorated) -> Decorated:
@@ -156,11 +214,17 @@ def takes(
             ctx = click.get_current_context()
             if "history" in values:
                 ctx.meta["d2rpick.history"] = values["history"]
-            given = {name for name in values if ctx.get_parameter_source(name) is not ParameterSource.DEFAULT}
+            given = {
+                name
+                for name in values
+                if ctx.get_parameter_source(name) is not ParameterSource.DEFAULT
+            }
             for table, taken in tables.items():
                 if taken:
                     more = {"given": given & {*taken}} if table is Request else {}
-                    values[table.__name__.lower()] = table(**{name: values.pop(name) for name in taken}, **more)
+                    values[table.__name__.lower()] = table(
+                        **{name: values.pop(name) for name in taken}, **more
+                    )
             if "no_deck" in names:
                 from d2rpick.api.deck_in_folder import find_deck_in_folder
 
@@ -172,13 +236,19 @@ def takes(
                 run = flag(run)
         for name in reversed(names):
             as_in_table = of is TABLES and name not in other
-            run = (_as_in_table(name) if as_in_table else _decorator(of, name, other.get(name, {})))(run)
+            run = (
+                _as_in_table(name)
+                if as_in_table
+                else _decorator(of, name, other.get(name, {}))
+            )(run)
         return run
 
     return decorate
 
 
-def _shared(decorate: Callable[[Decorated], Decorated]) -> Callable[[Decorated], Decorated]:
+def _shared(
+    decorate: Callable[[Decorated], Decorated],
+) -> Callable[[Decorated], Decorated]:
     """Give all commands the same object of an option: a module has commands, of which one is called."""
     made = decorate(lambda: None).__click_params__[0]
     again: Any = lambda *_, **__: made  # noqa: E731  click takes what makes an option for its class
@@ -190,12 +260,24 @@ def _as_in_table(name: str) -> Callable[[Decorated], Decorated]:
     return _shared(_decorator(TABLES, name, {}))
 
 
-def _decorator(tables: Sequence[Any], name: str, other: Any) -> Callable[[Decorated], Decorated]:
+def _decorator(
+    tables: Sequence[Any], name: str, other: Any
+) -> Callable[[Decorated], Decorated]:
     if name == HISTORY:
-        return click.argument("history", metavar="HISTORY...", nargs=-1, required=True, type=click_type("file"))
+        return click.argument(
+            "history",
+            metavar="HISTORY...",
+            nargs=-1,
+            required=True,
+            type=click_type("file"),
+        )
     table = next(one for one in tables if name in options_of(one))
     more = {"help": other} if isinstance(other, str) else other
-    return option(name, options_of(table)[name], **{"default": table.__dataclass_fields__[name].default, **more})
+    return option(
+        name,
+        options_of(table)[name],
+        **{"default": table.__dataclass_fields__[name].default, **more},
+    )
 
 
 def option(name: str, one: Option, **other: Any) -> Callable[[Decorated], Decorated]:
@@ -211,7 +293,11 @@ def option(name: str, one: Option, **other: Any) -> Callable[[Decorated], Decora
         about["cls"] = Either
     else:
         del about["instead_of"]
-    if about.get("default") is None or about["default"] is False or about["default"] == ():
+    if (
+        about.get("default") is None
+        or about["default"] is False
+        or about["default"] == ()
+    ):
         about.pop("default", None)
     else:
         about.setdefault("show_default", True)
@@ -221,16 +307,26 @@ def option(name: str, one: Option, **other: Any) -> Callable[[Decorated], Decora
 def time(name: str, text: str, **more: Any) -> Callable[[Decorated], Decorated]:
     """Make an option of one command that is a time, or a window of time."""
     pair, required = more.get("pair", False), more.pop("required", False)
-    return option(name[2:].replace("-", "_"), Option(text, TIME, "LO HI" if pair else "T", **more), required=required)
+    return option(
+        name[2:].replace("-", "_"),
+        Option(text, TIME, "LO HI" if pair else "T", **more),
+        required=required,
+    )
 
 
-def file(name: str, text: str, metavar: str = "FILE", **more: Any) -> Callable[[Decorated], Decorated]:
+def file(
+    name: str, text: str, metavar: str = "FILE", **more: Any
+) -> Callable[[Decorated], Decorated]:
     """Make an option of one command that names a file, or ``many`` of them, one each time.
 
     Its ``kind`` is "file", or "output" if the command writes it.
     """
     required, kind = more.pop("required", False), more.pop("kind", "file")
-    return option(name[2:].replace("-", "_"), Option(text, kind, metavar, **more), required=required)
+    return option(
+        name[2:].replace("-", "_"),
+        Option(text, kind, metavar, **more),
+        required=required,
+    )
 
 
 def windows_in(file: str) -> Sequence[tuple[float, float]]:
@@ -245,7 +341,9 @@ def judging_run(request: Request) -> Run | None:
     """Open the history by which cards are judged; None without one."""
     if not request.history:
         return None
-    from d2rpick.api.asked import open_run  # not above: without a history nothing is computed
+    from d2rpick.api.asked import (
+        open_run,
+    )  # not above: without a history nothing is computed
 
     return open_run(request)
 
@@ -256,11 +354,21 @@ def _remember(ctx: click.Context, option: click.Parameter, value: bool) -> None:
 
 # What every command can be told and none asks for itself: it is kept in the context.
 _FLAGS: Final = [
-    _shared(click.option(*names, is_flag=True, expose_value=False, callback=_remember, help=text))
+    _shared(
+        click.option(
+            *names, is_flag=True, expose_value=False, callback=_remember, help=text
+        )
+    )
     for names, text in (
         (["--debug"], "Show the traceback of an error."),
-        (["--show-settings"], "Print every option with its value and its source, and do nothing else."),
-        (["-v", "--verbose"], "Say all that is known, and on stderr what was read and how long it took."),
+        (
+            ["--show-settings"],
+            "Print every option with its value and its source, and do nothing else.",
+        ),
+        (
+            ["-v", "--verbose"],
+            "Say all that is known, and on stderr what was read and how long it took.",
+        ),
     )
 ]
 
@@ -271,10 +379,16 @@ def repeat() -> list[str]:
     It may replace the files that it has written, so that it can be typed again.
     """
     context = click.get_current_context()
-    names = [_variable(context, name) for name in context.params if _source(context, name) == "environment"]
+    names = [
+        _variable(context, name)
+        for name in context.params
+        if _source(context, name) == "environment"
+    ]
     variables = [f"{name}={os.environ[name]}" for name in names]
     words = context.meta["d2rpick.command"]
-    if not context.params["overwrite"] and any(context.params.get(name) for name in _WRITTEN):
+    if not context.params["overwrite"] and any(
+        context.params.get(name) for name in _WRITTEN
+    ):
         words = inserted(words, ["--overwrite"])
     return [*(["env", *variables] if variables else []), "d2rpick", *words]
 
@@ -298,7 +412,10 @@ def _settings(ctx: click.Context) -> Iterator[str]:
     for one in ctx.command.get_params(ctx):
         if one.expose_value and one.name:
             value, source = ctx.params[one.name], _source(ctx, one.name)
-            named = {"environment": f", {_variable(ctx, one.name)}", "settings": f", {ctx.meta['d2rpick.settings']}"}
+            named = {
+                "environment": f", {_variable(ctx, one.name)}",
+                "settings": f", {ctx.meta['d2rpick.settings']}",
+            }
             name = spelled(one) if isinstance(one, click.Option) else one.name
             shown = "none" if value in (None, ()) else as_json(value, None)
             yield f"{name} = {shown}  # {source}{named.get(source, '')}"

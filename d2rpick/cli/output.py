@@ -13,7 +13,14 @@ import click
 
 from d2rpick.api.cards import Cards, JudgedCard
 from d2rpick.api.request import OPTIONS, UNLIMITED, Request, dashed, option, options_of
-from d2rpick.base.errors import FORESEEN, ArgumentError, D2RPickError, listing, one_line, printable
+from d2rpick.base.errors import (
+    FORESEEN,
+    ArgumentError,
+    D2RPickError,
+    listing,
+    one_line,
+    printable,
+)
 from d2rpick.base.files import write_whole
 from d2rpick.cli.progress import on_terminal, reading
 
@@ -27,7 +34,11 @@ if TYPE_CHECKING:
 
 
 OBJECTION = 1
-GRADES: Final = ("poor", "fair", "good")  # of d2rpick.choice.quality; a test holds them together
+GRADES: Final = (
+    "poor",
+    "fair",
+    "good",
+)  # of d2rpick.choice.quality; a test holds them together
 # A terminal of fewer columns is none that tables are read on.
 _NARROWEST: Final = 40
 # Formats that names of files promise.
@@ -42,28 +53,66 @@ _ANSWER: Final = r"(?m)^(\* |(recommended|best of|make rigid|verdict|common tr) 
 ARGUMENTS: Final = (
     *OPTIONS,
     *options_of(Cards),
-    *("td", "td_window", "tr", "min_rigid", "overwrite", "write_as", "done", "before", "wait", "min_mean_energy"),
+    *(
+        "td",
+        "td_window",
+        "tr",
+        "min_rigid",
+        "overwrite",
+        "write_as",
+        "done",
+        "before",
+        "wait",
+        "min_mean_energy",
+    ),
 )
-_OTHERS: Final = {"parts": "part", "channels": "channel", "replay": "no_verify", "run": "history"}
+_OTHERS: Final = {
+    "parts": "part",
+    "channels": "channel",
+    "replay": "no_verify",
+    "run": "history",
+}
 _FOR_PROGRAMS: Final = {"json", "ndjson", "csv", "value"}
-IN_WORDS: Final = {"table", "markdown"}  # forms in which the answer says itself why nothing is recommended
+IN_WORDS: Final = {
+    "table",
+    "markdown",
+}  # forms in which the answer says itself why nothing is recommended
 
 
 @dataclass(eq=False, repr=False)
 class Output:
     """Results to stdout or a file, everything else to stderr unless ``quiet``; ``inputs`` are never written to."""
 
-    plot: str | None = option("Draw energy and motion to FILE (png, svg, pdf).", "output", "FILE")
-    report: str | None = option("Write everything to one HTML page to read, print and sign.", "output", "FILE")
-    min_quality: str | None = option("Exit with 1 where the pair is worse than that.", ("good", "fair"))
+    plot: str | None = option(
+        "Draw energy and motion to FILE (png, svg, pdf).", "output", "FILE"
+    )
+    report: str | None = option(
+        "Write everything to one HTML page to read, print and sign.", "output", "FILE"
+    )
+    min_quality: str | None = option(
+        "Exit with 1 where the pair is worse than that.", ("good", "fair")
+    )
     output_format: str = option("Format of the result.", default="table", short=("-f",))
-    exit_zero: bool = option("Exit with 0 instead of 1 when the answer is an objection.", "flag", default=False)
+    exit_zero: bool = option(
+        "Exit with 0 instead of 1 when the answer is an objection.",
+        "flag",
+        default=False,
+    )
     output_file: str | None = option(
-        "Write the result to FILE, completely or not at all.", "output", "FILE", short=("-o",)
+        "Write the result to FILE, completely or not at all.",
+        "output",
+        "FILE",
+        short=("-o",),
     )
     overwrite: bool = option("Replace existing files.", "flag", default=False)
-    quiet: bool = option("Print no notes and warnings to stderr.", "flag", default=False, short=("-q",))
-    limit: int = option("Number of rows in the table; json and csv have all.", range(1, UNLIMITED), default=3)
+    quiet: bool = option(
+        "Print no notes and warnings to stderr.", "flag", default=False, short=("-q",)
+    )
+    limit: int = option(
+        "Number of rows in the table; json and csv have all.",
+        range(1, UNLIMITED),
+        default=3,
+    )
     inputs: tuple[str, ...] = ()
 
     @property
@@ -78,7 +127,9 @@ class Output:
 
     def beside(self, *inputs: str | None) -> Output:
         """Give what writes beside these inputs; D2RPickError when a file to be written may not be."""
-        output = replace(self, inputs=tuple(name for name in inputs if name not in (None, "-")))
+        output = replace(
+            self, inputs=tuple(name for name in inputs if name not in (None, "-"))
+        )
         if self.plot is not None:
             from d2rpick.report import figures
 
@@ -91,28 +142,43 @@ class Output:
                 output.claim(file)
                 other = claimed.setdefault(os.path.realpath(file), named)
                 if other != named:
-                    raise D2RPickError(f"{file}: {named} and {other} are the same file; give two")
+                    raise D2RPickError(
+                        f"{file}: {named} and {other} are the same file; give two"
+                    )
         if self.file is not None and not self.quiet and (form := _meant(self.file)):
-            tell(f"note: {self.file} gets the table; -f {form} writes what its name promises")
+            tell(
+                f"note: {self.file} gets the table; -f {form} writes what its name promises"
+            )
         return output
 
     def check(self, cards: Cards, *, by_itself: bool = False) -> None:
         """Refuse options of a card where none is asked for, ``by_itself`` or in a page."""
-        if cards.given and not (by_itself or self.output_format == "card" or self.report is not None):
-            raise ArgumentError(f"--{dashed(cards.given[0])} is about the card; ask for one with -f card or --report")
+        if cards.given and not (
+            by_itself or self.output_format == "card" or self.report is not None
+        ):
+            raise ArgumentError(
+                f"--{dashed(cards.given[0])} is about the card; ask for one with -f card or --report"
+            )
 
     def shown(self, **more: Any) -> Shown:
         """Give what a form may show beside the answer."""
         from d2rpick.report.formats import Shown
 
         meta = click.get_current_context().meta
-        shown = Shown(meta["d2rpick.command"], self.limit, verbose=meta.get("d2rpick.verbose", False), **more)
+        shown = Shown(
+            meta["d2rpick.command"],
+            self.limit,
+            verbose=meta.get("d2rpick.verbose", False),
+            **more,
+        )
         return shown._replace(width=self.columns or shown.width)
 
     def answer(self, answer: Answer, below: str = "", **shown: Any) -> None:
         """Give out an answer in the form that is asked for."""
         now = self.shown(**shown)
-        text = in_words(answer.text(self.output_format, now), self.output_format, now.width)
+        text = in_words(
+            answer.text(self.output_format, now), self.output_format, now.width
+        )
         self.result(f"{text}\n\n{below}" if below else text)
 
     def beside_answer(self, answer: Paged, page: Callable[[], str]) -> None:
@@ -126,7 +192,9 @@ class Output:
 
     def finish(self, *, objection: bool, grade: str | None = None) -> None:
         """Exit with 1 when the answer is an objection, or its pair worse than asked for, unless told otherwise."""
-        poor = bool(grade and self.min_quality) and GRADES.index(grade) < GRADES.index(self.min_quality)
+        poor = bool(grade and self.min_quality) and GRADES.index(grade) < GRADES.index(
+            self.min_quality
+        )
         if (objection or poor) and not self.exit_zero:
             click.get_current_context().exit(OBJECTION)
 
@@ -143,15 +211,25 @@ class Output:
 
         path = Path(name)
         if path.is_dir():
-            raise D2RPickError(f"{name or repr(name)}: this is a folder; give a file in it")
+            raise D2RPickError(
+                f"{name or repr(name)}: this is a folder; give a file in it"
+            )
         if not path.parent.is_dir():
-            raise D2RPickError(f"{name}: no such folder: {str(path.parent)!r}; create it or give another one")
+            raise D2RPickError(
+                f"{name}: no such folder: {str(path.parent)!r}; create it or give another one"
+            )
         if not path.exists():
             return
-        if any(Path(source).exists() and path.samefile(source) for source in self.inputs):
-            raise D2RPickError(f"{name}: this is an input; give another file for the output")
+        if any(
+            Path(source).exists() and path.samefile(source) for source in self.inputs
+        ):
+            raise D2RPickError(
+                f"{name}: this is an input; give another file for the output"
+            )
         if path.is_file() and not self.overwrite:
-            raise D2RPickError(f"{name}: the file exists; give another one or --overwrite")
+            raise D2RPickError(
+                f"{name}: the file exists; give another one or --overwrite"
+            )
 
     def result(self, text: str) -> None:
         """Give out the result; on a terminal the lines of the answer stand out."""
@@ -160,7 +238,13 @@ class Output:
             self.write(self.file, content)
             return
         text = content.decode()
-        colour = False if os.environ.get("NO_COLOR") else True if os.environ.get("FORCE_COLOR") else None
+        colour = (
+            False
+            if os.environ.get("NO_COLOR")
+            else True
+            if os.environ.get("FORCE_COLOR")
+            else None
+        )
         bold = re.sub(_ANSWER, lambda line: click.style(line[0], bold=True), text)
         click.echo(bold, nl=False, color=colour)
 
@@ -198,7 +282,9 @@ class Output:
         except BrokenPipeError:
             raise
         except OSError as error:
-            raise D2RPickError(f"{name}: cannot be written ({error.strerror}); give another file") from error
+            raise D2RPickError(
+                f"{name}: cannot be written ({error.strerror}); give another file"
+            ) from error
 
 
 def _check_report(name: str | None) -> None:
@@ -206,16 +292,23 @@ def _check_report(name: str | None) -> None:
     if name == "-":
         raise D2RPickError("-: --report writes a file; give its name")
     if name is not None and name.lower().endswith(_PRINTED):
-        raise D2RPickError(f"{name}: the report is an HTML page; name it .html, and print it to PDF in a browser")
+        raise D2RPickError(
+            f"{name}: the report is an HTML page; name it .html, and print it to PDF in a browser"
+        )
 
 
 def _meant(name: str) -> str | None:
     """Give the format that the name of a result promises, where the command has it and none was asked for."""
     ctx = click.get_current_context()
-    given = ctx.get_parameter_source("output_format") is not click.core.ParameterSource.DEFAULT
+    given = (
+        ctx.get_parameter_source("output_format")
+        is not click.core.ParameterSource.DEFAULT
+    )
     if given or "write_as" in ctx.params:  # of a history the name itself decides
         return None
-    form = next((form for ending, form in _NAMED.items() if name.lower().endswith(ending)), None)
+    form = next(
+        (form for ending, form in _NAMED.items() if name.lower().endswith(ending)), None
+    )
     (choice,) = [one.type for one in ctx.command.params if one.name == "output_format"]
     return form if isinstance(choice, click.Choice) and form in choice.choices else None
 
@@ -224,7 +317,11 @@ def columns_of(stream: TextIO) -> int | None:
     """Columns of the terminal that a stream writes to, as many as are read at a glance; None where there is none."""
     given = os.environ.get("COLUMNS", "")
     try:
-        columns = int(given) if given.isdecimal() else os.get_terminal_size(stream.fileno()).columns
+        columns = (
+            int(given)
+            if given.isdecimal()
+            else os.get_terminal_size(stream.fileno()).columns
+        )
     except OSError:
         return None
     from d2rpick.report.formats import WIDEST
@@ -256,7 +353,9 @@ def explained(error: BaseException, inputs: Sequence[str] = ()) -> str:
         click.echo("".join(traceback.format_exception(error)), err=True, nl=False)
     if isinstance(error, FORESEEN):
         return with_options(one_line(error))
-    return f"{listing(inputs)}{': ' * bool(inputs)}{one_line(error)}; --debug shows where"
+    return (
+        f"{listing(inputs)}{': ' * bool(inputs)}{one_line(error)}; --debug shows where"
+    )
 
 
 def text_bytes(text: str) -> bytes:
@@ -273,7 +372,11 @@ def with_options(message: str) -> str:
     'give it as --after where it is known'
     """
     named = "`" in message
-    return re.sub(r"`(\w+)`", lambda found: option_of(found[1]) or found[0], message) if named else message
+    return (
+        re.sub(r"`(\w+)`", lambda found: option_of(found[1]) or found[0], message)
+        if named
+        else message
+    )
 
 
 def option_of(argument: str) -> str:
@@ -309,7 +412,9 @@ def check_switched(what: str, request: Request, cards: Cards) -> None:
 
 
 @contextmanager
-def opened(request: Request, output: Output, *inputs: str | None) -> Iterator[tuple[Run, Output]]:
+def opened(
+    request: Request, output: Output, *inputs: str | None
+) -> Iterator[tuple[Run, Output]]:
     """Open the run that is asked about and give it with what writes beside it and further ``inputs``.
 
     What reads of it belongs inside.

@@ -19,7 +19,9 @@ _PERIOD: Final = 1.0  # [s] before the first line, and between two
 
 
 @contextmanager
-def reading(names: Sequence[str], *, quiet: bool, period: float = _PERIOD) -> Iterator[None]:
+def reading(
+    names: Sequence[str], *, quiet: bool, period: float = _PERIOD
+) -> Iterator[None]:
     """Tell on stderr for how many seconds ``names`` have been read, unless ``quiet`` or where no terminal is.
 
     ``period``: before the first line, and between two [s].  Nobody knows how long it will take: how much of a file has
@@ -28,7 +30,11 @@ def reading(names: Sequence[str], *, quiet: bool, period: float = _PERIOD) -> It
     what = "standard input" if names[0] == "-" else printable(names[0])
     more = f" and {len(names) - 1} more" if len(names) > 1 else ""
     start = perf_counter()
-    with telling(lambda seconds: f"reading {what}{more} ... {seconds:.0f} s", quiet=quiet, period=period):
+    with telling(
+        lambda seconds: f"reading {what}{more} ... {seconds:.0f} s",
+        quiet=quiet,
+        period=period,
+    ):
         yield
     context = click.get_current_context(silent=True)
     if context and context.meta.get("d2rpick.verbose"):
@@ -48,7 +54,11 @@ class Count:
     def told(self, seconds: float) -> str:
         """Say how far it is after so many seconds, and how long the rest will take at this pace."""
         computed = self.done - max(self.taken, 0)
-        left = f", {_clock(seconds / computed * (self.total - self.done))} left" if computed else ""
+        left = (
+            f", {_clock(seconds / computed * (self.total - self.done))} left"
+            if computed
+            else ""
+        )
         return f"{self.done} of {self.total} runs{left}"
 
 
@@ -79,7 +89,9 @@ def on_terminal() -> bool:
 
 
 @contextmanager
-def telling(say: Callable[[float], str], *, quiet: bool, period: float = _PERIOD) -> Iterator[None]:
+def telling(
+    say: Callable[[float], str], *, quiet: bool, period: float = _PERIOD
+) -> Iterator[None]:
     """Show what ``say`` gives for the seconds that have gone by, unless ``quiet`` or where no terminal is."""
     if quiet or not on_terminal():
         yield
@@ -102,7 +114,9 @@ def _tell(say: Callable[[float], str], done: Event, period: float) -> None:
     line, seconds = "", 0.0
     while not done.wait(period):
         seconds += period
-        room = shutil.get_terminal_size().columns - 1  # a line that wraps could not be erased
+        room = (
+            shutil.get_terminal_size().columns - 1
+        )  # a line that wraps could not be erased
         before, line = line, say(seconds)[-room:]
         sys.stderr.write(f"\r{line.ljust(len(before))}")
         sys.stderr.flush()

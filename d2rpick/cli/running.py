@@ -29,25 +29,50 @@ CMD = ("program", "CMD")
     help="Folder of the run; made if missing.",
 )  # fmt: skip
 @options.option(
-    "part", Option("Parts to switch.  [default: those of the bodies that the deck puts off]", "text", "IDS", many=True)
+    "part",
+    Option(
+        "Parts to switch.  [default: those of the bodies that the deck puts off]",
+        "text",
+        "IDS",
+        many=True,
+    ),
 )
 @options.option("wait", Option(
     "Time without force that counts as flight.  [default: half of the longest inner period known so far]",
     *(POSITIVE, "T"),
 ))  # fmt: skip
 @options.option(
-    "margin", Option("From td to the contact.  [default: 2 ms, or 3% of the flight if that is more]", POSITIVE, "T")
+    "margin",
+    Option(
+        "From td to the contact.  [default: 2 ms, or 3% of the flight if that is more]",
+        POSITIVE,
+        "T",
+    ),
 )
 @options.option(
-    "starter", Option("Command that runs the starter on {deck}.  [default: that of OPENRADIOSS_PATH]", *CMD)
+    "starter",
+    Option(
+        "Command that runs the starter on {deck}.  [default: that of OPENRADIOSS_PATH]",
+        *CMD,
+    ),
 )
-@options.option("engine", Option("Command that runs the engine on {deck}.  [default: that of OPENRADIOSS_PATH]", *CMD))
+@options.option(
+    "engine",
+    Option(
+        "Command that runs the engine on {deck}.  [default: that of OPENRADIOSS_PATH]",
+        *CMD,
+    ),
+)
 @click.option(
     "--threads", type=click.IntRange(min=1), default=1, show_default=True, metavar="N",
     help="Threads of the solver; {threads} in a command.",
 )  # fmt: skip
-@click.option("--resume", is_flag=True, help="Go on with a run that has begun in RUNDIR.")
-@click.option("--dry-run", is_flag=True, help="Print what would be started, and start nothing.")
+@click.option(
+    "--resume", is_flag=True, help="Go on with a run that has begun in RUNDIR."
+)
+@click.option(
+    "--dry-run", is_flag=True, help="Print what would be started, and start nothing."
+)
 @options.takes(
     "report",
     "output_format",
@@ -56,7 +81,9 @@ CMD = ("program", "CMD")
     report="Write windows, energy and evidence to one HTML page.",
     forms=FORMATS["drive"],
 )
-def drive(deck: str, folder: str, resume: bool, dry_run: bool, output: Output, **asked: Any) -> None:
+def drive(
+    deck: str, folder: str, resume: bool, dry_run: bool, output: Output, **asked: Any
+) -> None:
     r"""Compute a Radioss run that switches itself: no reference is needed.
 
     DECK, a starter deck with one engine file, is copied into RUNDIR.  It flies when no force has acted for the wait.
@@ -80,10 +107,15 @@ def drive(deck: str, folder: str, resume: bool, dry_run: bool, output: Output, *
     if dry_run:
         return click.echo("\n".join(_plan(driving)))
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    with driving.driver(resume=resume) as driver, telling(driver.progress, quiet=output.quiet):
+    with (
+        driving.driver(resume=resume) as driver,
+        telling(driver.progress, quiet=output.quiet),
+    ):
         driver.prepare()
         driver.run()
-        answer = driving.answer(driver, click.get_current_context().meta["d2rpick.command"])
+        answer = driving.answer(
+            driver, click.get_current_context().meta["d2rpick.command"]
+        )
     output.beside_answer(answer, lambda: answer.page(options.repeat()))
     return output.answer(answer)
 
@@ -97,7 +129,11 @@ def _plan(driving: Driving) -> list[str]:
         f"copies    {', '.join(deck.files)} to {driving.folder}",
         f"starts    {shlex.join(commands.words('starter', f'{deck.name}_0000.rad'))}",
         f"          {shlex.join(commands.words('engine', f'{deck.name}_0001.rad'))}, and further legs",
-        *([f"missing   {missing}: no such program"] if (missing := commands.missing()) else []),
+        *(
+            [f"missing   {missing}: no such program"]
+            if (missing := commands.missing())
+            else []
+        ),
         f"switches  {len(deck.parts)} parts by main node {bodies}, to the end at {deck.end:g}",
     ]
 
@@ -109,7 +145,11 @@ def _plan(driving: Driving) -> list[str]:
     *(POSITIVE, "T"),
 ))  # fmt: skip
 @click.option(
-    "--once", is_flag=True, cls=options.Either, instead_of=("lasting",), help="Tell what there is now, and end."
+    "--once",
+    is_flag=True,
+    cls=options.Either,
+    instead_of=("lasting",),
+    help="Tell what there is now, and end.",
 )
 @click.option(
     "--for", "lasting", type=click_type(NOT_NEGATIVE), metavar="T", cls=options.Either, instead_of=("once",),
@@ -120,7 +160,14 @@ def _plan(driving: Driving) -> list[str]:
     deck="Main deck of the run: tells gravity, supports, bodies, and the period of parts on springs.",
     forms=("table", "ndjson"),
 )
-def follow(run: str, wait: float | None, once: bool, lasting: float | None, request: Request, output: Output) -> None:
+def follow(
+    run: str,
+    wait: float | None,
+    once: bool,
+    lasting: float | None,
+    request: Request,
+    output: Output,
+) -> None:
     """Watch RUN, files or a folder, while it is computed: say when it flies, and when to switch.
 
     A line for each event: load, flight with its evidence, a switch advised, contact, restart, silence, end.  RUN need
@@ -137,14 +184,19 @@ def follow(run: str, wait: float | None, once: bool, lasting: float | None, requ
         raise click.UsageError("--once and --for exclude each other")
     seconds = 0.0 if once else lasting
     failed, since = False, None
-    for one in events(run, parts=request.part or None, wait=wait, deck=request.deck, lasting=seconds):
+    for one in events(
+        run, parts=request.part or None, wait=wait, deck=request.deck, lasting=seconds
+    ):
         failed, since = failed or one.event == "failed", one.time
         if output.output_format == "ndjson":
             text = json.dumps(one._asdict(), allow_nan=False)
         else:
             seen = "-" if one.seen is None else f"{one.seen:.6g}"
             text = f"{seen:>10}  {one.event:<10}  {one.message}"
-        click.echo(text_bytes(f"{in_words(text, output.output_format, output.columns)}\n"), nl=False)
+        click.echo(
+            text_bytes(f"{in_words(text, output.output_format, output.columns)}\n"),
+            nl=False,
+        )
     output.finish(objection=failed or (seconds is not None and since is None))
 
 
@@ -157,16 +209,30 @@ def follow(run: str, wait: float | None, once: bool, lasting: float | None, requ
         *("names", "IDS"), many=True,
     ),
 )  # fmt: skip
-@options.option("wait", Option("Time without force that counts as flight.  [default: by the deck]", POSITIVE, "T"))
+@options.option(
+    "wait",
+    Option(
+        "Time without force that counts as flight.  [default: by the deck]",
+        POSITIVE,
+        "T",
+    ),
+)
 @options.option("after", Option("Nothing becomes rigid before.", NOT_NEGATIVE, "T"))
 @options.option(
     "output_dir",
-    Option("Folder for the copy, made where there is none.", "output", "DIR", short=("-o",)),
+    Option(
+        "Folder for the copy, made where there is none.", "output", "DIR", short=("-o",)
+    ),
     required=True,
 )
 @options.takes("overwrite", "quiet")
 def first(
-    deck: str, part: tuple[str, ...], wait: float | None, after: float | None, output_dir: str, output: Output
+    deck: str,
+    part: tuple[str, ...],
+    wait: float | None,
+    after: float | None,
+    output_dir: str,
+    output: Output,
 ) -> None:
     """Write a copy of DECK whose first run switches itself: no reference run is needed.
 
@@ -180,6 +246,13 @@ def first(
     """
     from d2rpick.api.running import first as write
 
-    found = write(deck, output_dir, parts=part or None, wait=wait, after=after, overwrite=output.overwrite)
+    found = write(
+        deck,
+        output_dir,
+        parts=part or None,
+        wait=wait,
+        after=after,
+        overwrite=output.overwrite,
+    )
     output.notes(found.notes, ())
     click.echo("\n".join(f"written  {printable(name)}" for name in found.files))

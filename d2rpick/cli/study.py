@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from d2rpick.api.request import LIMITS, READING, UNLIMITED, Option, Request, time_or_window
+from d2rpick.api.request import (
+    LIMITS,
+    READING,
+    UNLIMITED,
+    Option,
+    Request,
+    time_or_window,
+)
 from d2rpick.base.errors import INTERNAL_ERROR, D2RPickError, FormatError
 from d2rpick.cli import options
 from d2rpick.cli.options import RESULT, WINDOW
@@ -26,7 +33,9 @@ if TYPE_CHECKING:
 
 @options.command
 @click.argument("run", metavar="RUN...", nargs=-1, type=click_type("file"))
-@options.time("--td", "Switch back to deformable at this time.", instead_of=("td_window",))
+@options.time(
+    "--td", "Switch back to deformable at this time.", instead_of=("td_window",)
+)
 @options.time(
     "--td-window",
     "Let each run choose its time to switch back within this window.",
@@ -37,7 +46,11 @@ if TYPE_CHECKING:
     "--from", "listed", envvar="D2RPICK_STUDY_FROM", metavar="LIST", type=click_type("file"),
     help="File with more names of runs, one per line; - is stdin.",
 )  # fmt: skip
-@options.file("--resume", "Keep finished runs in FILE, and skip those that are in it and unchanged.", kind="output")
+@options.file(
+    "--resume",
+    "Keep finished runs in FILE, and skip those that are in it and unchanged.",
+    kind="output",
+)
 @options.option("jobs", Option(
     "Number of processes.  [default: one per core]", range(1, UNLIMITED), "N", instead_of=("scheduler",)
 ))  # fmt: skip
@@ -74,10 +87,19 @@ def study(
     d2rpick study --td 0.37 --part box --resume runs.ndjson -f json sample_data/rolloverT01.gz
     d2rpick study --td 0.064 --tolerance 0.1 -f ndjson sample_data/energy.csv sample_data/energy.glstat
     """
-    from d2rpick.api.studies import Ledger, fingerprint, line, question_of, rows_of, summary
+    from d2rpick.api.studies import (
+        Ledger,
+        fingerprint,
+        line,
+        question_of,
+        rows_of,
+        summary,
+    )
 
     if scheduler and jobs:
-        raise click.UsageError("--scheduler and --jobs exclude each other: the cluster has its own processes")
+        raise click.UsageError(
+            "--scheduler and --jobs exclude each other: the cluster has its own processes"
+        )
     asked = time_or_window(td, td_window)
     sources = _sources(run, listed)
     output = output.beside(*sources)
@@ -90,8 +112,13 @@ def study(
     streaming = by_line and output.file is None
     quiet = output.quiet or (streaming and sys.stdout.isatty())
     calls = len(sources) - _known(ledger, sources, quiet=output.quiet)
-    with _farm(jobs, scheduler, calls, quiet=output.quiet) as farm, counting(len(sources), quiet=quiet) as count:
-        for row in rows_of(question, sources, farm, ledger, absolute=bool(scheduler), told=count.tell):
+    with (
+        _farm(jobs, scheduler, calls, quiet=output.quiet) as farm,
+        counting(len(sources), quiet=quiet) as count,
+    ):
+        for row in rows_of(
+            question, sources, farm, ledger, absolute=bool(scheduler), told=count.tell
+        ):
             rows.append(row)
             if streaming:
                 output.result(line(row, mark))
@@ -99,7 +126,10 @@ def study(
     output.notes((), answer.cautions)
     output.spare(dict.fromkeys(stamp.name for row in rows for stamp in row.files))
     output.beside_answer(answer, lambda: answer.page(options.repeat()))
-    output.answer(answer, lines=[line(row, mark) for row in rows] if by_line and not streaming else [])
+    output.answer(
+        answer,
+        lines=[line(row, mark) for row in rows] if by_line and not streaming else [],
+    )
     if not answer.judged:
         tell(f"d2rpick: no run could be judged; the first: {rows[0].message or ''}")
     if not answer.judged or any(row.status == INTERNAL_ERROR for row in rows):
@@ -113,10 +143,18 @@ def _sources(names: Sequence[str], listed: str | None) -> tuple[str, ...]:
 
     sources = find_runs([*names, *(_listed(listed) if listed is not None else ())])
     if not sources:
-        where = "" if listed is None else f"{'standard input' if listed == '-' else listed} names none; "
-        raise click.UsageError(f"no runs; {where}give their names, or a list with --from")
+        where = (
+            ""
+            if listed is None
+            else f"{'standard input' if listed == '-' else listed} names none; "
+        )
+        raise click.UsageError(
+            f"no runs; {where}give their names, or a list with --from"
+        )
     if "-" in sources:
-        raise click.UsageError("- cannot be a run: standard input cannot be passed to other processes")
+        raise click.UsageError(
+            "- cannot be a run: standard input cannot be passed to other processes"
+        )
     return sources
 
 
@@ -125,13 +163,19 @@ def _listed(name: str) -> Iterator[str]:
     from pathlib import Path
 
     if name == "-" and sys.stdin is None:
-        raise FormatError("-: standard input is closed; give a file with one run per line")
+        raise FormatError(
+            "-: standard input is closed; give a file with one run per line"
+        )
     try:
         content = sys.stdin.buffer.read() if name == "-" else Path(name).read_bytes()
     except OSError as error:
-        raise FormatError(f"{name}: cannot be read ({error.strerror}); give a file with one run per line") from None
+        raise FormatError(
+            f"{name}: cannot be read ({error.strerror}); give a file with one run per line"
+        ) from None
     if b"\0" in content:
-        raise FormatError(f"{name}: holds NUL bytes; give a text file with one run per line")
+        raise FormatError(
+            f"{name}: holds NUL bytes; give a text file with one run per line"
+        )
     # Not splitlines(): a name may hold its other signs.
     for text in os.fsdecode(content).removeprefix("\ufeff").split("\n"):
         if (text := text.strip()) and not text.startswith("#"):
@@ -144,9 +188,13 @@ def _check_ledger(name: str | None, written: Mapping[str, str | None]) -> None:
         return
     for option, file in written.items():
         if file is not None and os.path.realpath(file) == os.path.realpath(name):
-            raise D2RPickError(f"{name}: --resume and --{option} are the same file; give two files")
+            raise D2RPickError(
+                f"{name}: --resume and --{option} are the same file; give two files"
+            )
     if os.path.exists(name) and os.path.samestat(os.stat(name), os.fstat(1)):  # noqa: PTH110, PTH116
-        raise D2RPickError(f"{name}: --resume and standard output are the same file; send one elsewhere")
+        raise D2RPickError(
+            f"{name}: --resume and standard output are the same file; send one elsewhere"
+        )
 
 
 def _known(ledger: Ledger | None, sources: Sequence[str], *, quiet: bool) -> int:
@@ -172,7 +220,9 @@ def _farm(jobs: int | None, scheduler: str | None, calls: int, *, quiet: bool) -
 
 
 @options.command
-@click.argument("folders", metavar="RUN...", nargs=-1, required=True, type=click_type("file"))
+@click.argument(
+    "folders", metavar="RUN...", nargs=-1, required=True, type=click_type("file")
+)
 @options.takes(*RESULT, forms=FORMATS["calibration"])
 def calibrate(folders: tuple[str, ...], output: Output) -> None:
     """Fit the cost of elements to what runs of a site took, for --weights.

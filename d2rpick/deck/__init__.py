@@ -29,19 +29,31 @@ def read_inventory(path: str) -> Inventory:
     DeckError
         If the deck cannot be read, or has no parts.
     """
-    from d2rpick.deck import ls_dyna_inventory, radioss_files, radioss_inventory  # not above: they load numpy
+    from d2rpick.deck import (
+        ls_dyna_inventory,
+        radioss_files,
+        radioss_inventory,
+    )  # not above: they load numpy
     from d2rpick.deck.radioss_run import read_run
     from d2rpick.deck.reader import read_deck
 
     is_run = radioss_files.run_files(path)
-    found = radioss_inventory.read(read_run(path)) if is_run else ls_dyna_inventory.read(read_deck(path))
+    found = (
+        radioss_inventory.read(read_run(path))
+        if is_run
+        else ls_dyna_inventory.read(read_deck(path))
+    )
     if not found.parts:
         why = f" ({found.notes[0]})" if found.notes else ""
-        raise DeckError(f"{path}: no parts were found{why}; name the main deck of the run")
+        raise DeckError(
+            f"{path}: no parts were found{why}; name the main deck of the run"
+        )
     return found
 
 
-_HEAD = 64 * 1024  # bytes in which a deck shows what it is: titles and comments come before
+_HEAD = (
+    64 * 1024
+)  # bytes in which a deck shows what it is: titles and comments come before
 
 
 def main_decks(folder: str) -> list[str]:
@@ -59,8 +71,14 @@ def main_decks(folder: str) -> list[str]:
     included = {os.path.realpath(path) for deck in decks for path in _includes(deck)}
     found = [path for path in decks if os.path.realpath(path) not in included]
     if not found:
-        what = "every one is included by another" if decks else "no file with *KEYWORD or /BEGIN"
-        raise DeckError(f"{folder}: no main deck in this folder ({what}); give the deck itself")
+        what = (
+            "every one is included by another"
+            if decks
+            else "no file with *KEYWORD or /BEGIN"
+        )
+        raise DeckError(
+            f"{folder}: no main deck in this folder ({what}); give the deck itself"
+        )
     return found
 
 
@@ -73,7 +91,12 @@ def find_decks_of_run(folder: str) -> list[str]:
         decks = main_decks(folder)
     except DeckError:
         return []
-    return [path for path in decks if os.path.samefile(os.path.dirname(path) or os.curdir, folder) and _has_parts(path)]  # noqa: PTH120, PTH121  start-up
+    return [
+        path
+        for path in decks
+        if os.path.samefile(os.path.dirname(path) or os.curdir, folder)  # noqa: PTH120, PTH121
+        and _has_parts(path)
+    ]
 
 
 def _has_parts(path: str) -> bool:
@@ -112,7 +135,9 @@ def _files(folder: str) -> Iterator[str]:
 
     for root, folders, names in os.walk(folder):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
-        yield from (str(Path(root) / name) for name in sorted(names) if not name.startswith("."))
+        yield from (
+            str(Path(root) / name) for name in sorted(names) if not name.startswith(".")
+        )
 
 
 def _begins(path: str) -> bool:
@@ -121,7 +146,9 @@ def _begins(path: str) -> bool:
         head = _head(path) if os.path.isfile(path) else b""  # noqa: PTH113  a pipe gives it once
     except OSError:
         return False
-    lines = (line.strip().upper() for line in head.removeprefix(b"\xef\xbb\xbf").splitlines())
+    lines = (
+        line.strip().upper() for line in head.removeprefix(b"\xef\xbb\xbf").splitlines()
+    )
     first = next((line for line in lines if line[:1] in {b"*", b"/"}), b"")
     return first.startswith((b"*KEYWORD", b"/BEGIN")) and b"\0" not in head
 

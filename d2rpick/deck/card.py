@@ -84,7 +84,11 @@ class Value(Generic[T]):
     @property
     def field(self) -> Field:
         """The field itself."""
-        return self.place.field(self.position) if isinstance(self.place, Row) else self.place
+        return (
+            self.place.field(self.position)
+            if isinstance(self.place, Row)
+            else self.place
+        )
 
 
 @dataclass(eq=False, repr=False, slots=True)
@@ -106,7 +110,9 @@ class Row:
         """Field ``position`` from 0, between commas or in fixed columns; empty beyond the end of the line."""
         pieces, comma = self._pieces(), int("," in self.text)
         text = "".join(pieces[position : position + 1])
-        start = min(sum(len(piece) + comma for piece in pieces[:position]), len(self.text))
+        start = min(
+            sum(len(piece) + comma for piece in pieces[:position]), len(self.text)
+        )
         column = 1 + start + len(text) - len(text.lstrip() or text)
         return Field(text.strip(), self.block, self.distance, column)
 
@@ -141,9 +147,13 @@ class Transform(NamedTuple):
 
     def inside(self, outer: Transform) -> Transform:
         """Return this transform of a file that is itself included by a transformed one."""
-        node, part, material, set_, rest = (own + further for own, further in zip(self[:5], outer[:5], strict=True))
+        node, part, material, set_, rest = (
+            own + further for own, further in zip(self[:5], outer[:5], strict=True)
+        )
         scaled, moved = self.scaled or outer.scaled, self.moved or outer.moved
-        return Transform(node, part, material, set_, rest, self.time * outer.time, scaled, moved)
+        return Transform(
+            node, part, material, set_, rest, self.time * outer.time, scaled, moved
+        )
 
 
 @dataclass(eq=False, repr=False)
@@ -174,7 +184,12 @@ class Card:
     @cached_property
     def rows(self) -> tuple[Row, ...]:
         """All data lines, blank ones too; comments are left out."""
-        return tuple([Row(self.block, distance, text, self.width) for distance, text in self.block.lines()])
+        return tuple(
+            [
+                Row(self.block, distance, text, self.width)
+                for distance, text in self.block.lines()
+            ]
+        )
 
     @cached_property
     def lines(self) -> tuple[Row, ...]:
@@ -184,7 +199,11 @@ class Card:
     @cached_property
     def data(self) -> tuple[Row, ...]:
         """Lines that are not blank, below that of the title where the keyword has one (``_TITLE``)."""
-        return tuple(row for row in self.rows[1:] if not row.blank) if "TITLE" in self.name else self.lines
+        return (
+            tuple(row for row in self.rows[1:] if not row.blank)
+            if "TITLE" in self.name
+            else self.lines
+        )
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -212,7 +231,9 @@ class Card:
         """Read the first fields of a line, each of its kind."""
         return [self._number(row, at, kind(), kind) for at, kind in enumerate(kinds)]
 
-    def _number(self, row: Row, position: int, default: T, kind: Callable[[float], T]) -> Value[T]:
+    def _number(
+        self, row: Row, position: int, default: T, kind: Callable[[float], T]
+    ) -> Value[T]:
         text = row.cell(position)
         if not text:
             return Value(default, row, "", (), position)
@@ -225,12 +246,18 @@ class Card:
     def positive(self, row: Row, position: int) -> float | None:
         """Read a positive number, or None; of an include in other units none is known."""
         found = self.real(row, position)
-        return None if self.transform.scaled or found.problem or found.value <= 0 else found.value
+        return (
+            None
+            if self.transform.scaled or found.problem or found.value <= 0
+            else found.value
+        )
 
     def word(self, row: Row, position: int, default: str = "") -> Value[str]:
         """Read a word, in upper case."""
         text = row.cell(position)
-        return Value(self.scope.text(text).upper() or default, row, "", names_in(text), position)
+        return Value(
+            self.scope.text(text).upper() or default, row, "", names_in(text), position
+        )
 
 
 # Parameters.
@@ -266,35 +293,58 @@ class Scope:
     def __init__(self, outer: Scope | None = None) -> None:
         self._outer = outer
         self._local: _Table = {}
-        self._whole: Scope = outer._whole if outer else self  # that of the main file, which has what all files share
+        self._whole: Scope = (
+            outer._whole if outer else self
+        )  # that of the main file, which has what all files share
         self._shared: _Table = {}
         self._latest_wins = False
         self._count = 0
-        self._known: float = math.inf  # how many definitions of the deck were read before
+        self._known: float = (
+            math.inf
+        )  # how many definitions of the deck were read before
         self._seen = self
 
     def as_of_now(self) -> Scope:
         """Return the same scope as a card sees it that stands here: later definitions do not count for its values."""
         if self._seen._known != self._whole._count:
             self._seen = Scope(self._outer)
-            self._seen._local, self._seen._whole, self._seen._known = self._local, self._whole, self._whole._count
+            self._seen._local, self._seen._whole, self._seen._known = (
+                self._local,
+                self._whole,
+                self._whole._count,
+            )
         return self._seen
 
     def definitions(self, name: str) -> tuple[Definition, ...]:
         """All definitions of ``name`` (lower case), later ones too, in the innermost scope that has one by now."""
         found = [table[name] for table in self._tables() if name in table]
-        return tuple(next((each for each in found if each[0].order < self._known), found[0] if found else ()))
+        return tuple(
+            next(
+                (each for each in found if each[0].order < self._known),
+                found[0] if found else (),
+            )
+        )
 
     def definition(self, name: str) -> Definition | None:
         """Return the definition that counts."""
-        found = [definition for definition in self.definitions(name) if definition.order < self._known]
+        found = [
+            definition
+            for definition in self.definitions(name)
+            if definition.order < self._known
+        ]
         if not found:
             return None
-        return found[-1] if self._whole._latest_wins or found[-1].replaceable else found[0]
+        return (
+            found[-1] if self._whole._latest_wins or found[-1].replaceable else found[0]
+        )
 
     def closure(self, names: tuple[str, ...]) -> list[str]:
         """Return ``names`` and all parameters their definitions refer to, directly or not."""
-        return reached(names, lambda name: (use for one in self.definitions(name) for use in one.uses), wide=True)
+        return reached(
+            names,
+            lambda name: (use for one in self.definitions(name) for use in one.uses),
+            wide=True,
+        )
 
     def value(self, text: str) -> Number:
         """Value of a field: a number, a reference, or an expression; ExpressionError if it is none."""
@@ -310,7 +360,9 @@ class Scope:
 
         def value(reference: re.Match[str]) -> str:
             found = self.definition(reference[1].lower())
-            return found.value if found and isinstance(found.value, str) else reference[0]
+            return (
+                found.value if found and isinstance(found.value, str) else reference[0]
+            )
 
         return re.sub(REFERENCE, value, text) if "&" in text else text
 
@@ -332,7 +384,9 @@ class Scope:
         yield self._local
         yield from self._outer._tables() if self._outer else (self._whole._shared,)
 
-    def _definition(self, row: Row, named: str, text: str, replaceable: bool) -> Definition | None:
+    def _definition(
+        self, row: Row, named: str, text: str, replaceable: bool
+    ) -> Definition | None:
         kind, name = named[:1].upper(), named[1:].strip().lstrip("&").strip().lower()
         if kind not in {"R", "I", "C"} or not name:
             return None
@@ -343,22 +397,32 @@ class Scope:
             value = text.strip().strip('"')
         else:
             try:
-                value = evaluate(text, self._number) if uses or not is_number(text) else number(text)
+                value = (
+                    evaluate(text, self._number)
+                    if uses or not is_number(text)
+                    else number(text)
+                )
                 value = int(value) if kind == "I" else float(value)
             except ExpressionError as error:
                 value, problem = 0, str(error)
-        return Definition(name, value, row.field(0), self._whole._count, replaceable, uses, problem)
+        return Definition(
+            name, value, row.field(0), self._whole._count, replaceable, uses, problem
+        )
 
     def _number(self, name: str) -> Number:
         definition = self.definition(name)
         if definition is None:
             if later := self.definitions(name):
                 place = later[0].place
-                raise ExpressionError(f"parameter &{name} is defined only below, at {place.at}")
+                raise ExpressionError(
+                    f"parameter &{name} is defined only below, at {place.at}"
+                )
             raise ExpressionError(f"parameter &{name} is not defined")
         if definition.problem:
             place = definition.place
-            raise ExpressionError(f"parameter &{name} has no value ({place.at}: {definition.problem})")
+            raise ExpressionError(
+                f"parameter &{name} has no value ({place.at}: {definition.problem})"
+            )
         if isinstance(definition.value, str):
             raise ExpressionError(f"parameter &{name} is a text, a number was expected")
         return definition.value

@@ -57,15 +57,23 @@ def time_pair(windows: Sequence[Times], pushes: Pushes) -> Timing:
         If no wait gives as many windows as are planned.
     """
     contacts_after = [_find_after(td, pushes.spans) for _, td in windows]
-    leads = [start - td for (_, td), (start, _) in zip(windows, contacts_after, strict=True) if start < math.inf]
+    leads = [
+        start - td
+        for (_, td), (start, _) in zip(windows, contacts_after, strict=True)
+        if start < math.inf
+    ]
     lead = min(leads, default=0.0) if pushes.speed else 0.0
     advanced = tuple((start - lead, end) for start, end in pushes.spans)
     landing = contacts_after[-1]
-    latest = windows[-1][1] if landing[0] == math.inf else (landing[0] + landing[1]) / 2  # in the contact behind them
+    latest = (
+        windows[-1][1] if landing[0] == math.inf else (landing[0] + landing[1]) / 2
+    )  # in the contact behind them
     rigid = ForceSwitch(True, False, windows[0][0], latest)
 
     def follow(wait: float) -> Sequence[tuple[float, float | None]]:
-        return follow_pair(rigid, ForceSwitch(False, True, delay=wait), advanced, math.inf)
+        return follow_pair(
+            rigid, ForceSwitch(False, True, delay=wait), advanced, math.inf
+        )
 
     waits = [tr - td for (_, td), (tr, _) in itertools.pairwise(windows)]
     wait, switched = _find_least_wait(waits, windows, follow, "pair of switch sets")
@@ -87,10 +95,16 @@ def time_sensor(windows: Sequence[Times], pushes: Pushes) -> Timing:
 
     def follow(wait: float) -> Sequence[tuple[float, float | None]]:
         pushed = tuple((start, end + wait) for start, end in pushes.spans)
-        active = either([pushed, ((0.0, first),) if first > 0 else (), ((last, math.inf),)])
+        active = either(
+            [pushed, ((0.0, first),) if first > 0 else (), ((last, math.inf),)]
+        )
         return inactive(active)
 
-    waits = [tr - end for (tr, _), (_, end) in zip(windows, contacts_before, strict=True) if end > -math.inf]
+    waits = [
+        tr - end
+        for (tr, _), (_, end) in zip(windows, contacts_before, strict=True)
+        if end > -math.inf
+    ]
     wait, switched = _find_least_wait(waits, windows, follow, "sensor")
     return Timing(first, last, wait, 0.0, switched)
 
@@ -106,7 +120,10 @@ def _find_least_wait(
     for wait in sorted({0.0, *waits}):
         switched = [(tr, math.inf if td is None else td) for tr, td in follow(wait)]
         if len(switched) == len(windows) and switched[-1][1] < math.inf:
-            early = (got < wanted * (1 - _ROUNDING) for (got, _), (wanted, _) in zip(switched, windows, strict=True))
+            early = (
+                got < wanted * (1 - _ROUNDING)
+                for (got, _), (wanted, _) in zip(switched, windows, strict=True)
+            )
             if not any(early):
                 return wait, tuple(switched)
     achieved = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in switched) or "none"
@@ -124,4 +141,6 @@ def _find_after(time: float, spans: Sequence[Times]) -> Times:
 
 def _find_before(time: float, spans: Sequence[Times]) -> Times:
     """Give the last span that ends before a time; minus infinite without one."""
-    return next((span for span in reversed(spans) if span[1] <= time), (-math.inf, -math.inf))
+    return next(
+        (span for span in reversed(spans) if span[1] <= time), (-math.inf, -math.inf)
+    )

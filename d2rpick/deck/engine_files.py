@@ -31,13 +31,22 @@ def choose_step_cap(tr: float, td: float) -> float:
     return float(f"{(td - tr) / _CAP_SHARE:.2g}")
 
 
-def legs(windows: Sequence[Times], end: float, step_cap: float | None) -> list[EngineFile]:
+def legs(
+    windows: Sequence[Times], end: float, step_cap: float | None
+) -> list[EngineFile]:
     """Give the engine runs that the windows ask for; a window from 0 on needs none before it."""
     caps = [step_cap or choose_step_cap(tr, td) for tr, td in windows]
     switches = zip(windows, caps, strict=True)
-    stops = [(time, cap) for (tr, td), own in switches for time, cap in ((tr, None), (td, own)) if time > 0]
+    stops = [
+        (time, cap)
+        for (tr, td), own in switches
+        for time, cap in ((tr, None), (td, own))
+        if time > 0
+    ]
     if len(stops) >= _MOST_LEGS:
-        raise DeckError(f"{len(windows)} windows need {len(stops) + 1} engine runs, at most {_MOST_LEGS} were expected")
+        raise DeckError(
+            f"{len(windows)} windows need {len(stops) + 1} engine runs, at most {_MOST_LEGS} were expected"
+        )
     numbered = enumerate([*stops, (end, None)], start=1)
     return [EngineFile(number, stop, cap) for number, (stop, cap) in numbered]
 
@@ -50,10 +59,15 @@ def off(nodes: Sequence[int]) -> Iterator[str]:
 
 def listed(ids: Sequence[int]) -> Iterator[str]:
     """Write numbers in lines."""
-    yield from (" ".join(map(str, ids[i : i + _NODES_PER_LINE])) for i in range(0, len(ids), _NODES_PER_LINE))
+    yield from (
+        " ".join(map(str, ids[i : i + _NODES_PER_LINE]))
+        for i in range(0, len(ids), _NODES_PER_LINE)
+    )
 
 
-def engine_lines(leg: EngineFile, name: str, ids: Sequence[int], others: Sequence[int]) -> Iterator[str]:
+def engine_lines(
+    leg: EngineFile, name: str, ids: Sequence[int], others: Sequence[int]
+) -> Iterator[str]:
     """Write what an engine file says of a leg: its run, and which main nodes are rigid; ``others`` stay off."""
     yield f"/RUN/{name}/{leg.number}"
     yield f"{leg.stop!r:>20}"
@@ -66,4 +80,8 @@ def engine_lines(leg: EngineFile, name: str, ids: Sequence[int], others: Sequenc
 
 def capped(cap: float) -> Iterator[str]:
     """Hold the step of a leg with rigid bodies below a limit."""
-    yield from ("# with nothing deformable left the step would grow without limit", "/DTIX", f"{cap!r} {cap!r}")
+    yield from (
+        "# with nothing deformable left the step would grow without limit",
+        "/DTIX",
+        f"{cap!r} {cap!r}",
+    )

@@ -17,12 +17,16 @@ if TYPE_CHECKING:
 
 Number = int | float
 
-_NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d+))?", re.ASCII)
+_NUMBER = re.compile(
+    r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]([+-]?\d+)|([+-]\d+))?", re.ASCII
+)
 _TOKEN: Final = (  # compiled where it is needed
     r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?)|(?P<name>&?\s*[a-z_]\w*)|(?P<sign>\*\*|[-+*/(),]))"
 )
 REFERENCE: Final = r"(?ai)&\s*([a-z_]\w*)"  # this too
-_DEEPEST = 50  # nested parentheses; no deck needs more, and Python's stack is not to be tried
+_DEEPEST = (
+    50  # nested parentheses; no deck needs more, and Python's stack is not to be tried
+)
 LONGEST = 40  # characters of a number: more are no number of a deck
 _LONGEST_EXPRESSION = 2000
 _INTEGER_LIMIT = 2**63
@@ -66,7 +70,9 @@ def plain(kind: Callable[[float], Any], text: str) -> tuple[Any, str] | None:
     return None if "&" in text or text[0] == "<" else of_kind(kind, text, number)
 
 
-def of_kind(kind: Callable[[float], Any], text: str, value: Callable[[str], Number]) -> tuple[Any, str]:
+def of_kind(
+    kind: Callable[[float], Any], text: str, value: Callable[[str], Number]
+) -> tuple[Any, str]:
     """Value of a text as a number of a kind, int or float; or why it has none.
 
     Examples
@@ -98,7 +104,11 @@ def names_in(text: str) -> tuple[str, ...]:
     >>> names_in("-&tEnd/6.0+&dt")
     ('tend', 'dt')
     """
-    return tuple(name.lower() for name in re.findall(REFERENCE, text)) if "&" in text else ()
+    return (
+        tuple(name.lower() for name in re.findall(REFERENCE, text))
+        if "&" in text
+        else ()
+    )
 
 
 def evaluate(text: str, lookup: Callable[[str], Number]) -> Number:
@@ -112,7 +122,9 @@ def evaluate(text: str, lookup: Callable[[str], Number]) -> Number:
     12
     """
     if len(text) > _LONGEST_EXPRESSION:
-        raise ExpressionError(f"an expression is longer than {_LONGEST_EXPRESSION} characters")
+        raise ExpressionError(
+            f"an expression is longer than {_LONGEST_EXPRESSION} characters"
+        )
     try:
         return _Parser(text, lookup).whole()
     except (ValueError, OverflowError, ZeroDivisionError, TypeError):
@@ -127,7 +139,20 @@ _FUNCTIONS: Final[dict[str, tuple[int, Callable[..., Number]]]] = {
     **{
         name: (1, getattr(math, name))
         for name in (
-            *("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh"),
+            *(
+                "sin",
+                "cos",
+                "tan",
+                "asin",
+                "acos",
+                "atan",
+                "sinh",
+                "cosh",
+                "tanh",
+                "asinh",
+                "acosh",
+                "atanh",
+            ),
             *("sqrt", "exp", "log", "log10"),
         )
     },
@@ -189,7 +214,9 @@ class _Parser:
     def nested(self, least: int = 1) -> Number:
         self.depth += 1
         if self.depth > _DEEPEST:
-            raise ExpressionError(f"an expression is nested deeper than {_DEEPEST} levels")
+            raise ExpressionError(
+                f"an expression is nested deeper than {_DEEPEST} levels"
+            )
         value = self.value(least)
         self.depth -= 1
         return value
@@ -199,7 +226,11 @@ class _Parser:
         while (operation := _OPERATIONS.get(self.tokens[0])) and operation[0] >= least:
             tight, operate = operation
             # those of one kind are taken from the left, powers from the right
-            behind = self.nested(tight) if self.tokens.pop(0) == "**" else self.value(tight + 1)
+            behind = (
+                self.nested(tight)
+                if self.tokens.pop(0) == "**"
+                else self.value(tight + 1)
+            )
             value = _checked(operate(value, behind))
         return value
 
@@ -230,7 +261,9 @@ class _Parser:
 
     def call(self, name: str) -> Number:
         if name not in _FUNCTIONS:
-            raise ExpressionError(f"{name!r} is not a function of *PARAMETER_EXPRESSION")
+            raise ExpressionError(
+                f"{name!r} is not a function of *PARAMETER_EXPRESSION"
+            )
         arity, function = _FUNCTIONS[name]
         self.expect("(")
         arguments = [self.nested()]
@@ -239,7 +272,9 @@ class _Parser:
             arguments.append(self.nested())
         self.expect(")")
         if len(arguments) != arity:
-            raise ExpressionError(f"{name}() takes {arity} values, found {len(arguments)}")
+            raise ExpressionError(
+                f"{name}() takes {arity} values, found {len(arguments)}"
+            )
         return _checked(function(*arguments))
 
     def expect(self, sign: str) -> None:
@@ -249,7 +284,9 @@ class _Parser:
 
     def unexpected(self) -> ExpressionError:
         found = repr(self.tokens[0]) if self.tokens[0] else "the end"
-        return ExpressionError(f"{self.text!r} is not an expression, found {found} where it should go on")
+        return ExpressionError(
+            f"{self.text!r} is not an expression, found {found} where it should go on"
+        )
 
 
 def _tokens(text: str) -> Iterator[str]:

@@ -92,7 +92,9 @@ def _next(with_force: bool, since: float, contacts: Spans) -> float:
     return math.inf if with_force else since
 
 
-def find_delay_without_chatter(windows: Sequence[tuple[float, float]], contacts: Spans) -> float | None:
+def find_delay_without_chatter(
+    windows: Sequence[tuple[float, float]], contacts: Spans
+) -> float | None:
     """Give the least TIME3 of the set that makes parts deformable for it to switch in these windows alone.
 
     Each contact after which a window begins has to be over before; None where no contact comes before any.
@@ -102,7 +104,9 @@ def find_delay_without_chatter(windows: Sequence[tuple[float, float]], contacts:
     return max((end - start for start, end in clusters), default=None)
 
 
-def _cluster(contacts: Spans, windows: Sequence[tuple[float, float]]) -> tuple[float, float]:
+def _cluster(
+    contacts: Spans, windows: Sequence[tuple[float, float]]
+) -> tuple[float, float]:
     """Give the time from the first to the last of some contacts, of those that follow the last window before them."""
     last = contacts[-1][1]
     after = max((td for _, td in windows if td <= last), default=-math.inf)

@@ -24,7 +24,12 @@ _ISH3N: Final = {
     30: Formulation("DKT18", QBAT, measured=False), 31: Formulation("DKT_S3", QEPH, measured=False),
 }  # fmt: skip
 # Solids were measured together: 24, 17 and 1 could not be told apart.
-_ISOLID: Final = {5: "HEPH5", 14: "HA8", 24: "HEPH", **{one: f"SOLID{one}" for one in (1, 2, 12, 17, 18)}}
+_ISOLID: Final = {
+    5: "HEPH5",
+    14: "HA8",
+    24: "HEPH",
+    **{one: f"SOLID{one}" for one in (1, 2, 12, 17, 18)},
+}
 _ISOLID_MEASURED: Final = {1, 17, 24}
 
 # LS-DYNA, ELFORM of *SECTION_SHELL: one point, one point with physical stabilisation or warping, four points.
@@ -42,11 +47,19 @@ _ELFORM_SHELL: Final = {
 def radioss(kind: str, shell: int, triangle: int, solid: int) -> Formulation | None:
     """How Radioss computes elements of a kind with these flags of their property; None for what is not known."""
     if kind == "shell":
-        return _layered(_ISHELL.get(shell, Formulation(f"Ishell {shell}", None, measured=False)))
+        return _layered(
+            _ISHELL.get(shell, Formulation(f"Ishell {shell}", None, measured=False))
+        )
     if kind == "triangle":
-        return _layered(_ISH3N.get(triangle, Formulation(f"Ish3n {triangle}", None, measured=False)))
+        return _layered(
+            _ISH3N.get(triangle, Formulation(f"Ish3n {triangle}", None, measured=False))
+        )
     if kind == "solid":
-        return Formulation(_ISOLID.get(solid, f"Isolid {solid}"), SOLID, measured=solid in _ISOLID_MEASURED)
+        return Formulation(
+            _ISOLID.get(solid, f"Isolid {solid}"),
+            SOLID,
+            measured=solid in _ISOLID_MEASURED,
+        )
     return _plain(kind, measured=True)
 
 
@@ -66,5 +79,13 @@ def _layered(shell: Formulation) -> Formulation:
 
 def _plain(kind: str, *, measured: bool) -> Formulation | None:
     alike = {"beam": BEAM, "truss": BEAM, "spring": SPRING, "seatbelt": SPRING}
-    cost = SOLID if kind in ("tetrahedron", "pentahedron", "thick shell") else alike.get(kind)
-    return Formulation(kind, cost, measured and kind in ("beam", "spring")) if cost else None
+    cost = (
+        SOLID
+        if kind in ("tetrahedron", "pentahedron", "thick shell")
+        else alike.get(kind)
+    )
+    return (
+        Formulation(kind, cost, measured and kind in ("beam", "spring"))
+        if cost
+        else None
+    )

@@ -27,7 +27,14 @@ if TYPE_CHECKING:
 
 _PIECE: Final = 1 << 14
 # Corners of a brick, seen from outside.
-_FACES: Final = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
+_FACES: Final = (
+    (0, 3, 2, 1),
+    (4, 5, 6, 7),
+    (0, 1, 5, 4),
+    (1, 2, 6, 5),
+    (2, 3, 7, 6),
+    (3, 0, 4, 7),
+)
 _SURFACES: Final = frozenset({"shell", "triangle"})
 _LINES: Final = frozenset({"beam", "truss"})
 _VOLUMES: Final = frozenset({"solid", "tetrahedron", "thick shell"})
@@ -42,18 +49,29 @@ class _Measured(NamedTuple):
     length: float
 
 
-def masses_and_steps(inventory: Inventory) -> dict[int, tuple[float | None, float | None]]:
+def masses_and_steps(
+    inventory: Inventory,
+) -> dict[int, tuple[float | None, float | None]]:
     """Mass by density and size [mass] and smallest stable step [time] of every part that has elements.
 
     None where the deck does not give the density, modulus, thickness or place of every element of the part.
     """
     measured: dict[int, list[_Measured]] = {}
     for elements in inventory.elements:
-        sizes, lengths = sizes_and_lengths(elements.kind, elements.nodes, inventory.coordinates)
+        sizes, lengths = sizes_and_lengths(
+            elements.kind, elements.nodes, inventory.coordinates
+        )
         order = np.argsort(elements.part, kind="stable")
-        parts, starts, counts = np.unique(elements.part[order], return_index=True, return_counts=True)
-        sums, lows = np.add.reduceat(sizes[order], starts), np.minimum.reduceat(lengths[order], starts)
-        for part, *values in zip(*(a.tolist() for a in (parts, counts, sums, lows)), strict=True):
+        parts, starts, counts = np.unique(
+            elements.part[order], return_index=True, return_counts=True
+        )
+        sums, lows = (
+            np.add.reduceat(sizes[order], starts),
+            np.minimum.reduceat(lengths[order], starts),
+        )
+        for part, *values in zip(
+            *(a.tolist() for a in (parts, counts, sums, lows)), strict=True
+        ):
             measured.setdefault(part, []).append(_Measured(elements.kind, *values))
     return {
         part: (_mass(inventory.parts[part], found), _step(inventory.parts[part], found))
@@ -68,7 +86,10 @@ def _mass(data: PartData, measured: Sequence[_Measured]) -> float | None:
         if one.kind == "spring" and data.section.mass is not None:
             mass += one.number * data.section.mass
             continue
-        density, depth = data.material.density if data.material else None, _depth(one.kind, data)
+        density, depth = (
+            data.material.density if data.material else None,
+            _depth(one.kind, data),
+        )
         if density is None or depth is None:
             return None
         mass += density * depth * one.size
@@ -82,7 +103,9 @@ def _step(data: PartData, measured: Sequence[_Measured]) -> float | None:
         if speed is None:
             return None
         steps.append(one.length / speed)
-    return min(steps) if all(math.isfinite(step) and step > 0 for step in steps) else None
+    return (
+        min(steps) if all(math.isfinite(step) and step > 0 for step in steps) else None
+    )
 
 
 def _depth(kind: str, data: PartData) -> float | None:
@@ -105,22 +128,35 @@ def _wave_speed(kind: str, material: Material | None) -> float | None:
     return None
 
 
-def sizes_and_lengths(kind: str, nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
+def sizes_and_lengths(
+    kind: str, nodes: Places, coordinates: Reals
+) -> tuple[Reals, Reals]:
     """Size of each element [length, area or volume], and the length that a wave has to cross; NaN where unknown."""
     # so many at once that they stay in the processor's cache
-    pieces = [_sizes(kind, nodes[at : at + _PIECE], coordinates) for at in range(0, len(nodes), _PIECE)]
-    return np.concatenate([size for size, _ in pieces]), np.concatenate([length for _, length in pieces])
+    pieces = [
+        _sizes(kind, nodes[at : at + _PIECE], coordinates)
+        for at in range(0, len(nodes), _PIECE)
+    ]
+    return np.concatenate([size for size, _ in pieces]), np.concatenate(
+        [length for _, length in pieces]
+    )
 
 
 def _sizes(kind: str, nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
     """Length, area or volume of elements, and the length that a wave has to cross; both (n,), NaN where unknown."""
     if kind in _LINES:
-        length = np.linalg.norm(coordinates[nodes[:, 1]] - coordinates[nodes[:, 0]], axis=1)
+        length = np.linalg.norm(
+            coordinates[nodes[:, 1]] - coordinates[nodes[:, 0]], axis=1
+        )
         return length, length
     if kind in _SURFACES:
         return _surfaces(nodes, coordinates)
     if kind in _VOLUMES:
-        return _tetrahedra(nodes, coordinates) if kind == "tetrahedron" else _bricks(nodes, coordinates)
+        return (
+            _tetrahedra(nodes, coordinates)
+            if kind == "tetrahedron"
+            else _bricks(nodes, coordinates)
+        )
     unknown = np.full(len(nodes), np.nan)
     return unknown, unknown
 
@@ -151,7 +187,12 @@ def _cross(a: Reals, b: Reals) -> Reals:
 def _tetrahedra(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
     corners = coordinates[nodes[:, :4]]
     volume = np.abs(_sixth(corners, (0, 1, 2, 3)))
-    faces = np.stack([_area(corners[:, [*face, face[-1]]]) for face in ((0, 1, 2), (0, 1, 3), (1, 2, 3), (0, 2, 3))])
+    faces = np.stack(
+        [
+            _area(corners[:, [*face, face[-1]]])
+            for face in ((0, 1, 2), (0, 1, 3), (1, 2, 3), (0, 2, 3))
+        ]
+    )
     return volume, 3 * volume / faces.max(axis=0)
 
 
@@ -159,7 +200,9 @@ def _bricks(nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
     """Bricks, wedges and tetrahedra that repeat a node, or leave the last ones out."""
     eight = nodes[:, :8].copy()
     for column in range(1, 8):
-        eight[:, column] = np.where(eight[:, column] == NO_NODE, eight[:, column - 1], eight[:, column])
+        eight[:, column] = np.where(
+            eight[:, column] == NO_NODE, eight[:, column - 1], eight[:, column]
+        )
     corners = coordinates[eight]
     volume = np.abs(sum(_below(corners, face) for face in _FACES))
     faces = np.stack([_area(corners[:, list(face)]) for face in _FACES])
@@ -214,12 +257,19 @@ class Placement:
         for elements in self._inventory.elements:
             for part, share in _shares(elements, self._inventory.coordinates):
                 found.setdefault(part, []).append(share)
-        placed = ((part, _placed(self._inventory, part, shares)) for part, shares in found.items())
+        placed = (
+            (part, _placed(self._inventory, part, shares))
+            for part, shares in found.items()
+        )
         return {part: one for part, one in placed if np.isfinite(one.spread).all()}
 
     def watched_centre(self, parts: Iterable[int]) -> Reals | None:
         """Mean of the watched nodes of some parts (3,) [length], each node once; None without any."""
-        places = {place: where for part in parts for place, where in self.parts[part].watched.items()}
+        places = {
+            place: where
+            for part in parts
+            for place, where in self.parts[part].watched.items()
+        }
         return np.mean(list(places.values()), axis=0) if places else None
 
     def hanging_together(self, parts: Collection[int]) -> frozenset[int]:
@@ -238,26 +288,40 @@ def _shares(elements: Elements, coordinates: Reals) -> Iterable[tuple[int, _Shar
     middles = _middles(elements.nodes, coordinates)
     parts, at = np.unique(elements.part, return_inverse=True)
     total = np.bincount(at, sizes)
-    total[total == 0] = np.nan  # elements without any size do not tell where their part is
+    total[total == 0] = (
+        np.nan
+    )  # elements without any size do not tell where their part is
     first = np.stack([np.bincount(at, sizes * axis) for axis in middles.T], axis=1)
-    x, y, z = (middles - (first / total[:, np.newaxis])[at]).T  # from there: far from the origin digits would be lost
+    x, y, z = (
+        middles - (first / total[:, np.newaxis])[at]
+    ).T  # from there: far from the origin digits would be lost
     xx, yy, zz, xy, yz, zx = (
-        np.bincount(at, sizes * a * b) for a, b in ((x, x), (y, y), (z, z), (x, y), (y, z), (z, x))
+        np.bincount(at, sizes * a * b)
+        for a, b in ((x, x), (y, y), (z, z), (x, y), (y, z), (z, x))
     )
     second = np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
     return [
         (part, _Share(size, one, other))
-        for part, size, one, other in zip(parts.tolist(), total.tolist(), first, second.transpose(2, 0, 1), strict=True)
+        for part, size, one, other in zip(
+            parts.tolist(),
+            total.tolist(),
+            first,
+            second.transpose(2, 0, 1),
+            strict=True,
+        )
     ]
 
 
 def _middles(nodes: Places, coordinates: Reals) -> Reals:
     """Mean of the nodes of each element (n, 3)."""
     if (nodes != NO_NODE).all():
-        return np.asarray(sum(coordinates[column] for column in nodes.T) / nodes.shape[1])
+        return np.asarray(
+            sum(coordinates[column] for column in nodes.T) / nodes.shape[1]
+        )
     real = nodes != NO_NODE
     summed = sum(
-        np.where(there[:, np.newaxis], coordinates[column], 0.0) for column, there in zip(nodes.T, real.T, strict=True)
+        np.where(there[:, np.newaxis], coordinates[column], 0.0)
+        for column, there in zip(nodes.T, real.T, strict=True)
     )
     return np.asarray(summed / real.sum(axis=1)[:, np.newaxis])
 
@@ -266,8 +330,12 @@ def _placed(inventory: Inventory, part: int, shares: Sequence[_Share]) -> Placed
     size = sum(one.size for one in shares)
     centre = np.asarray(sum(one.first for one in shares) / size)
     apart = [(one, one.first / one.size - centre) for one in shares]
-    spread = sum(one.second + one.size * np.outer(way, way) for one, way in apart) / size
-    nodes = inventory.nodes_by_part[part]  # ascending, and many more than those that are watched
+    spread = (
+        sum(one.second + one.size * np.outer(way, way) for one, way in apart) / size
+    )
+    nodes = inventory.nodes_by_part[
+        part
+    ]  # ascending, and many more than those that are watched
     at = np.minimum(np.searchsorted(nodes, inventory.watched), nodes.size - 1)
     own = inventory.watched[nodes[at] == inventory.watched]
     watched = {place: inventory.coordinates[place] for place in own.tolist()}

@@ -12,9 +12,22 @@ import numpy as np
 
 from d2rpick.deck import formulations, ls_dyna_loads
 from d2rpick.deck.card import LONG
-from d2rpick.deck.ls_dyna_parts import Parts, SectionCard, material_of, read_parts, read_sections
+from d2rpick.deck.ls_dyna_parts import (
+    Parts,
+    SectionCard,
+    material_of,
+    read_parts,
+    read_sections,
+)
 from d2rpick.deck.mesh import Mesh, layout, lines_of
-from d2rpick.deck.model import Formulation, Inventory, Material, PartData, Section, placed
+from d2rpick.deck.model import (
+    Formulation,
+    Inventory,
+    Material,
+    PartData,
+    Section,
+    placed,
+)
 from d2rpick.deck.reader import Deck, cuts, holds_mesh
 from d2rpick.deck.unswitchable import find_unswitchable_in_ls_dyna
 
@@ -44,25 +57,110 @@ _KINDS: Final = {
 }
 # Options whose lines hold reals or words, or ids in other columns than those of an element and its part.
 _OPTIONS: Final = {
-    *("THICKNESS", "BETA", "MCID", "OFFSET", "ORTHO", "ORIENTATION", "COMPOSITE", "LONG", "SCALAR", "SCALR"),
-    *("SECTION", "ELFORM", "DOF", "PID", "WARPAGE", "ELBOW", "ID", "TITLE", "SHL4", "TO", "SHL8", "TET4TOTET10"),
+    *(
+        "THICKNESS",
+        "BETA",
+        "MCID",
+        "OFFSET",
+        "ORTHO",
+        "ORIENTATION",
+        "COMPOSITE",
+        "LONG",
+        "SCALAR",
+        "SCALR",
+    ),
+    *(
+        "SECTION",
+        "ELFORM",
+        "DOF",
+        "PID",
+        "WARPAGE",
+        "ELBOW",
+        "ID",
+        "TITLE",
+        "SHL4",
+        "TO",
+        "SHL8",
+        "TET4TOTET10",
+    ),
     *("H8TOH20", "H8TOH27", "H8TOH64", "H20", "H27", "H64", "P21", "P40", "T15", "T20"),
 }
 # They make no part heavier or dearer.
 _NO_ELEMENTS: Final = {"MASS", "INERTIA", "BLANKING", "LANCING", "TRIM", "PLOTEL"}
 _TEN: Final = 10  # nodes in the second line of a solid
 _SPRING: Final = re.compile(r"MAT_(SPRING|DAMPER|S\d\d)(_|\Z)")
-_DAMPERS: Final = ("MAT_DAMPER", "MAT_S02", "MAT_S05", "MAT_SPRING_GENERAL_NONLINEAR", "MAT_SPRING_MAXWELL")
+_DAMPERS: Final = (
+    "MAT_DAMPER",
+    "MAT_S02",
+    "MAT_S05",
+    "MAT_SPRING_GENERAL_NONLINEAR",
+    "MAT_SPRING_MAXWELL",
+)
 _AIRBAG: Final = ("MAT_FABRIC", "MAT_034")
 _VOID: Final = ("MAT_NULL", "MAT_009")
 # Materials that begin with density, Young's modulus and Poisson's ratio, by name and number.
 _ELASTIC: Final = {
-    *("ELASTIC", "001", "1", "PLASTIC_KINEMATIC", "003", "3", "RIGID", "020", "20", "PIECEWISE_LINEAR_PLASTICITY"),
-    *("024", "24", "POWER_LAW_PLASTICITY", "018", "18", "STRAIN_RATE_DEPENDENT_PLASTICITY", "019", "19"),
-    *("SIMPLIFIED_JOHNSON_COOK", "098", "98", "PLASTICITY_WITH_DAMAGE", "081", "81", "SPOTWELD", "100"),
-    *("MODIFIED_PIECEWISE_LINEAR_PLASTICITY", "123", "LAMINATED_GLASS", "032", "32", "CRUSHABLE_FOAM", "063", "63"),
-    *("RESULTANT_PLASTICITY", "028", "28", "3-PARAMETER_BARLAT", "036", "36", "FABRIC", "034", "34"),
-    *("TRANSVERSELY_ANISOTROPIC_ELASTIC_PLASTIC", "037", "37", "RATE_SENSITIVE_POWERLAW_PLASTICITY", "064", "64"),
+    *(
+        "ELASTIC",
+        "001",
+        "1",
+        "PLASTIC_KINEMATIC",
+        "003",
+        "3",
+        "RIGID",
+        "020",
+        "20",
+        "PIECEWISE_LINEAR_PLASTICITY",
+    ),
+    *(
+        "024",
+        "24",
+        "POWER_LAW_PLASTICITY",
+        "018",
+        "18",
+        "STRAIN_RATE_DEPENDENT_PLASTICITY",
+        "019",
+        "19",
+    ),
+    *(
+        "SIMPLIFIED_JOHNSON_COOK",
+        "098",
+        "98",
+        "PLASTICITY_WITH_DAMAGE",
+        "081",
+        "81",
+        "SPOTWELD",
+        "100",
+    ),
+    *(
+        "MODIFIED_PIECEWISE_LINEAR_PLASTICITY",
+        "123",
+        "LAMINATED_GLASS",
+        "032",
+        "32",
+        "CRUSHABLE_FOAM",
+        "063",
+        "63",
+    ),
+    *(
+        "RESULTANT_PLASTICITY",
+        "028",
+        "28",
+        "3-PARAMETER_BARLAT",
+        "036",
+        "36",
+        "FABRIC",
+        "034",
+        "34",
+    ),
+    *(
+        "TRANSVERSELY_ANISOTROPIC_ELASTIC_PLASTIC",
+        "037",
+        "37",
+        "RATE_SENSITIVE_POWERLAW_PLASTICITY",
+        "064",
+        "64",
+    ),
 }
 
 
@@ -71,7 +169,11 @@ def read(deck: Deck) -> Inventory:
     parts = read_parts(deck)
     cards = list(_element_cards(deck))
     ids, coordinates, codes = _nodes(deck)
-    mesh = Mesh.of([one for card in cards if _followed(card) for one in _elements(card)], ids, coordinates)
+    mesh = Mesh.of(
+        [one for card in cards if _followed(card) for one in _elements(card)],
+        ids,
+        coordinates,
+    )
     notes = (*_notes(deck, cards), *mesh.doubts(parts.materials.keys(), "*"))
     joints = ls_dyna_loads.joints_of(deck)
     return Inventory(
@@ -82,7 +184,9 @@ def read(deck: Deck) -> Inventory:
     )  # fmt: skip
 
 
-def first_shared_nodes(cards: Sequence[Card], bodies: Mapping[int, int]) -> dict[tuple[int, int], int]:
+def first_shared_nodes(
+    cards: Sequence[Card], bodies: Mapping[int, int]
+) -> dict[tuple[int, int], int]:
     """Find a node for every two parts of different bodies that share one.
 
     Parameters
@@ -114,12 +218,16 @@ def first_parts(cards: Sequence[Card], parts: Collection[int]) -> dict[int, int]
     return found
 
 
-def _nodes_of(cards: Sequence[Card], parts: Collection[int]) -> Iterator[tuple[int, int]]:
+def _nodes_of(
+    cards: Sequence[Card], parts: Collection[int]
+) -> Iterator[tuple[int, int]]:
     """Part and node, for the nodes of each element of some parts, in the order of the deck."""
     for card in cards:
         for _, owners, nodes in _elements(card, _TEN):
             rows = np.isin(owners, [*parts])
-            for part, own in zip(owners[rows].tolist(), nodes[rows].tolist(), strict=True):
+            for part, own in zip(
+                owners[rows].tolist(), nodes[rows].tolist(), strict=True
+            ):
                 yield from ((part, node) for node in {node for node in own if node})
 
 
@@ -129,8 +237,12 @@ def _watched(deck: Deck) -> Integers:
     for card in deck.named("DATABASE_HISTORY_NODE"):
         options = card.name.removeprefix("DATABASE_HISTORY_NODE").split("_")[1:]
         if set(options) <= {"ID", "LOCAL"}:
-            fields: Layout = layout(*[20 if card.width == LONG else 10] * (1 if options else 8))
-            found = [lines.integers(fields).ravel() for lines in lines_of(card) if len(lines)]
+            fields: Layout = layout(
+                *[20 if card.width == LONG else 10] * (1 if options else 8)
+            )
+            found = [
+                lines.integers(fields).ravel() for lines in lines_of(card) if len(lines)
+            ]
             ids += [one[one > 0] + card.transform.node for one in found]
     return np.unique(np.concatenate(ids))
 
@@ -143,18 +255,36 @@ def _moves_nodes(deck: Deck) -> bool:
 
 def _notes(deck: Deck, cards: Sequence[Card]) -> Iterator[str]:
     """Say what may be missing."""
-    yield from (f"{card.at}: elements of *{card.name} are not followed" for card in cards if not _followed(card))
-    yield from (f"{one.name.at}: {one.name.text} was not read: {one.reason}" for one in deck.unread)
+    yield from (
+        f"{card.at}: elements of *{card.name} are not followed"
+        for card in cards
+        if not _followed(card)
+    )
+    yield from (
+        f"{one.name.at}: {one.name.text} was not read: {one.reason}"
+        for one in deck.unread
+    )
     for block in deck.encrypted:
         yield f"{block.source.name}:{block.line}: elements may hide in an encrypted block"
-    yield from (f"{block.source.name}: {told}" for block, told in cuts(deck) if holds_mesh(block))
+    yield from (
+        f"{block.source.name}: {told}"
+        for block, told in cuts(deck)
+        if holds_mesh(block)
+    )
 
 
 def _element_cards(deck: Deck) -> Iterator[Card]:
     for card in deck.cards:
         kind = card.name.split("_")[1:2]
-        fitting = card.name.startswith("ELEMENT_SEATBELT_")  # slip ring, retractor, sensor, ...
-        if card.name.startswith("ELEMENT_") and kind and kind[0] not in _NO_ELEMENTS and not fitting:
+        fitting = card.name.startswith(
+            "ELEMENT_SEATBELT_"
+        )  # slip ring, retractor, sensor, ...
+        if (
+            card.name.startswith("ELEMENT_")
+            and kind
+            and kind[0] not in _NO_ELEMENTS
+            and not fitting
+        ):
             yield card
 
 
@@ -166,10 +296,18 @@ def _followed(card: Card) -> bool:
 def _width(card: Card) -> int:
     """Columns of an id."""
     words = card.block.head.split()
-    return LONG if card.width == LONG else 10 if "%" in words[0] or words[1:2] == ["%"] else 8
+    return (
+        LONG
+        if card.width == LONG
+        else 10
+        if "%" in words[0] or words[1:2] == ["%"]
+        else 8
+    )
 
 
-def _elements(card: Card, most: int | None = None) -> Iterator[tuple[str, Integers, Integers]]:
+def _elements(
+    card: Card, most: int | None = None
+) -> Iterator[tuple[str, Integers, Integers]]:
     """Kind, parts and node ids of the elements of a card, piece by piece; ids with their offsets.
 
     ``most`` nodes of each, by default those that give it its size.
@@ -183,15 +321,27 @@ def _elements(card: Card, most: int | None = None) -> Iterator[tuple[str, Intege
         if kind.name == "particle":
             ids = lines.integers(layout(width, width))
             rows = ids[(ids > 0).all(axis=1)]
-            yield kind.name, rows[:, 1] + card.transform.part, rows[:, :1] + card.transform.node
+            yield (
+                kind.name,
+                rows[:, 1] + card.transform.part,
+                rows[:, :1] + card.transform.node,
+            )
             continue
-        values = lines.integers(layout(*[width] * (2 + (_TEN if kind.name == "solid" else kind.most))))
+        values = lines.integers(
+            layout(*[width] * (2 + (_TEN if kind.name == "solid" else kind.most)))
+        )
         if kind.name == "solid":
-            values, left = _of_two_lines(values if left is None else np.concatenate([left, values]))
+            values, left = _of_two_lines(
+                values if left is None else np.concatenate([left, values])
+            )
         # rows that name an element, its part and enough nodes: not those of further options
         mesh = values[(values[:, : 2 + kind.fewest] > 0).all(axis=1)]
         nodes = np.maximum(mesh[:, 2 : 2 + (most or kind.most)], 0)
-        yield kind.name, mesh[:, 1] + card.transform.part, np.where(nodes > 0, nodes + card.transform.node, 0)
+        yield (
+            kind.name,
+            mesh[:, 1] + card.transform.part,
+            np.where(nodes > 0, nodes + card.transform.node, 0),
+        )
 
 
 def _of_two_lines(values: Integers) -> tuple[Integers, Integers | None]:
@@ -209,7 +359,11 @@ def _of_two_lines(values: Integers) -> tuple[Integers, Integers | None]:
 
 def _nodes(deck: Deck) -> tuple[Integers, Reals, Integers]:
     """Ids and coordinates of all nodes, and the codes of their translations that are fixed."""
-    ids, places, codes = [np.empty(0, np.int64)], [np.empty((0, 3))], [np.empty(0, np.int64)]
+    ids, places, codes = (
+        [np.empty(0, np.int64)],
+        [np.empty((0, 3))],
+        [np.empty(0, np.int64)],
+    )
     for card in deck.named("NODE"):
         if card.name != "NODE":
             continue
@@ -221,7 +375,9 @@ def _nodes(deck: Deck) -> tuple[Integers, Reals, Integers]:
                 good = numbers > 0
                 ids.append(numbers[good] + card.transform.node)
                 found = lines.reals(fields, slice(1, 4))[good]
-                places.append(np.full_like(found, np.nan) if card.transform.scaled else found)
+                places.append(
+                    np.full_like(found, np.nan) if card.transform.scaled else found
+                )
                 codes.append(_codes(lines, [*fields, (sum(fields[-1]), width)])[good])
     return np.concatenate(ids), np.concatenate(places), np.concatenate(codes)
 
@@ -229,30 +385,45 @@ def _nodes(deck: Deck) -> tuple[Integers, Reals, Integers]:
 def _codes(lines: Lines, fields: Layout) -> Integers:
     """Last of some fields, 0 in most meshes."""
     start, width = fields[-1]
-    if lines.in_columns and not (lines.cells[:, start : start + width] > ord("0")).any():
+    if (
+        lines.in_columns
+        and not (lines.cells[:, start : start + width] > ord("0")).any()
+    ):
         return np.zeros(len(lines), np.int64)
     return lines.integers(fields)[:, -1]
 
 
 def _parts(deck: Deck, parts: Parts, mesh: Mesh) -> dict[int, PartData]:
-    kinds, sections, materials = mesh.kinds, read_sections(deck), dict(_materials(deck, parts))
+    kinds, sections, materials = (
+        mesh.kinds,
+        read_sections(deck),
+        dict(_materials(deck, parts)),
+    )
     unswitchable = find_unswitchable_in_ls_dyna(deck, parts)
     found: dict[int, PartData] = {}
     for part, name in parts.materials.items():
         material = materials.get(name)
-        section = _section(sections.get(parts.sections.get(part, 0)), kinds.get(part, set()), material)
+        section = _section(
+            sections.get(parts.sections.get(part, 0)), kinds.get(part, set()), material
+        )
         why = unswitchable[part].reason if part in unswitchable else ""
         found[part] = PartData(part, parts.titles.get(part, ""), material, section, why)
     return found
 
 
-def _section(card: SectionCard | None, kinds: set[str], material: Material | None) -> Section:
+def _section(
+    card: SectionCard | None, kinds: set[str], material: Material | None
+) -> Section:
     found: dict[str, Formulation] = {}
     for kind in sorted(kinds):
         one = formulations.ls_dyna(kind, card.elform if card else 0)
         if one and (card or kind == "spring"):
             found[kind] = one
-    damped = None if material is None or material.kind != "spring" else material.name.startswith(_DAMPERS)
+    damped = (
+        None
+        if material is None or material.kind != "spring"
+        else material.name.startswith(_DAMPERS)
+    )
     if card is None:
         return Section(found, damped=damped)
     area = card.first if card.kind == "BEAM" and card.elform in (2, 3, 12) else None
@@ -267,8 +438,13 @@ def _materials(deck: Deck, parts: Parts) -> Iterator[tuple[str, Material]]:
         row, number = card.data[0], material_of(card, card.data[0], 0)
         name = card.name.removesuffix("_TITLE")
         known = name.removeprefix("MAT_") in _ELASTIC
-        density, modulus, poisson = (card.positive(row, at) if known else None for at in (1, 2, 3))
-        yield number, Material(name, _kind(name, number, parts), density, modulus, poisson)
+        density, modulus, poisson = (
+            card.positive(row, at) if known else None for at in (1, 2, 3)
+        )
+        yield (
+            number,
+            Material(name, _kind(name, number, parts), density, modulus, poisson),
+        )
 
 
 def _kind(name: str, number: str, parts: Parts) -> str:

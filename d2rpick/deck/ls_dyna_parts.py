@@ -19,14 +19,22 @@ if TYPE_CHECKING:
     from d2rpick.deck.reader import Deck
 
 
-_EXTRA_LINES: Final = {"CONTACT": 1, "REPOSITION": 1, "PRINT": 1, "FIELD": 1, "INERTIA": 3}
+_EXTRA_LINES: Final = {
+    "CONTACT": 1,
+    "REPOSITION": 1,
+    "PRINT": 1,
+    "FIELD": 1,
+    "INERTIA": 3,
+}
 _FOLLOWED: Final = {*_EXTRA_LINES, "AVERAGED", "TITLE"}  # the last two add no line
 _NO_DEFINITION: Final = {"MOVE", "MODES", "SENSOR", "STACKED", "ADAPTIVE", "ANNEAL"}
 _ROTATED = 1  # IRCS of *PART_INERTIA: one more line follows
 _SET_OPTIONS: Final = {"LIST", "TITLE", "COLLECT", "GENERATE", "COLUMN", "ADD"}
 _NODE_SET_OPTIONS: Final = {"LIST", "TITLE", "GENERATE", "COLUMN"}
 _PER_LINE = 8
-_NODE_SETS: WeakKeyDictionary[Deck, Mapping[int, frozenset[int]]] = WeakKeyDictionary()  # what was found
+_NODE_SETS: WeakKeyDictionary[Deck, Mapping[int, frozenset[int]]] = (
+    WeakKeyDictionary()
+)  # what was found
 # Solid formulations that keep their stresses in global axes, by ELFORM; 0 and 9 co-rotate.
 NOT_TURNED: Final = {
     -2: "8 points, selectively reduced, for poor aspect ratios",
@@ -41,10 +49,27 @@ NOT_TURNED: Final = {
     16: "tetrahedron with 10 nodes",
     17: "tetrahedron with 10 nodes",
 }
-_LINES: Final = {"SOLID": 1, "DISCRETE": 2, "SHELL": 2, "BEAM": 2, "TSHELL": 2}  # of one section
+_LINES: Final = {
+    "SOLID": 1,
+    "DISCRETE": 2,
+    "SHELL": 2,
+    "BEAM": 2,
+    "TSHELL": 2,
+}  # of one section
 _SEARCHED: Final = ("ELEMENT_SHELL", "ELEMENT_SOLID", "ELEMENT_TSHELL", "ELEMENT_BEAM")
 _ELEMENT_OPTIONS: Final = {  # their lines hold reals or words, or a single integer
-    *("THICKNESS", "BETA", "MCID", "OFFSET", "ORTHO", "ORIENTATION", "COMPOSITE", "LONG", "SCALAR", "SECTION"),
+    *(
+        "THICKNESS",
+        "BETA",
+        "MCID",
+        "OFFSET",
+        "ORTHO",
+        "ORIENTATION",
+        "COMPOSITE",
+        "LONG",
+        "SCALAR",
+        "SECTION",
+    ),
     "ELFORM",
 }
 
@@ -63,7 +88,10 @@ class PartSet(NamedTuple):
     def joined(self, other: PartSet) -> PartSet:
         """Return both together (``_COLLECT``)."""
         return PartSet(
-            self.parts + other.parts, self.ranges + other.ranges, self.sets + other.sets, self.problems + other.problems
+            self.parts + other.parts,
+            self.ranges + other.ranges,
+            self.sets + other.sets,
+            self.problems + other.problems,
         )
 
 
@@ -93,21 +121,37 @@ class Parts:
         found: set[int] = set()
         for current in self.reached(set_id):
             content = self.sets.get(current)
-            if content is None or content.problems or (content.ranges and not self.materials):
+            if (
+                content is None
+                or content.problems
+                or (content.ranges and not self.materials)
+            ):
                 return None
             found.update(content.parts)
-            found.update(part for low, high in content.ranges for part in self.materials if low <= part <= high)
+            found.update(
+                part
+                for low, high in content.ranges
+                for part in self.materials
+                if low <= part <= high
+            )
         return tuple(sorted(found))
 
     def reached(self, set_id: int) -> list[int]:
         """Return the set itself and all sets it adds up, directly or not, whether the deck has them or not."""
-        return reached([set_id], lambda one: content.sets if (content := self.sets.get(one)) else ())
+        return reached(
+            [set_id],
+            lambda one: content.sets if (content := self.sets.get(one)) else (),
+        )
 
 
 def read_parts(deck: Deck) -> Parts:
     """Collect the parts, part sets and rigid materials of a deck."""
-    parts = Parts(problems=list(deck.problems), all_known=not deck.unread and not deck.encrypted)
-    parts.rigid_materials.update(material_of(card, card.data[0], 0) for card in rigid_materials(deck))
+    parts = Parts(
+        problems=list(deck.problems), all_known=not deck.unread and not deck.encrypted
+    )
+    parts.rigid_materials.update(
+        material_of(card, card.data[0], 0) for card in rigid_materials(deck)
+    )
     for card in deck.named("PART"):
         _take_parts(card, parts)
     for card in deck.named("SET_PART"):
@@ -119,13 +163,21 @@ def read_parts(deck: Deck) -> Parts:
 def rigid_materials(deck: Deck) -> Iterator[Card]:
     """Cards of rigid materials."""
     cards = deck.named("MAT_RIGID", "MAT_020", "MAT_20")
-    return (card for card in cards if card.data and card.name.split("_")[2:3] != ["DISCRETE"])
+    return (
+        card
+        for card in cards
+        if card.data and card.name.split("_")[2:3] != ["DISCRETE"]
+    )
 
 
 def material_of(card: Card, row: Row, position: int) -> str:
     """Id of a material with its offset, or its name where the deck uses names."""
     value = card.integer(row, position)
-    return value.field.text.upper() if value.problem else str(value.value + card.transform.material)
+    return (
+        value.field.text.upper()
+        if value.problem
+        else str(value.value + card.transform.material)
+    )
 
 
 def _take_parts(card: Card, parts: Parts) -> None:
@@ -133,8 +185,12 @@ def _take_parts(card: Card, parts: Parts) -> None:
     if options & _NO_DEFINITION:
         return
     if "ATTACHMENT" in options:
-        options = (options - {"ATTACHMENT", "NODES"}) | {"PRINT"}  # one line more, like _PRINT
-    if "COMPOSITE" in options:  # one part, and a material for every ply: none of them makes it rigid
+        options = (options - {"ATTACHMENT", "NODES"}) | {
+            "PRINT"
+        }  # one line more, like _PRINT
+    if (
+        "COMPOSITE" in options
+    ):  # one part, and a material for every ply: none of them makes it rigid
         if len(card.rows) > 1:
             _add(card, card.rows[:2], "", parts)
         return
@@ -146,7 +202,11 @@ def _take_parts(card: Card, parts: Parts) -> None:
     while at + 1 < len(rows):  # a title, the ids, and what the options add
         _add(card, rows[at : at + 2], material_of(card, rows[at + 1], 2), parts)
         at += 2
-        turned = "INERTIA" in options and at < len(rows) and card.integer(rows[at], 4).value == _ROTATED
+        turned = (
+            "INERTIA" in options
+            and at < len(rows)
+            and card.integer(rows[at], 4).value == _ROTATED
+        )
         at += added + turned
 
 
@@ -179,40 +239,64 @@ def _take_set(card: Card, parts: Parts) -> None:
         return
     content = _content(card, options, values)
     known = parts.sets.get(set_id)
-    parts.sets[set_id] = known.joined(content) if known and "COLLECT" in options else content
+    parts.sets[set_id] = (
+        known.joined(content) if known and "COLLECT" in options else content
+    )
 
 
-def _content(card: Card, options: Collection[str], values: Sequence[Value[int]]) -> PartSet:
+def _content(
+    card: Card, options: Collection[str], values: Sequence[Value[int]]
+) -> PartSet:
     offset = card.transform.set_ if "ADD" in options else card.transform.part
     told = "{!r} in a part set is not followed, a positive id was expected"
     wrong = (one for one in values if one.problem or one.value < 0)
-    problems = tuple((one.field, one.problem or told.format(one.field.text)) for one in wrong)
+    problems = tuple(
+        (one.field, one.problem or told.format(one.field.text)) for one in wrong
+    )
     ids = tuple(value.value + offset for value in values if value.value > 0)
     if "GENERATE" in options:
-        return PartSet(ranges=tuple(zip(ids[::2], ids[1::2], strict=False)), problems=problems)
-    return PartSet(sets=ids, problems=problems) if "ADD" in options else PartSet(parts=ids, problems=problems)
+        return PartSet(
+            ranges=tuple(zip(ids[::2], ids[1::2], strict=False)), problems=problems
+        )
+    return (
+        PartSet(sets=ids, problems=problems)
+        if "ADD" in options
+        else PartSet(parts=ids, problems=problems)
+    )
 
 
 def nodes_of_set(deck: Deck, card: Card, number: int) -> frozenset[int] | None:
     """Members of the node set with this number on a card; None of one that the deck has not, or is not followed."""
     if deck not in _NODE_SETS:
-        _NODE_SETS[deck] = {id_: ids for one in deck.named("SET_NODE") for id_, ids in _node_set(one)}
+        _NODE_SETS[deck] = {
+            id_: ids for one in deck.named("SET_NODE") for id_, ids in _node_set(one)
+        }
     return _NODE_SETS[deck].get(number + card.transform.set_)
 
 
 def _node_set(card: Card) -> Iterator[tuple[int, frozenset[int]]]:
     options = card.options("SET_NODE")
     if card.data and options <= _NODE_SET_OPTIONS:
-        ids = [value.value + card.transform.node for value in _listed(card, options) if value.value > 0]
+        ids = [
+            value.value + card.transform.node
+            for value in _listed(card, options)
+            if value.value > 0
+        ]
         if "GENERATE" in options:
-            ids = [one for low, high in zip(ids[::2], ids[1::2], strict=False) for one in range(low, high + 1)]
+            ids = [
+                one
+                for low, high in zip(ids[::2], ids[1::2], strict=False)
+                for one in range(low, high + 1)
+            ]
         yield card.integer(card.data[0], 0).value + card.transform.set_, frozenset(ids)
 
 
 def _listed(card: Card, options: Collection[str]) -> list[Value[int]]:
     """Ids below the first line of a set."""
     places = range(1 if "COLUMN" in options else _PER_LINE)
-    return [card.integer(row, at) for row in card.data[1:] for at in places if row.cell(at)]
+    return [
+        card.integer(row, at) for row in card.data[1:] for at in places if row.cell(at)
+    ]
 
 
 class SectionCard(NamedTuple):
@@ -231,7 +315,11 @@ class SectionCard(NamedTuple):
 
 def read_sections(deck: Deck) -> dict[int, SectionCard]:
     """Collect the sections by id."""
-    return {number: section for card in deck.named("SECTION") for number, section in _sections(card)}
+    return {
+        number: section
+        for card in deck.named("SECTION")
+        for number, section in _sections(card)
+    }
 
 
 def _sections(card: Card) -> Iterator[tuple[int, SectionCard]]:
@@ -242,23 +330,34 @@ def _sections(card: Card) -> Iterator[tuple[int, SectionCard]]:
     if per_section is None or options - {"TITLE"}:
         rows, per_section, titled = rows[int(titled) :][:2], 2, False
     for at in range(titled, len(rows), per_section + titled):
-        number, elform = card.integer(rows[at], 0), card.integer(rows[at], 1, 1 if kind == "SOLID" else 2)
+        number, elform = (
+            card.integer(rows[at], 0),
+            card.integer(rows[at], 1, 1 if kind == "SOLID" else 2),
+        )
         layers = card.integer(rows[at], 3, 2) if kind == "SHELL" else None
         through = (layers.value or 2) if layers and not layers.problem else None
         second = rows[at + 1] if per_section > 1 and at + 1 < len(rows) else None
         first = card.positive(second, 0) if second else None
         if not number.problem:
-            section = SectionCard(kind, 0 if elform.problem else elform.value, first, through)
+            section = SectionCard(
+                kind, 0 if elform.problem else elform.value, first, through
+            )
             yield number.value + card.transform.rest, section
 
 
 def element_cards(deck: Deck, *, searched: bool) -> list[Card]:
     """Cards of elements that are searched for nodes that parts share, or those whose lines are not followed."""
     cards = deck.named(*_SEARCHED)
-    return [card for card in cards if searched == (set(card.name.split("_")[2:]) <= _ELEMENT_OPTIONS)]
+    return [
+        card
+        for card in cards
+        if searched == (set(card.name.split("_")[2:]) <= _ELEMENT_OPTIONS)
+    ]
 
 
-Kind = Literal["nodal rigid body", "extra nodes", "joint", "spotweld", "rivet", "generalized weld"]
+Kind = Literal[
+    "nodal rigid body", "extra nodes", "joint", "spotweld", "rivet", "generalized weld"
+]
 _BODY: Final = "CONSTRAINED_NODAL_RIGID_BODY"
 _JOINT_NODES = 6
 
@@ -296,16 +395,28 @@ def _extra_nodes(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
         part, other = card.integer(row, 0), card.integer(row, 1)
         if row.blank or part.problem or other.problem:
             continue
-        single = None if card.name.endswith("_SET") else frozenset({other.value + card.transform.node})
+        single = (
+            None
+            if card.name.endswith("_SET")
+            else frozenset({other.value + card.transform.node})
+        )
         nodes = single or nodes_of_set(deck, card, other.value) or frozenset()
         yield Constraint(kind, part.field, 0, nodes, part.value + card.transform.part)
 
 
 def _joints(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
-    if card.name.startswith(("CONSTRAINED_JOINT_STIFFNESS", "CONSTRAINED_JOINT_COOR", "CONSTRAINED_JOINT_USER_FORCE")):
+    if card.name.startswith(
+        (
+            "CONSTRAINED_JOINT_STIFFNESS",
+            "CONSTRAINED_JOINT_COOR",
+            "CONSTRAINED_JOINT_USER_FORCE",
+        )
+    ):
         return
     for row in _first(card):
-        number = card.integer(card.lines[0], 0).value if card.name.endswith("_ID") else 0
+        number = (
+            card.integer(card.lines[0], 0).value if card.name.endswith("_ID") else 0
+        )
         yield _of_nodes(card, row, kind, _JOINT_NODES, number)
 
 
@@ -318,7 +429,12 @@ def _of_two_nodes(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
 def _generalized_welds(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
     for row in _first(card):
         members = card.integer(row, 0)
-        yield Constraint(kind, members.field, 0, nodes_of_set(deck, card, members.value) or frozenset())
+        yield Constraint(
+            kind,
+            members.field,
+            0,
+            nodes_of_set(deck, card, members.value) or frozenset(),
+        )
 
 
 def _first(card: Card) -> tuple[Row, ...]:
@@ -326,15 +442,21 @@ def _first(card: Card) -> tuple[Row, ...]:
     return card.lines[1:2] if card.name.endswith("_ID") else card.lines[:1]
 
 
-def _of_nodes(card: Card, row: Row, kind: Kind, most: int, number: int = 0) -> Constraint:
+def _of_nodes(
+    card: Card, row: Row, kind: Kind, most: int, number: int = 0
+) -> Constraint:
     """Read a constraint whose line lists its nodes."""
     nodes = [card.integer(row, at) for at in range(most)]
-    ids = frozenset(node.value + card.transform.node for node in nodes if node.value > 0)
+    ids = frozenset(
+        node.value + card.transform.node for node in nodes if node.value > 0
+    )
     return Constraint(kind, nodes[0].field, number, ids)
 
 
 # By what they are: their keyword, and the function that reads a card.
-_CONSTRAINTS: Final[Mapping[Kind, tuple[str, Callable[[Deck, Card, Kind], Iterator[Constraint]]]]] = {
+_CONSTRAINTS: Final[
+    Mapping[Kind, tuple[str, Callable[[Deck, Card, Kind], Iterator[Constraint]]]]
+] = {
     "nodal rigid body": (_BODY, _nodal_rigid_bodies),
     "extra nodes": ("CONSTRAINED_EXTRA_NODES", _extra_nodes),
     "joint": ("CONSTRAINED_JOINT", _joints),
@@ -344,8 +466,19 @@ _CONSTRAINTS: Final[Mapping[Kind, tuple[str, Callable[[Deck, Card, Kind], Iterat
 }
 
 
-_NO_CONTACTS: Final = {"ADD", "AUTO", "COUPLING", "EXCLUDE", "GEBOD", "GUIDED"}  # first words of their names
-_ABLE: Final = ("SURFACE_TO_SURFACE", "NODES_TO_SURFACE", "NODE_TO_SURFACE")  # in the names of contacts that trigger
+_NO_CONTACTS: Final = {
+    "ADD",
+    "AUTO",
+    "COUPLING",
+    "EXCLUDE",
+    "GEBOD",
+    "GUIDED",
+}  # first words of their names
+_ABLE: Final = (
+    "SURFACE_TO_SURFACE",
+    "NODES_TO_SURFACE",
+    "NODE_TO_SURFACE",
+)  # in the names of contacts that trigger
 _MOST_ROWS = 8  # of one definition without an id; more rows may hold another one
 
 
@@ -372,7 +505,9 @@ class Entities(NamedTuple):
     def named(self, number: int) -> Entity | None:
         """Find by id, else by the order of definition, which counts for those without an id."""
         by_id = next((one for one in self.found if one.id == number), None)
-        return by_id or next((one for one in self.found if one.number == number and not one.id), None)
+        return by_id or next(
+            (one for one in self.found if one.number == number and not one.id), None
+        )
 
 
 def read_entities(deck: Deck, keyword: Literal["CONTACT", "RIGIDWALL"]) -> Entities:
@@ -384,7 +519,14 @@ def read_entities(deck: Deck, keyword: Literal["CONTACT", "RIGIDWALL"]) -> Entit
         if words[1:2] and words[1] in _NO_CONTACTS:
             continue
         if {"ID", "TITLE"} & {*words} and card.rows:
-            number, title = card.integer(card.rows[0], 0).value, card.rows[0].text[card.width :].strip()
-        all_known = all_known and not card.transform.rest and (number > 0 or len(card.rows) <= _MOST_ROWS)
+            number, title = (
+                card.integer(card.rows[0], 0).value,
+                card.rows[0].text[card.width :].strip(),
+            )
+        all_known = (
+            all_known
+            and not card.transform.rest
+            and (number > 0 or len(card.rows) <= _MOST_ROWS)
+        )
         found.append(Entity(card.name, number, title, len(found) + 1))
     return Entities(tuple(found), all_known)

@@ -33,7 +33,9 @@ if TYPE_CHECKING:
 _WIDEST: Final = 240  # columns that any line of a mesh uses
 _BLANK, _ZERO = (np.uint8(ord(letter)) for letter in " 0")
 _ONE_BY_ONE: Final = (b",", b"&", b"<", b"\t")  # in lines that do not stand in columns
-_ID_ENDS: Final = 7  # last column of most ids: a line that has something there is not blank
+_ID_ENDS: Final = (
+    7  # last column of most ids: a line that has something there is not blank
+)
 _HIGHEST: Final = 10**17  # no id comes near: a longer number would overflow
 NO_NODE: Final = -1  # in place of a node that there is not
 _DENSE: Final = 50_000_000  # up to this id a table of all ids is small enough
@@ -78,33 +80,51 @@ class Lines:
         else:
             found = np.stack([*map(_integers, columns)], axis=1)
         for row, texts in self._texts.items():
-            found[row] = [_id(self._value(text)) for text in self._pieces(texts, fields)]
+            found[row] = [
+                _id(self._value(text)) for text in self._pieces(texts, fields)
+            ]
         return found
 
     def reals(self, fields: Layout, wanted: slice) -> Reals:
         """Give the numbers in ``wanted`` of the fields, shape (lines, wanted): 0 for a blank, NaN for what is none."""
-        found = np.stack([_reals(self._field(*place)) for place in fields[wanted]], axis=1)
+        found = np.stack(
+            [_reals(self._field(*place)) for place in fields[wanted]], axis=1
+        )
         for row, texts in self._texts.items():
-            found[row] = [self._value(text) for text in self._pieces(texts, fields)[wanted]]
+            found[row] = [
+                self._value(text) for text in self._pieces(texts, fields)[wanted]
+            ]
         return found
 
     def _field(self, start: int, width: int) -> NDArray[np.uint8]:
         found = self.cells[:, start : start + width]
         missing = width - found.shape[1]
-        return np.pad(found, ((0, 0), (0, missing)), constant_values=_BLANK) if missing else found
+        return (
+            np.pad(found, ((0, 0), (0, missing)), constant_values=_BLANK)
+            if missing
+            else found
+        )
 
     @cached_property
     def _texts(self) -> dict[int, str]:
         """Lines that do not stand in columns, or refer to parameters."""
         if self.in_columns:
             return {}
-        special = np.isin(self.cells, [ord(letter) for letter in _ONE_BY_ONE]).any(axis=1)
-        return {row: self.cells[row].tobytes().decode("latin-1") for row in np.flatnonzero(special).tolist()}
+        special = np.isin(self.cells, [ord(letter) for letter in _ONE_BY_ONE]).any(
+            axis=1
+        )
+        return {
+            row: self.cells[row].tobytes().decode("latin-1")
+            for row in np.flatnonzero(special).tolist()
+        }
 
     def _pieces(self, text: str, fields: Layout) -> list[str]:
         if "," in text:
             cells = text.split(",")
-            return [cells[place] if place < len(cells) else "" for place in range(len(fields))]
+            return [
+                cells[place] if place < len(cells) else ""
+                for place in range(len(fields))
+            ]
         return [text.expandtabs(8)[start : start + width] for start, width in fields]
 
     def _value(self, text: str) -> float:
@@ -177,7 +197,11 @@ def _id(value: float) -> int:
 def distinct(values: Places) -> Places:
     """Give the distinct values, ascending; by sorting, which is quicker here than by a table of hashes."""
     ordered = np.sort(values, axis=None)
-    return ordered[np.append(True, ordered[1:] != ordered[:-1])] if ordered.size else ordered
+    return (
+        ordered[np.append(True, ordered[1:] != ordered[:-1])]
+        if ordered.size
+        else ordered
+    )
 
 
 def _used(wanted: Sequence[Places]) -> Places:
@@ -256,19 +280,36 @@ class Mesh(NamedTuple):
     lost: int
 
     @classmethod
-    def of(cls, blocks: Sequence[tuple[str, Places, Places]], ids: Places, coordinates: Reals) -> Mesh:
+    def of(
+        cls,
+        blocks: Sequence[tuple[str, Places, Places]],
+        ids: Places,
+        coordinates: Reals,
+    ) -> Mesh:
         """Put together blocks of elements (kind, parts, node ids) and all nodes with coordinates."""
         blocks = [one for one in blocks if len(one[1])]
         kinds = sorted({(kind, nodes.shape[1]) for kind, _, nodes in blocks})
-        alike = [[one for one in blocks if (one[0], one[2].shape[1]) == kind] for kind in kinds]
+        alike = [
+            [one for one in blocks if (one[0], one[2].shape[1]) == kind]
+            for kind in kinds
+        ]
         nodes = [np.concatenate([own for _, _, own in those]) for those in alike]
         table = NodeTable(ids, nodes)
         elements = tuple(
-            Elements(those[0][0], np.concatenate([part for _, part, _ in those]), table.places(own))
+            Elements(
+                those[0][0],
+                np.concatenate([part for _, part, _ in those]),
+                table.places(own),
+            )
             for those, own in zip(alike, nodes, strict=True)
         )
         lost = table.ids.size - ids.size
-        return cls(elements, table, np.concatenate([coordinates, np.full((lost, 3), np.nan)]), lost)
+        return cls(
+            elements,
+            table,
+            np.concatenate([coordinates, np.full((lost, 3), np.nan)]),
+            lost,
+        )
 
     @property
     def kinds(self) -> Mapping[int, set[str]]:
@@ -309,17 +350,23 @@ KINDS: Final = {
 NOT_COUNTED: Final = {"SPHCEL", "XELEM"}
 
 
-def elements_of(card: Card, *, damaged: bool = False) -> Iterator[tuple[str, Integers, Integers]]:
+def elements_of(
+    card: Card, *, damaged: bool = False
+) -> Iterator[tuple[str, Integers, Integers]]:
     """Kind, parts and node ids of the elements of a card, ``damaged`` ones too, with 0 for what is no node."""
     kind = KINDS[card.words[0]]
     fields: Layout = layout(*[_WIDTH] * max(kind.lines))
-    found = [lines.integers(fields) for lines in lines_of(card, _COMMENTS) if len(lines)]
+    found = [
+        lines.integers(fields) for lines in lines_of(card, _COMMENTS) if len(lines)
+    ]
     if not found:
         return
     values = np.concatenate(found)
     per = len(kind.lines)
     values = values[: len(values) // per * per].reshape(-1, per, values.shape[1])
-    flat = np.concatenate([values[:, line, :count] for line, count in enumerate(kind.lines)], axis=1)
+    flat = np.concatenate(
+        [values[:, line, :count] for line, count in enumerate(kind.lines)], axis=1
+    )
     good = (flat[:, : 1 + min(kind.nodes, 3)] > 0).all(axis=1) | damaged
     nodes = np.maximum(flat[good, 1 : 1 + kind.nodes], 0)
     yield kind.name, np.full(len(nodes), number_of(card), np.int64), nodes
@@ -330,15 +377,24 @@ def parts_with_elements(starter: Starter) -> set[int]:
     return {part for part, _ in _elements(starter)}
 
 
-def parts_within(starter: Starter, groups: Mapping[int, Collection[int]]) -> dict[int, set[int]]:
+def parts_within(
+    starter: Starter, groups: Mapping[int, Collection[int]]
+) -> dict[int, set[int]]:
     """Parts all of whose nodes are some of these, by the keys of ``groups``."""
     known = {key: np.array([0, *group]) for key, group in groups.items()}
     inside: dict[tuple[int, int], bool] = {}
     for part, nodes in _elements(starter):
         real = bool((nodes > 0).any(axis=1).all())
         for key, own in known.items():
-            inside[key, part] = inside.get((key, part), True) and real and bool(np.isin(nodes, own).all())
-    return {key: {part for (one, part), whole in inside.items() if whole and one == key} for key in groups}
+            inside[key, part] = (
+                inside.get((key, part), True)
+                and real
+                and bool(np.isin(nodes, own).all())
+            )
+    return {
+        key: {part for (one, part), whole in inside.items() if whole and one == key}
+        for key in groups
+    }
 
 
 def _elements(starter: Starter) -> Iterator[tuple[int, Integers]]:
@@ -346,7 +402,10 @@ def _elements(starter: Starter) -> Iterator[tuple[int, Integers]]:
     for card in starter.named(*KINDS, *NOT_COUNTED):
         kind = KINDS.get(card.words[0])
         if kind and len(kind.lines) == 1 and card.words[1:]:
-            yield from ((number_of(card), nodes) for _, _, nodes in elements_of(card, damaged=True))
+            yield from (
+                (number_of(card), nodes)
+                for _, _, nodes in elements_of(card, damaged=True)
+            )
         elif card.words[1:]:
             yield number_of(card), np.zeros((1, 1), np.int64)
 

@@ -31,7 +31,9 @@ if TYPE_CHECKING:
 
 _LAYERS: Final = 3  # points through the thickness where the deck does not tell: most shells have 2 to 5
 SPRING: Final = "spring"
-DISCRETE: Final = frozenset({SPRING, "seatbelt"})  # kinds of elements that are not switched by part
+DISCRETE: Final = frozenset(
+    {SPRING, "seatbelt"}
+)  # kinds of elements that are not switched by part
 
 
 class Hold(NamedTuple):
@@ -90,16 +92,26 @@ class Boundary(NamedTuple):
     notes: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, holds: Sequence[Hold | str], pulls: Sequence[Gravity | str], *, whole: bool) -> Boundary:
+    def of(
+        cls, holds: Sequence[Hold | str], pulls: Sequence[Gravity | str], *, whole: bool
+    ) -> Boundary:
         """Sort what was found from what is not followed; without the ``whole`` of a deck gravity is not known."""
         gravity = tuple(one for one in pulls if isinstance(one, Gravity))
         known = whole and len(gravity) == len(pulls)
         notes = tuple(one for one in (*holds, *pulls) if isinstance(one, str))
-        return cls(tuple(one for one in holds if isinstance(one, Hold)), gravity if known else None, notes)
+        return cls(
+            tuple(one for one in holds if isinstance(one, Hold)),
+            gravity if known else None,
+            notes,
+        )
 
     def placed(self, table: NodeTable) -> Boundary:
         """Give it with the places of its nodes in a table of ids."""
-        return Boundary(placed(self.holds, table), self.gravity and placed(self.gravity, table), self.notes)
+        return Boundary(
+            placed(self.holds, table),
+            self.gravity and placed(self.gravity, table),
+            self.notes,
+        )
 
 
 NO_BOUNDARY: Final = Boundary()
@@ -110,7 +122,10 @@ Acting = TypeVar("Acting", Hold, Gravity, Joint)
 
 def placed(acting: Iterable[Acting], table: NodeTable) -> tuple[Acting, ...]:
     """Put places of nodes for their ids; nodes that are not in the table are left out."""
-    return tuple(one if one.nodes is None else one._replace(nodes=table.known(one.nodes)) for one in acting)
+    return tuple(
+        one if one.nodes is None else one._replace(nodes=table.known(one.nodes))
+        for one in acting
+    )
 
 
 def ids(numbers: Iterable[int]) -> Places:
@@ -126,7 +141,9 @@ def plateaus(ordinates: Sequence[float], scale: float) -> tuple[float, ...]:
     >>> plateaus([0.0, 0.0, 1.0, 1.0], 9.81)
     (0.0, 9.81)
     """
-    return tuple(sorted({scale * one for one, other in pairwise(ordinates) if one == other}))
+    return tuple(
+        sorted({scale * one for one, other in pairwise(ordinates) if one == other})
+    )
 
 
 class Formulation(NamedTuple):
@@ -236,7 +253,11 @@ class Inventory:
     def further_points(self, part: int, kind: str) -> int:
         """Integration points of an element of a part beside those of one layer; of shells alone."""
         data = self.parts.get(part)
-        layers = _LAYERS if data is None or data.section.layers is None else data.section.layers
+        layers = (
+            _LAYERS
+            if data is None or data.section.layers is None
+            else data.section.layers
+        )
         return self.formulation(part, kind).in_plane * max(layers - 1, 0)
 
     @cached_property
@@ -246,9 +267,13 @@ class Inventory:
         for elements in self.elements:
             order = np.argsort(elements.part, kind="stable")
             parts, starts = np.unique(elements.part[order], return_index=True)
-            for part, rows in zip(parts.tolist(), np.split(order, starts[1:]), strict=True):
+            for part, rows in zip(
+                parts.tolist(), np.split(order, starts[1:]), strict=True
+            ):
                 found.setdefault(part, []).append(distinct(elements.nodes[rows]))
-        joined = {part: distinct(np.concatenate(pieces)) for part, pieces in found.items()}
+        joined = {
+            part: distinct(np.concatenate(pieces)) for part, pieces in found.items()
+        }
         return {part: nodes[nodes != NO_NODE] for part, nodes in joined.items()}
 
     @cached_property
@@ -270,16 +295,28 @@ class Inventory:
     @cached_property
     def joined(self) -> Mapping[int, Mapping[int, frozenset[str]]]:
         """By part the others that welds, ties or rigid bodies join to it, and what these are."""
-        holds = (one for one, whole in zip(self.switched, self.ready, strict=True) if not whole)
+        holds = (
+            one
+            for one, whole in zip(self.switched, self.ready, strict=True)
+            if not whole
+        )
         return self._held_by([*self.joints, *holds])
 
     @cached_property
     def sprung(self) -> Mapping[int, Mapping[int, frozenset[str]]]:
         """By part the others that springs hold to it, which then move against it."""
         ends = (elements.nodes for elements in self.elements if elements.kind == SPRING)
-        return self._held_by([Joint(SPRING, nodes[nodes != NO_NODE], frozenset()) for of in ends for nodes in of])
+        return self._held_by(
+            [
+                Joint(SPRING, nodes[nodes != NO_NODE], frozenset())
+                for of in ends
+                for nodes in of
+            ]
+        )
 
-    def _held_by(self, joints: Sequence[Joint]) -> Mapping[int, Mapping[int, frozenset[str]]]:
+    def _held_by(
+        self, joints: Sequence[Joint]
+    ) -> Mapping[int, Mapping[int, frozenset[str]]]:
         wanted = np.zeros(len(self.coordinates), bool)
         for _, nodes, _ in joints:
             wanted[nodes] = True
@@ -292,7 +329,13 @@ class Inventory:
             together = parts.union(*(owners.get(node, ()) for node in nodes.tolist()))
             for part in together:
                 own = found.setdefault(part, {})
-                own.update({other: own.get(other, frozenset()) | {kind} for other in together if other != part})
+                own.update(
+                    {
+                        other: own.get(other, frozenset()) | {kind}
+                        for other in together
+                        if other != part
+                    }
+                )
         return found
 
     @cached_property
@@ -319,11 +362,18 @@ class Inventory:
 
         def linked(part: int) -> Iterable[int]:
             own = of.get(part, frozenset[int]())
-            springs = (other for other in self.sprung.get(part, ()) if other in own or not (own and other in of))
+            springs = (
+                other
+                for other in self.sprung.get(part, ())
+                if other in own or not (own and other in of)
+            )
             return {*self._linked(part), *springs, *own}
 
         springs = set(parts) - rigid
-        return tuple(tuple(sorted([*body, *self._within(body, springs)])) for body in _together(rigid, linked))
+        return tuple(
+            tuple(sorted([*body, *self._within(body, springs)]))
+            for body in _together(rigid, linked)
+        )
 
     def _within(self, body: Collection[int], springs: Collection[int]) -> list[int]:
         """Those of some parts of springs whose nodes are all nodes of a body."""
@@ -363,7 +413,9 @@ class Inventory:
         inside = np.append(self._mask(parts), True)  # the last stands for NO_NODE
         found: dict[int, Counter[str]] = {}
         for elements in self.elements:
-            _count(elements.kind, elements.part[inside[elements.nodes].all(axis=1)], found)
+            _count(
+                elements.kind, elements.part[inside[elements.nodes].all(axis=1)], found
+            )
         return found
 
     def _mask(self, parts: Iterable[int]) -> NDArray[np.bool_]:
@@ -375,11 +427,15 @@ class Inventory:
 
 def _count(kind: str, parts: Places, counts: dict[int, Counter[str]]) -> None:
     """Add elements of a kind to the counts of their parts."""
-    for part, count in zip(*(one.tolist() for one in np.unique(parts, return_counts=True)), strict=True):
+    for part, count in zip(
+        *(one.tolist() for one in np.unique(parts, return_counts=True)), strict=True
+    ):
         counts.setdefault(part, Counter())[kind] += count
 
 
-def _together(parts: Collection[int], linked: Callable[[int], Iterable[int]]) -> tuple[tuple[int, ...], ...]:
+def _together(
+    parts: Collection[int], linked: Callable[[int], Iterable[int]]
+) -> tuple[tuple[int, ...], ...]:
     """Groups of parts that are linked to each other, directly or not."""
     left, found = set(parts), []
     while left:

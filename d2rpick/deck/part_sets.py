@@ -14,9 +14,13 @@ _MOST_LISTED: Final = 10  # parts one by one
 _PER_LINE: Final = 8
 
 
-def number_sets(groups: Iterable[Sequence[int]], first: int) -> dict[tuple[int, ...], int]:
+def number_sets(
+    groups: Iterable[Sequence[int]], first: int
+) -> dict[tuple[int, ...], int]:
     """Number a set for each of the groups of parts that are too many to be listed."""
-    many = dict.fromkeys(tuple(sorted(group)) for group in groups if len(group) > _MOST_LISTED)
+    many = dict.fromkeys(
+        tuple(sorted(group)) for group in groups if len(group) > _MOST_LISTED
+    )
     return {group: first + place for place, group in enumerate(many)}
 
 

@@ -28,10 +28,14 @@ if TYPE_CHECKING:
     Mask = NDArray[np.bool_]
 
 # What was found: a mesh may have millions of nodes.
-_LABELS: WeakKeyDictionary[Inventory, dict[tuple[frozenset[int], bool], Places]] = WeakKeyDictionary()
+_LABELS: WeakKeyDictionary[Inventory, dict[tuple[frozenset[int], bool], Places]] = (
+    WeakKeyDictionary()
+)
 
 
-def pieces_of(inventory: Inventory, parts: Collection[int], among: Collection[int] | None = None) -> int:
+def pieces_of(
+    inventory: Inventory, parts: Collection[int], among: Collection[int] | None = None
+) -> int:
     """Number of pieces of some parts that nothing joins; none without elements.
 
     ``among`` are the parts through which they may hang together, by default the same; joints and springs count in any
@@ -42,7 +46,9 @@ def pieces_of(inventory: Inventory, parts: Collection[int], among: Collection[in
     return np.unique(labels[np.concatenate(nodes)]).size
 
 
-def labels_of(inventory: Inventory, parts: frozenset[int], *, springs: bool = True) -> Places:
+def labels_of(
+    inventory: Inventory, parts: frozenset[int], *, springs: bool = True
+) -> Places:
     """Number of the piece of each node of the deck (nodes,): what parts, springs and joints make hang together."""
     known = _LABELS.setdefault(inventory, {})
     if (parts, springs) not in known:
@@ -63,27 +69,46 @@ def _labels(inventory: Inventory, parts: frozenset[int], *, springs: bool) -> Pl
     links = np.concatenate([np.empty((2, 0), np.int64), *ends], axis=1)
     # older versions of scipy take no wider numbers
     links = links[:, (links != NO_NODE).all(axis=0)].astype(np.int32)
-    graph = coo_array((np.ones(links.shape[1], bool), (links[0], links[1])), shape=(size, size))
+    graph = coo_array(
+        (np.ones(links.shape[1], bool), (links[0], links[1])), shape=(size, size)
+    )
     return np.asarray(connected_components(graph, directed=False)[1])
 
 
-def _rows(inventory: Inventory, parts: frozenset[int], *, springs: bool) -> Iterator[Places]:
+def _rows(
+    inventory: Inventory, parts: frozenset[int], *, springs: bool
+) -> Iterator[Places]:
     """Nodes that hang together, a row each."""
     wanted, own = np.array([*parts], np.int64), inventory.nodes_by_part
     for elements in inventory.elements:
         of_springs = np.full(len(elements.part), springs)
-        yield elements.nodes[of_springs if elements.kind == SPRING else np.isin(elements.part, wanted)]
+        yield elements.nodes[
+            of_springs if elements.kind == SPRING else np.isin(elements.part, wanted)
+        ]
     for _, nodes, named in inventory.joints:
-        yield np.concatenate([nodes, *(own[part] for part in named & own.keys())])[np.newaxis]
+        yield np.concatenate([nodes, *(own[part] for part in named & own.keys())])[
+            np.newaxis
+        ]
 
 
 # Kinds of elements whose nodes do not turn.
-_UNTURNED: Final = {"solid", "tetrahedron", "pentahedron", "quad", "tria", "truss", "thick shell", "particle"}
+_UNTURNED: Final = {
+    "solid",
+    "tetrahedron",
+    "pentahedron",
+    "quad",
+    "tria",
+    "truss",
+    "thick shell",
+    "particle",
+}
 # Nodes lie in one plane within this share of the size of what they belong to.
 _FLAT: Final = 1e-6
 
 
-def supports_of(inventory: Inventory) -> tuple[Mapping[int, tuple[Hold, ...]], tuple[Hold, ...]]:
+def supports_of(
+    inventory: Inventory,
+) -> tuple[Mapping[int, tuple[Hold, ...]], tuple[Hold, ...]]:
     """Give what holds each part that is held, and what holds the model.
 
     What is fixed all over is an obstacle: it is held itself, and holds nothing that it does not hang together with.
@@ -93,7 +118,10 @@ def supports_of(inventory: Inventory) -> tuple[Mapping[int, tuple[Hold, ...]], t
         return {}, ()
     own = inventory.nodes_by_part
     labels = labels_of(inventory, frozenset(own))
-    held = [np.concatenate([one.nodes, *(own[part] for part in one.parts & own.keys())]) for one in holds]
+    held = [
+        np.concatenate([one.nodes, *(own[part] for part in one.parts & own.keys())])
+        for one in holds
+    ]
     fixed = np.zeros((len(labels), 3), bool)
     for one, nodes in zip(holds, held, strict=True):
         if not one.counts and one.start <= 0 and np.isinf(one.end):
@@ -107,18 +135,31 @@ def supports_of(inventory: Inventory) -> tuple[Mapping[int, tuple[Hold, ...]], t
         by_piece[piece] = tuple(
             number
             for number, (one, nodes) in enumerate(zip(holds, held, strict=True))
-            if _counts(one, nodes[labels[nodes] == piece], excused, turning & ~fixed.any(axis=1))
+            if _counts(
+                one,
+                nodes[labels[nodes] == piece],
+                excused,
+                turning & ~fixed.any(axis=1),
+            )
         )
         whole |= set() if fixed[members].all() else set(by_piece[piece])
     by_part = {part: sorted({number for piece in np.unique(labels[nodes]).tolist()
                              for number in by_piece.get(piece, ())}) for part, nodes in own.items()}  # fmt: skip
-    named = {part: tuple(holds[number] for number in numbers) for part, numbers in by_part.items() if numbers}
+    named = {
+        part: tuple(holds[number] for number in numbers)
+        for part, numbers in by_part.items()
+        if numbers
+    }
     return named, tuple(holds[number] for number in sorted(whole))
 
 
-def _pieces(inventory: Inventory, labels: Places, held: Places) -> Iterator[tuple[int, Places]]:
+def _pieces(
+    inventory: Inventory, labels: Places, held: Places
+) -> Iterator[tuple[int, Places]]:
     """Pieces of which some nodes are held, and the nodes of elements in each."""
-    used = np.unique(np.concatenate([np.empty(0, np.int64), *inventory.nodes_by_part.values()]))
+    used = np.unique(
+        np.concatenate([np.empty(0, np.int64), *inventory.nodes_by_part.values()])
+    )
     used = used[np.argsort(labels[used], kind="stable")]
     of = labels[used]
     for piece in np.unique(labels[held]).tolist():
@@ -136,7 +177,9 @@ def _counts(hold: Hold, nodes: Places, excused: frozenset[int], turned: Mask) ->
 
 def _turning(inventory: Inventory) -> Mask:
     """Whether each node has rotations."""
-    found = np.zeros(len(inventory.coordinates) + 1, bool)  # the last stands for NO_NODE
+    found = np.zeros(
+        len(inventory.coordinates) + 1, bool
+    )  # the last stands for NO_NODE
     for elements in inventory.elements:
         if elements.kind not in _UNTURNED:
             found[elements.nodes] = True
@@ -160,7 +203,12 @@ def _symmetries(inventory: Inventory, members: Places, fixed: Mask) -> frozenset
         axis
         for axis in np.flatnonzero(fixed.any(axis=0)).tolist()
         if axis not in pulled
-        and (fixed[:, axis].all() or (not inventory.moved and _is_plane(places[:, axis], fixed[:, axis], room)))
+        and (
+            fixed[:, axis].all()
+            or (
+                not inventory.moved and _is_plane(places[:, axis], fixed[:, axis], room)
+            )
+        )
     )
 
 
@@ -211,7 +259,11 @@ def inner_period(inventory: Inventory) -> InnerPeriod | None:
     None where no springs join them, or the deck does not give every mass and stiffness in a way that is followed:
     springs that are linear along their length (Radioss: /PROP/SPRING without functions).
     """
-    stiff = frozenset(part for part in inventory.nodes_by_part if not set(inventory.counts[part]) <= DISCRETE)
+    stiff = frozenset(
+        part
+        for part in inventory.nodes_by_part
+        if not set(inventory.counts[part]) <= DISCRETE
+    )
     if inventory.moved or not inventory.complete:
         return None
     labels = labels_of(inventory, stiff, springs=False)
@@ -219,13 +271,26 @@ def inner_period(inventory: Inventory) -> InnerPeriod | None:
     springs = list(_springs(inventory, labels, pieces)) if pieces else []
     if not pieces or None in springs:
         return None
-    held = {label: [one for one in springs if one and label in one.joins] for label in pieces}
+    held = {
+        label: [one for one in springs if one and label in one.joins]
+        for label in pieces
+    }
     whole = sum(piece.mass for label, piece in pieces.items() if held[label])
-    heavy = [label for label in pieces if held[label] and pieces[label].mass >= _HEAVY * whole]
-    return max((_period(label, pieces, held[label]) for label in heavy), key=lambda one: one.time, default=None)
+    heavy = [
+        label
+        for label in pieces
+        if held[label] and pieces[label].mass >= _HEAVY * whole
+    ]
+    return max(
+        (_period(label, pieces, held[label]) for label in heavy),
+        key=lambda one: one.time,
+        default=None,
+    )
 
 
-def _masses_of_pieces(inventory: Inventory, parts: Collection[int], labels: Places) -> Mapping[int, _Piece] | None:
+def _masses_of_pieces(
+    inventory: Inventory, parts: Collection[int], labels: Places
+) -> Mapping[int, _Piece] | None:
     """Pieces by their label; None where the mass of a part is not known."""
     masses, made = masses_and_steps(inventory), dict[int, _Piece]()
     sizes: dict[int, dict[int, float]] = {part: {} for part in parts}
@@ -234,7 +299,9 @@ def _masses_of_pieces(inventory: Inventory, parts: Collection[int], labels: Plac
         for part in set(np.unique(elements.part).tolist()) & sizes.keys():
             of = elements.part == part
             found, at = np.unique(labels[elements.nodes[of, 0]], return_inverse=True)
-            for label, size in zip(found.tolist(), np.bincount(at, own[of]).tolist(), strict=True):
+            for label, size in zip(
+                found.tolist(), np.bincount(at, own[of]).tolist(), strict=True
+            ):
                 sizes[part][label] = sizes[part].get(label, 0.0) + size
     for part, pieces in sizes.items():
         mass = masses.get(part, (None,))[0]
@@ -242,15 +309,21 @@ def _masses_of_pieces(inventory: Inventory, parts: Collection[int], labels: Plac
             return None
         for label, size in pieces.items():
             before = made.get(label, _Piece(frozenset(), 0.0))
-            made[label] = _Piece(before.parts | {part}, before.mass + mass * size / sum(pieces.values()))
+            made[label] = _Piece(
+                before.parts | {part}, before.mass + mass * size / sum(pieces.values())
+            )
     return made
 
 
-def _springs(inventory: Inventory, labels: Places, pieces: Mapping[int, _Piece]) -> Iterator[_Spring | None]:
+def _springs(
+    inventory: Inventory, labels: Places, pieces: Mapping[int, _Piece]
+) -> Iterator[_Spring | None]:
     """Springs between two pieces; None for one that is not known."""
     springs = (elements for elements in inventory.elements if elements.kind == SPRING)
     for elements in springs:
-        for part, ends in zip(elements.part.tolist(), elements.nodes[:, :2], strict=True):
+        for part, ends in zip(
+            elements.part.tolist(), elements.nodes[:, :2], strict=True
+        ):
             joins = frozenset[int](labels[ends].tolist())
             if len(joins) < 2 or not joins & pieces.keys():
                 continue
@@ -258,14 +331,30 @@ def _springs(inventory: Inventory, labels: Places, pieces: Mapping[int, _Piece])
             stiffness = data.section.stiffness if data else None
             way = np.subtract(*inventory.coordinates[ends])
             known = stiffness is not None and joins <= pieces.keys() and way.any()
-            yield _Spring(stiffness * np.outer(way, way) / (way @ way), joins) if stiffness and known else None
+            yield (
+                _Spring(stiffness * np.outer(way, way) / (way @ way), joins)
+                if stiffness and known
+                else None
+            )
 
 
-def _period(label: int, pieces: Mapping[int, _Piece], springs: list[_Spring]) -> InnerPeriod:
+def _period(
+    label: int, pieces: Mapping[int, _Piece], springs: list[_Spring]
+) -> InnerPeriod:
     """Period in which a piece swings against those that springs join it to."""
-    piece, others = pieces[label], frozenset[int]().union(*(one.joins for one in springs)) - {label}
+    piece, others = (
+        pieces[label],
+        frozenset[int]().union(*(one.joins for one in springs)) - {label},
+    )
     mass = 1 / (1 / piece.mass + 1 / sum(pieces[one].mass for one in others))
     stiffness = np.sum([one.stiffness for one in springs], axis=0)
     most = float(np.linalg.eigvalsh(stiffness)[-1])
-    time, least = (2 * math.pi * math.sqrt(mass / one) for one in (most, float(np.trace(stiffness))))
-    return InnerPeriod(time, least, f"{name_units(piece.parts)} of mass {piece.mass:.4g} on {len(springs)} springs")
+    time, least = (
+        2 * math.pi * math.sqrt(mass / one)
+        for one in (most, float(np.trace(stiffness)))
+    )
+    return InnerPeriod(
+        time,
+        least,
+        f"{name_units(piece.parts)} of mass {piece.mass:.4g} on {len(springs)} springs",
+    )

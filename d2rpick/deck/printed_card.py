@@ -135,19 +135,38 @@ def shortest(value: float, width: int = LONGEST) -> str:
     for digits in range(1, _MOST_DIGITS + 1):
         fixed = f"{value:.{digits}f}"
         mantissa, _, exponent = f"{value:.{digits}e}".partition("e")
-        texts |= {fixed, fixed.replace("0.", ".", 1) if abs(value) < 1 else fixed, f"{mantissa}e{int(exponent)}"}
+        texts |= {
+            fixed,
+            fixed.replace("0.", ".", 1) if abs(value) < 1 else fixed,
+            f"{mantissa}e{int(exponent)}",
+        }
         texts.add(f"{mantissa.replace('.', '')}e{int(exponent) - digits}")
     fitting = [text for text in texts if len(text) <= width]
     if not fitting:
-        raise DeckError(f"{value:g} cannot be written in {width} columns, a number that fits was expected")
+        raise DeckError(
+            f"{value:g} cannot be written in {width} columns, a number that fits was expected"
+        )
     # exact before near, then with digits around a point, then short
-    return min(fitting, key=lambda text: (abs(float(text) - value), not _POINT.search(text), len(text), text))
+    return min(
+        fitting,
+        key=lambda text: (
+            abs(float(text) - value),
+            not _POINT.search(text),
+            len(text),
+            text,
+        ),
+    )
 
 
 def comments(remarks: Sequence[str]) -> Iterator[str]:
     """Remarks that cannot leave their comment lines, which are as long as those of the cards."""
     for remark in remarks:
-        yield from textwrap.wrap(printable(remark), _COMMENT_WIDTH, subsequent_indent="  ", break_long_words=False)
+        yield from textwrap.wrap(
+            printable(remark),
+            _COMMENT_WIDTH,
+            subsequent_indent="  ",
+            break_long_words=False,
+        )
 
 
 def check_windows(windows: Sequence[Times]) -> tuple[Times, ...]:
@@ -161,15 +180,21 @@ def check_windows(windows: Sequence[Times]) -> tuple[Times, ...]:
         if not later > td:
             what = "lies before" if end <= tr else "overlaps or touches"
             found = f"the window {later:g} to {end:g} {what} the one given before it, {tr:g} to {td:g}"
-            raise DeckError(f"{found}; windows of a part in the order of time were expected, apart from each other")
+            raise DeckError(
+                f"{found}; windows of a part in the order of time were expected, apart from each other"
+            )
     return tuple((tr + 0.0, td) for tr, td in windows)
 
 
 def check_ids(ids: Sequence[int], digits: int = WIDTH) -> list[int]:
     """Return ids that fit ``digits`` columns, each once; DeckError for any other, and for none at all."""
     if not ids:
-        raise DeckError("no id was given of what is switched, at least one was expected")
+        raise DeckError(
+            "no id was given of what is switched, at least one was expected"
+        )
     for number in ids:
         if not 0 < number < 10**digits:
-            raise DeckError(f"id {number} does not fit, 1 to {10**digits - 1} was expected")
+            raise DeckError(
+                f"id {number} does not fit, 1 to {10**digits - 1} was expected"
+            )
     return list(dict.fromkeys(ids))

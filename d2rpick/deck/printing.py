@@ -17,8 +17,22 @@ from d2rpick.base.errors import DeckError
 from d2rpick.deck import printed_card
 from d2rpick.deck.engine_files import capped, choose_step_cap, engine_lines, legs, off
 from d2rpick.deck.part_sets import PartSets, number_sets, write_part_set
-from d2rpick.deck.printed_card import LONGEST, PHYSICS, PrintedCard, Solver, check_ids, comments, shortest
-from d2rpick.deck.switch_sets import Waiting, group_by_lead, header, to_deformable, to_rigid
+from d2rpick.deck.printed_card import (
+    LONGEST,
+    PHYSICS,
+    PrintedCard,
+    Solver,
+    check_ids,
+    comments,
+    shortest,
+)
+from d2rpick.deck.switch_sets import (
+    Waiting,
+    group_by_lead,
+    header,
+    to_deformable,
+    to_rigid,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -42,7 +56,9 @@ _DELETED = (
 _CAPPED = "DTMAX: with nothing deformable left the time step would grow without limit."
 
 
-def _ls_dyna(windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()) -> PrintedCard:
+def _ls_dyna(
+    windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()
+) -> PrintedCard:
     """Print two unpaired CODE 0 sets for each window, their times in at most 9 characters.
 
     Raises
@@ -53,35 +69,71 @@ def _ls_dyna(windows: Sequence[Times], printing: Printing, remarks: Sequence[str
     windows, ids = printed_card.check_windows(windows), check_ids(printing.part)
     sets = list(_sets(printing.swset, len(windows)))
     if printing.merge is not None:
-        check_ids([printing.merge], LONGEST)  # stands right of an id, with a blank between them
+        check_ids(
+            [printing.merge], LONGEST
+        )  # stands right of an id, with a blank between them
     texts = [(shortest(tr), shortest(td)) for tr, td in windows]
     _check_printed([text for pair in texts for text in pair])
-    notes = tuple(note for times, pair in zip(windows, texts, strict=True) for note in _roundings(times, pair))
+    notes = tuple(
+        note
+        for times, pair in zip(windows, texts, strict=True)
+        for note in _roundings(times, pair)
+    )
     told = (*notes, *_warnings(ids, printing), *comments(remarks))
     spans = ", ".join(f"{tr} to {td}" for tr, td in texts)
-    lines = [*comments([f"Rigid from {spans}; written by d2rpick {__version__}"]), *told]
+    lines = [
+        *comments([f"Rigid from {spans}; written by d2rpick {__version__}"]),
+        *told,
+    ]
     lines = [f"$ {line}" for line in lines]
-    part_sets = number_sets((ids, *group_by_lead(ids, printing).values()), printing.swset[0])
+    part_sets = number_sets(
+        (ids, *group_by_lead(ids, printing).values()), printing.swset[0]
+    )
     for members, number in part_sets.items():
         lines += write_part_set(members, number)
     for pair, numbers in zip(texts, sets, strict=True):
         lines += _window(pair, numbers, ids, printing, part_sets)
     text = "\n".join(lines) + "\n"
-    return PrintedCard(text, tuple((float(tr), float(td)) for tr, td in texts), {_FILE: text}, notes)
+    return PrintedCard(
+        text, tuple((float(tr), float(td)) for tr, td in texts), {_FILE: text}, notes
+    )
 
 
 def _window(
-    texts: tuple[str, str], sets: tuple[int, int], ids: Sequence[int], printing: Printing, part_sets: PartSets
+    texts: tuple[str, str],
+    sets: tuple[int, int],
+    ids: Sequence[int],
+    printing: Printing,
+    part_sets: PartSets,
 ) -> Iterator[str]:
-    rigid, free = [*to_rigid(ids, printing, part_sets)], [*to_deformable(ids, part_sets)]  # with a comment each
+    rigid, free = (
+        [*to_rigid(ids, printing, part_sets)],
+        [*to_deformable(ids, part_sets)],
+    )  # with a comment each
     cap = printing.step_cap or choose_step_cap(*map(float, texts))
-    deleted = [flag * _DELETE for flag in (printing.delete_nodal_bodies, printing.delete_node_sets)]
-    activated = [flag * _ACTIVATE for flag in (printing.delete_nodal_bodies, printing.delete_node_sets)]
-    yield from (*header(sets[0], texts[0], shortest(cap), (len(rigid) - 1, 0), constraints=deleted), *rigid)
-    yield from (*header(sets[1], texts[1], "0.0", (0, len(free) - 1), constraints=activated), *free)
+    deleted = [
+        flag * _DELETE
+        for flag in (printing.delete_nodal_bodies, printing.delete_node_sets)
+    ]
+    activated = [
+        flag * _ACTIVATE
+        for flag in (printing.delete_nodal_bodies, printing.delete_node_sets)
+    ]
+    yield from (
+        *header(
+            sets[0], texts[0], shortest(cap), (len(rigid) - 1, 0), constraints=deleted
+        ),
+        *rigid,
+    )
+    yield from (
+        *header(sets[1], texts[1], "0.0", (0, len(free) - 1), constraints=activated),
+        *free,
+    )
 
 
-def _ls_dyna_contact(windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()) -> PrintedCard:
+def _ls_dyna_contact(
+    windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()
+) -> PrintedCard:
     """Print a pair of sets that switch by the force of a contact (CODE 2 and 4) or rigid wall (1 and 3).
 
     The windows of the card are those in which the pair switches in the history.
@@ -91,7 +143,9 @@ def _ls_dyna_contact(windows: Sequence[Times], printing: Printing, remarks: Sequ
     DeckError
         As `_ls_dyna` does, and if no wait gives as many windows as are planned.
     """
-    from d2rpick.deck.contact_timing import time_pair  # not above: other cards do without
+    from d2rpick.deck.contact_timing import (
+        time_pair,
+    )  # not above: other cards do without
 
     windows, ids = printed_card.check_windows(windows), check_ids(printing.part)
     kind, number, pushes = _force_of(printing)
@@ -99,17 +153,29 @@ def _ls_dyna_contact(windows: Sequence[Times], printing: Printing, remarks: Sequ
     timing = time_pair(windows, pushes)
     first, second = printing.swset
     part_sets = number_sets((ids, *group_by_lead(ids, printing).values()), first)
-    rigid, back = [*to_rigid(ids, printing, part_sets)], [*to_deformable(ids, part_sets)]
+    rigid, back = (
+        [*to_rigid(ids, printing, part_sets)],
+        [*to_deformable(ids, part_sets)],
+    )
     cap = printing.step_cap or min(choose_step_cap(*times) for times in timing.windows)
     waits = Waiting(free, number, 0.0, second, 1, latest=timing.latest)
     returns = Waiting(forced, number, timing.wait, first, -1, offset=timing.offset)
     spans = ", ".join(f"{tr:.6g} to {td:.6g}" for tr, td in timing.windows)
-    told = (*comments([f"Rigid from {spans} in the history; written by d2rpick {__version__}"]),)
+    told = (
+        *comments(
+            [f"Rigid from {spans} in the history; written by d2rpick {__version__}"]
+        ),
+    )
     told += (*_warnings(ids, printing), *_BY_FORCE[:2], _OF_OFFSET, *comments(remarks))
     lines = [f"$ {line}" for line in told]
     for members, name in part_sets.items():
         lines += write_part_set(members, name)
-    lines += (*header(first, shortest(timing.earliest), shortest(cap), (len(rigid) - 1, 0), waits), *rigid)
+    lines += (
+        *header(
+            first, shortest(timing.earliest), shortest(cap), (len(rigid) - 1, 0), waits
+        ),
+        *rigid,
+    )
     lines += (*header(second, "0.0", "0.0", (0, len(back) - 1), returns), *back)
     text = "\n".join(lines) + "\n"
     return PrintedCard(text, timing.windows, {_FILE: text})
@@ -118,7 +184,9 @@ def _ls_dyna_contact(windows: Sequence[Times], printing: Printing, remarks: Sequ
 def _sets(first: tuple[int, int], count: int) -> Iterator[tuple[int, int]]:
     """Ids of the switch sets of each window, all different."""
     if first[0] == first[1]:
-        raise DeckError(f"both switch sets are {first[0]}, two different ids were expected")
+        raise DeckError(
+            f"both switch sets are {first[0]}, two different ids were expected"
+        )
     above = max(first) + 1
     check_ids([*first, above + 2 * count])
     yield first
@@ -141,7 +209,12 @@ def _roundings(asked: Times, texts: tuple[str, str]) -> Iterator[str]:
 
 def _warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
     deleted = printing.delete_nodal_bodies or printing.delete_node_sets
-    yield from (*PHYSICS, *(_DELETED if deleted else _LEFT_ACTIVE), "Springs and dampers are not switched.", _CAPPED)
+    yield from (
+        *PHYSICS,
+        *(_DELETED if deleted else _LEFT_ACTIVE),
+        "Springs and dampers are not switched.",
+        _CAPPED,
+    )
     if printing.merge is None and printing.bodies:
         yield from (
             f"{len(body)} parts are one rigid body by the deck, led by part {body[0]} (LRB)."
@@ -172,10 +245,16 @@ _BY_FORCE = (
     "  other times, after its first window that locks in energy.",
     "They end in the first step of a contact, without a margin before it.",
 )
-_OF_SENSORS = tuple(line for line in _OF_RADIOSS[1:-1] if not line.startswith(("The starter looks", "A body that")))
+_OF_SENSORS = tuple(
+    line
+    for line in _OF_RADIOSS[1:-1]
+    if not line.startswith(("The starter looks", "A body that"))
+)
 
 
-def _radioss(windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()) -> PrintedCard:
+def _radioss(
+    windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()
+) -> PrintedCard:
     """Print the engine files, a leg up to each switch and one to the end.
 
     The main nodes are those of /RBODY in the starter file, of bodies without sensor.  Without a cap the step is
@@ -188,13 +267,18 @@ def _radioss(windows: Sequence[Times], printing: Printing, remarks: Sequence[str
     """
     windows, ids, end = _of_run(windows, printing)
     files = {
-        f"{printing.name}_{leg.number:04d}.rad": "\n".join(engine_lines(leg, printing.name, ids, printing.off)) + "\n"
+        f"{printing.name}_{leg.number:04d}.rad": "\n".join(
+            engine_lines(leg, printing.name, ids, printing.off)
+        )
+        + "\n"
         for leg in legs(windows, end, printing.step_cap)
     }
     return _told(windows, printing, (*_OF_RADIOSS, *remarks), files)
 
 
-def _radioss_sensors(windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()) -> PrintedCard:
+def _radioss_sensors(
+    windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()
+) -> PrintedCard:
     """Print sensors of times that switch the bodies with these main nodes, and one engine file for the whole run.
 
     The largest step holds for the whole run, so that it is the least of those that the windows ask for.
@@ -204,13 +288,19 @@ def _radioss_sensors(windows: Sequence[Times], printing: Printing, remarks: Sequ
     DeckError
         As `_radioss` does.
     """
-    from d2rpick.deck.radioss_sensors import inactive  # not above: other cards do without
+    from d2rpick.deck.radioss_sensors import (
+        inactive,
+    )  # not above: other cards do without
 
     windows, _, _ = _of_run(windows, printing)
-    return _of_sensors(windows, printing, _sensors(inactive(windows), printing.sensor), remarks)
+    return _of_sensors(
+        windows, printing, _sensors(inactive(windows), printing.sensor), remarks
+    )
 
 
-def _radioss_contact(windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()) -> PrintedCard:
+def _radioss_contact(
+    windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()
+) -> PrintedCard:
     """Print a sensor of the force of a contact or rigid wall, by which the bodies are deformable in the contacts.
 
     The windows of the card are those in which it switches in the history.
@@ -227,8 +317,13 @@ def _radioss_contact(windows: Sequence[Times], printing: Printing, remarks: Sequ
     timing = time_sensor(windows, pushes)
     row = f"{number:10d}{'NF':>10}{-1.0:20}{0.0:20}{0.0:20}"
     sensor = f"/SENSOR/{kind}/{{}}\nforce, or shortly after\n{shortest(timing.wait, 20):>20}\n{row}\n"
-    spans = [(0.0, timing.earliest)] * (timing.earliest > 0) + [(timing.latest, math.inf)]
-    how = (f"Deformable while /{kind} {number} has a force and {timing.wait:.6g} longer (Tdelay).", *_BY_FORCE)
+    spans = [(0.0, timing.earliest)] * (timing.earliest > 0) + [
+        (timing.latest, math.inf)
+    ]
+    how = (
+        f"Deformable while /{kind} {number} has a force and {timing.wait:.6g} longer (Tdelay).",
+        *_BY_FORCE,
+    )
     sensors = _sensors(spans, printing.sensor, [sensor])
     return _of_sensors(timing.windows, printing, sensors, (*how, *remarks))
 
@@ -238,23 +333,41 @@ def _force_of(printing: Printing) -> tuple[str, int, Pushes]:
     from d2rpick.deck.contact_timing import Pushes
 
     if (printing.contact is None) == (printing.wall is None):
-        raise DeckError("a card for switches by force needs one `contact`, or one rigid `wall`, by its number")
+        raise DeckError(
+            "a card for switches by force needs one `contact`, or one rigid `wall`, by its number"
+        )
     if not printing.pushed:
-        raise DeckError("a card for switches by force needs a history with momenta that show when something pushes")
-    kind, number = ("INTER", printing.contact) if printing.contact is not None else ("RWALL", printing.wall)
+        raise DeckError(
+            "a card for switches by force needs a history with momenta that show when something pushes"
+        )
+    kind, number = (
+        ("INTER", printing.contact)
+        if printing.contact is not None
+        else ("RWALL", printing.wall)
+    )
     return kind, number or 0, Pushes(printing.pushed, printing.speed)
 
 
 def _of_sensors(
-    windows: Sequence[Times], printing: Printing, sensors: tuple[str, int], remarks: Sequence[str]
+    windows: Sequence[Times],
+    printing: Printing,
+    sensors: tuple[str, int],
+    remarks: Sequence[str],
 ) -> PrintedCard:
     """Print sensors that switch the bodies, and one engine file for the whole run."""
     from d2rpick.deck.radioss_sensors import STOPS_SINCE
 
     texts, last = sensors
     ids, end = check_ids(printing.node), printing.end or 0.0
-    cap = min(leg.cap for leg in legs(windows, end, printing.step_cap) if leg.cap is not None)
-    lines = (f"/RUN/{printing.name}/1", f"{end!r:>20}", *off(printing.off), *capped(cap))
+    cap = min(
+        leg.cap for leg in legs(windows, end, printing.step_cap) if leg.cap is not None
+    )
+    lines = (
+        f"/RUN/{printing.name}/1",
+        f"{end!r:>20}",
+        *off(printing.off),
+        *capped(cap),
+    )
     files = {f"{printing.name}_0001.rad": "\n".join(lines) + "\n"}
     nodes = ", ".join(map(str, ids))
     how = (
@@ -265,11 +378,15 @@ def _of_sensors(
         f"The largest step, {cap:.4g}, holds for the whole run, which takes {end / cap:.0f} cycles at least;"
         " where it takes fewer without switching, set --step-cap to the deformable step or more."
     )
-    told = _told(tuple(windows), printing, (*_OF_SENSORS, *how, slow, *remarks), files, texts)
+    told = _told(
+        tuple(windows), printing, (*_OF_SENSORS, *how, slow, *remarks), files, texts
+    )
     return replace(told, sensors=dict.fromkeys(ids, last), notes=(*told.notes, slow))
 
 
-def _sensors(spans: Sequence[Times], first: int, further: Sequence[str] = ()) -> tuple[str, int]:
+def _sensors(
+    spans: Sequence[Times], first: int, further: Sequence[str] = ()
+) -> tuple[str, int]:
     """Write sensors with ids from ``first`` on, and give the id of the one that is active in one of ``spans``.
 
     ``further`` are sensors, with a place for their id, while which it is active too.
@@ -277,47 +394,92 @@ def _sensors(spans: Sequence[Times], first: int, further: Sequence[str] = ()) ->
     from d2rpick.deck.radioss_sensors import NEVER
 
     clock = "/SENSOR/TIME/{}\ndeformable\n"
-    kinds = [f"{clock}{shortest(start, 20):>20}\n{shortest(min(stop, NEVER), 20):>20}\n" for start, stop in spans]
+    kinds = [
+        f"{clock}{shortest(start, 20):>20}\n{shortest(min(stop, NEVER), 20):>20}\n"
+        for start, stop in spans
+    ]
     kinds += further
     texts = [text.format(number) for number, text in enumerate(kinds, start=first)]
     last = first
-    for number, other in enumerate(range(first + 1, first + len(kinds)), start=first + len(kinds)):
-        texts.append(f"/SENSOR/OR/{number}\ndeformable\n{0:20d}\n{last:10d}{other:10d}\n")
+    for number, other in enumerate(
+        range(first + 1, first + len(kinds)), start=first + len(kinds)
+    ):
+        texts.append(
+            f"/SENSOR/OR/{number}\ndeformable\n{0:20d}\n{last:10d}{other:10d}\n"
+        )
         last = number
     return "".join(texts), last
 
 
-def _of_run(windows: Sequence[Times], printing: Printing) -> tuple[tuple[Times, ...], list[int], float]:
+def _of_run(
+    windows: Sequence[Times], printing: Printing
+) -> tuple[tuple[Times, ...], list[int], float]:
     """Return the windows, main nodes and end of a run; DeckError where they do not make one."""
     windows, ids = printed_card.check_windows(windows), check_ids(printing.node)
     if not _RUN_NAME.fullmatch(printing.name):
-        raise DeckError(f"the name of the run is {printing.name!r}, letters, digits, '.', '_' and '-' were expected")
+        raise DeckError(
+            f"the name of the run is {printing.name!r}, letters, digits, '.', '_' and '-' were expected"
+        )
     if printing.end is None or not windows[-1][1] < printing.end < math.inf:
-        found = "the end of the run is not given" if printing.end is None else f"the run ends at {printing.end:g}"
+        found = (
+            "the end of the run is not given"
+            if printing.end is None
+            else f"the run ends at {printing.end:g}"
+        )
         raise DeckError(f"{found}, a time after td = {windows[-1][1]:g} was expected")
     return windows, ids, printing.end
 
 
 def _told(
-    windows: tuple[Times, ...], printing: Printing, remarks: Sequence[str], files: Mapping[str, str], more: str = ""
+    windows: tuple[Times, ...],
+    printing: Printing,
+    remarks: Sequence[str],
+    files: Mapping[str, str],
+    more: str = "",
 ) -> PrintedCard:
     """Put comments, cards for the starter deck and engine files together."""
     spans = ", ".join(f"{tr!r} to {td!r}" for tr, td in windows)
-    head = comments([f"Rigid from {spans}; written by d2rpick {__version__}", *PHYSICS, *remarks])
+    head = comments(
+        [f"Rigid from {spans}; written by d2rpick {__version__}", *PHYSICS, *remarks]
+    )
     text, starter = "".join(f"# {line}\n" for line in head), printing.starter + more
-    text += f"# ---- into {printing.name}_0000.rad, before /END\n{starter}" if starter else ""
+    text += (
+        f"# ---- into {printing.name}_0000.rad, before /END\n{starter}"
+        if starter
+        else ""
+    )
     text += "".join(f"# ---- {file}\n{content}" for file, content in files.items())
     return PrintedCard(text, windows, files, starter=starter)
 
 
 SOLVERS: Final[Mapping[str, Solver]] = {
-    "ls-dyna": Solver("LS-DYNA", ("glstat", "matsum", "binout"), "part", ("merge", "swset", "step_cap"), _ls_dyna),
-    "radioss": Solver("Radioss", ("radioss-th",), "node", ("step_cap", "end", "name"), _radioss),
-    "radioss-sensors": Solver("Radioss", (), "node", ("step_cap", "end", "name"), _radioss_sensors),
-    "ls-dyna-contact": Solver(
-        "LS-DYNA", (), "part", ("merge", "swset", "step_cap", "contact", "wall"), _ls_dyna_contact
+    "ls-dyna": Solver(
+        "LS-DYNA",
+        ("glstat", "matsum", "binout"),
+        "part",
+        ("merge", "swset", "step_cap"),
+        _ls_dyna,
     ),
-    "radioss-contact": Solver("Radioss", (), "node", ("step_cap", "end", "name", "contact", "wall"), _radioss_contact),
+    "radioss": Solver(
+        "Radioss", ("radioss-th",), "node", ("step_cap", "end", "name"), _radioss
+    ),
+    "radioss-sensors": Solver(
+        "Radioss", (), "node", ("step_cap", "end", "name"), _radioss_sensors
+    ),
+    "ls-dyna-contact": Solver(
+        "LS-DYNA",
+        (),
+        "part",
+        ("merge", "swset", "step_cap", "contact", "wall"),
+        _ls_dyna_contact,
+    ),
+    "radioss-contact": Solver(
+        "Radioss",
+        (),
+        "node",
+        ("step_cap", "end", "name", "contact", "wall"),
+        _radioss_contact,
+    ),
 }
 DEFAULT: Final = "ls-dyna"  # of histories that name no solver
 
@@ -331,11 +493,17 @@ def solver_of(history_format: str) -> str:
     ('radioss', 'ls-dyna', 'ls-dyna')
     """
     formats = set(history_format.split(" + "))
-    return next((name for name, solver in SOLVERS.items() if formats & {*solver.histories}), DEFAULT)
+    return next(
+        (name for name, solver in SOLVERS.items() if formats & {*solver.histories}),
+        DEFAULT,
+    )
 
 
 def cards(
-    windows: Sequence[Times], printing: Printing, solver: str = DEFAULT, remarks: Sequence[str] = ()
+    windows: Sequence[Times],
+    printing: Printing,
+    solver: str = DEFAULT,
+    remarks: Sequence[str] = (),
 ) -> PrintedCard:
     """Print the cards of windows.
 

@@ -16,7 +16,14 @@ from d2rpick.deck.geometry import Placement, masses_and_steps
 from d2rpick.deck.mesh import nodes_of
 from d2rpick.deck.model import DISCRETE, Inventory
 from d2rpick.deck.pieces import pieces_of
-from d2rpick.deck.radioss_deck import Starter, below_title, blocks, kept_off, keyword, whole
+from d2rpick.deck.radioss_deck import (
+    Starter,
+    below_title,
+    blocks,
+    kept_off,
+    keyword,
+    whole,
+)
 from d2rpick.deck.radioss_flaws import NodeGroups
 from d2rpick.deck.radioss_rigid import Body
 from d2rpick.deck.radioss_run import Run, read_run, rigid_parts
@@ -77,7 +84,9 @@ def bodies_for(path: str, parts: Collection[int]) -> Bodies:
     inventory = radioss_inventory.read(run)
     groups = NodeGroups(starter)
     if unknown := sorted(part for part in parts if not _nodes([part], groups)):
-        raise DeckError(f"{path}: {name_units(unknown)} {are(unknown)} without nodes that are followed; name others")
+        raise DeckError(
+            f"{path}: {name_units(unknown)} {are(unknown)} without nodes that are followed; name others"
+        )
     nodes, lacking = list[int](), list[tuple[int, ...]]()
     unused = frozenset(kept_off(run.legs))
     for group in inventory.bodies(parts):
@@ -98,7 +107,13 @@ def bodies_for(path: str, parts: Collection[int]) -> Bodies:
         f"/RBODY {body.id}, which every leg of the run keeps off, has to go ({body.card.at}): a new one takes its nodes"
         for body in gone
     )
-    return Bodies((*nodes, *mains), cards, notes, made.next("SENSOR"), tuple(body.node.value for body in gone))
+    return Bodies(
+        (*nodes, *mains),
+        cards,
+        notes,
+        made.next("SENSOR"),
+        tuple(body.node.value for body in gone),
+    )
 
 
 def replaced(run: Run, cards: str) -> tuple[Body, ...]:
@@ -109,10 +124,16 @@ def replaced(run: Run, cards: str) -> tuple[Body, ...]:
     if run.starter is None or not cards:
         return ()
     added = Starter(blocks=[*blocks(SourceFile("the card", cards.encode()))])
-    members = [known for body in added.bodies if (known := added.group_members(body.group))]
+    members = [
+        known for body in added.bodies if (known := added.group_members(body.group))
+    ]
     groups, unused = NodeGroups(run.starter), frozenset(kept_off(run.legs))
     taken = _nodes({part for _, parts in members for part in parts}, groups)
-    return tuple(body for body in run.starter.bodies if _is_unused(body, unused) and _touches(body, groups, taken))
+    return tuple(
+        body
+        for body in run.starter.bodies
+        if _is_unused(body, unused) and _touches(body, groups, taken)
+    )
 
 
 def _is_unused(body: Body, unused: Collection[int]) -> bool:
@@ -122,35 +143,57 @@ def _is_unused(body: Body, unused: Collection[int]) -> bool:
 
 def _apart(inventory: Inventory, parts: Sequence[int]) -> str:
     pieces = pieces_of(inventory, parts)
-    return f"; it keeps {pieces} pieces together that nothing joins" if pieces > 1 else ""
+    return (
+        f"; it keeps {pieces} pieces together that nothing joins" if pieces > 1 else ""
+    )
 
 
 def _stiff(inventory: Inventory, parts: Collection[int]) -> list[int]:
     """Those of some parts that are not springs alone; of springs alone all."""
-    return [part for part in parts if not set(inventory.counts.get(part, ())) <= DISCRETE] or list(parts)
+    return [
+        part for part in parts if not set(inventory.counts.get(part, ())) <= DISCRETE
+    ] or list(parts)
 
 
 def _nodes(parts: Collection[int], groups: NodeGroups) -> frozenset[int]:
-    return frozenset(node for part in parts for node in groups.by_part.get(part, np.empty(0, np.int64)).tolist())
+    return frozenset(
+        node
+        for part in parts
+        for node in groups.by_part.get(part, np.empty(0, np.int64)).tolist()
+    )
 
 
 def _whole(run: Run) -> Starter:
     """Give the starter deck; DeckError where ids, nodes or their places may be unknown."""
     starter, path = run.starter, run.deck.path
     if starter is None:
-        raise DeckError(f"{path}: the run has no starter deck (NAME_0000.rad); name a run that has one")
+        raise DeckError(
+            f"{path}: the run has no starter deck (NAME_0000.rad); name a run that has one"
+        )
     for one in run.deck.unread:
-        raise DeckError(f"{one.name.at}: {one.name.text} was not read: {one.reason}; its ids may be those of new cards")
+        raise DeckError(
+            f"{one.name.at}: {one.name.text} was not read: {one.reason}; its ids may be those of new cards"
+        )
     for block, told in cuts(run.deck):
         raise DeckError(f"{block.source.name}: {told} Complete it first")
     if starter.moved or starter.transformed:
-        what = "ids of a //SUBMODEL may be moved" if starter.moved else "/TRANSFORM moves nodes"
-        raise DeckError(f"{path}: {what}, which is not followed; write the /RBODY by hand, and name its main node")
+        what = (
+            "ids of a //SUBMODEL may be moved"
+            if starter.moved
+            else "/TRANSFORM moves nodes"
+        )
+        raise DeckError(
+            f"{path}: {what}, which is not followed; write the /RBODY by hand, and name its main node"
+        )
     return starter
 
 
 def _ready(
-    starter: Starter, inventory: Inventory, group: Sequence[int], groups: NodeGroups, unused: Collection[int]
+    starter: Starter,
+    inventory: Inventory,
+    group: Sequence[int],
+    groups: NodeGroups,
+    unused: Collection[int],
 ) -> tuple[int, ...]:
     """Main nodes of the bodies of the deck that hold a group of parts.
 
@@ -164,14 +207,23 @@ def _ready(
     held = rigid_parts(starter, {body.node.value: body.group for body in touching})
     whole = {node: set(_stiff(inventory, parts)) for node, parts in held.items()}
     found = frozenset[int]().union(*whole.values())
-    if found == stiff and all(whole.values()) and not any(body.sensor for body in touching):
+    if (
+        found == stiff
+        and all(whole.values())
+        and not any(body.sensor for body in touching)
+    ):
         return tuple(body.node.value for body in touching)
     if all(_is_unused(one, unused) for one in touching):
         return ()
-    body = next((one for one in touching if one.sensor or not whole[one.node.value] <= stiff), touching[0])
+    body = next(
+        (one for one in touching if one.sensor or not whole[one.node.value] <= stiff),
+        touching[0],
+    )
     place, who = f"{body.card.at}: /RBODY {body.id}", name_units(sorted(stiff))
     if body.sensor:
-        raise DeckError(f"{place} of {who} is switched by sensor {body.sensor} already; remove that first")
+        raise DeckError(
+            f"{place} of {who} is switched by sensor {body.sensor} already; remove that first"
+        )
     raise DeckError(
         f"{place} holds nodes of {who}, but not these parts alone and whole: a node lies in one body;"
         " name the parts that it holds, or remove it"
@@ -181,16 +233,22 @@ def _ready(
 def _touches(body: Body, groups: NodeGroups, nodes: frozenset[int]) -> bool:
     members = groups.members(body.group)
     if members is None:
-        raise DeckError(f"{body.card.at}: the nodes of /RBODY {body.id} are not known; name them by parts or numbers")
+        raise DeckError(
+            f"{body.card.at}: the nodes of /RBODY {body.id} are not known; name them by parts or numbers"
+        )
     return body.node.value in nodes or not nodes.isdisjoint(members)
 
 
 class _Made:
     """Writes new bodies with ids that no card of the deck has."""
 
-    def __init__(self, starter: Starter, inventory: Inventory, groups: NodeGroups) -> None:
+    def __init__(
+        self, starter: Starter, inventory: Inventory, groups: NodeGroups
+    ) -> None:
         self._starter, self._inventory, self._groups = starter, inventory, groups
-        self._masses = {part: mass for part, (mass, _) in masses_and_steps(inventory).items()}
+        self._masses = {
+            part: mass for part, (mass, _) in masses_and_steps(inventory).items()
+        }
         self._placed = Placement(inventory).parts
         self._free = {"NODE": int(nodes_of(starter.named("NODE"))[0].max(initial=0))}
 
@@ -214,7 +272,12 @@ class _Made:
         """Give an id above all that cards of a kind have."""
         if kind not in self._free:
             words = (keyword(block) for block in self._starter.blocks)
-            ids = (whole(word) for first, *others in words if first == kind for word in others)
+            ids = (
+                whole(word)
+                for first, *others in words
+                if first == kind
+                for word in others
+            )
             self._free[kind] = max(ids, default=0)
         self._free[kind] += 1
         return self._free[kind]
@@ -222,11 +285,21 @@ class _Made:
     def _centre(self, parts: Sequence[int]) -> Reals:
         """Centre of mass (3,) [length]; where a mass is not known the mean of the nodes: the starter moves it there."""
         parts = _stiff(self._inventory, parts)
-        masses = [mass for part in parts if part in self._placed and (mass := self._masses.get(part))]
+        masses = [
+            mass
+            for part in parts
+            if part in self._placed and (mass := self._masses.get(part))
+        ]
         if len(masses) < len(parts):
-            nodes = np.unique(np.concatenate([self._inventory.nodes_by_part[part] for part in parts]))
+            nodes = np.unique(
+                np.concatenate([self._inventory.nodes_by_part[part] for part in parts])
+            )
             return np.asarray(self._inventory.coordinates[nodes].mean(axis=0))
-        return np.asarray(np.average([self._placed[part].centre for part in parts], axis=0, weights=masses))
+        return np.asarray(
+            np.average(
+                [self._placed[part].centre for part in parts], axis=0, weights=masses
+            )
+        )
 
     def _moving(self, parts: Sequence[int], alone: int) -> Iterator[str]:
         """Give the main node what moves or pulls the nodes of its body."""
@@ -250,15 +323,24 @@ class _Made:
         rows = card.rows[1:]
         if column is None:
             return frozenset(card.integer(row, 0).value for row in rows)
-        members = self._groups.members(card.integer(rows[0], column).value if rows else 0)
+        members = self._groups.members(
+            card.integer(rows[0], column).value if rows else 0
+        )
         if members is None:
-            raise DeckError(f"{card.at}: its nodes are not known; name them by parts or numbers")
+            raise DeckError(
+                f"{card.at}: its nodes are not known; name them by parts or numbers"
+            )
         return members
 
     def _again(self, card: Card, column: int, group: int) -> str:
         """Write a card with a new id and another group."""
         title, first, *rest = (row.text for row in card.rows)
         at = 1 + (card.words[0] == "INIVEL")
-        head = "/".join(["", *card.words[:at], str(self.next(card.words[0])), *card.words[at + 1 :]])
-        before, after = first[: 10 * column].ljust(10 * column), first[10 * (column + 1) :]
+        head = "/".join(
+            ["", *card.words[:at], str(self.next(card.words[0])), *card.words[at + 1 :]]
+        )
+        before, after = (
+            first[: 10 * column].ljust(10 * column),
+            first[10 * (column + 1) :],
+        )
         return "\n".join([head, title, f"{before}{group:10d}{after}", *rest]) + "\n"

@@ -13,7 +13,14 @@ from d2rpick.base.caching import cached_property
 from d2rpick.base.graph import reached
 from d2rpick.deck.card import Card, Field, Row, Scope, Value
 from d2rpick.deck.expression import ExpressionError, number, real
-from d2rpick.deck.radioss_rigid import BODY, MADE_HERE, Body, Merge, RigidBodies, make_rigid_bodies
+from d2rpick.deck.radioss_rigid import (
+    BODY,
+    MADE_HERE,
+    Body,
+    Merge,
+    RigidBodies,
+    make_rigid_bodies,
+)
 from d2rpick.deck.source import Block, SourceFile
 
 if TYPE_CHECKING:
@@ -53,8 +60,14 @@ def _marked(lines: bytes) -> list[tuple[int, bytes]]:
         while at >= 0:
             found.append(at + 1)
             at = lines.find(mark, at + 1)
-    marked = [(at, lines[at : lines.find(b"\n", at) + 1 or None]) for at in sorted(found)]
-    return [(at, raw) for at, raw in marked if raw.startswith(b"/") or raw[: len(_INCLUDE)].lower() == _INCLUDE]
+    marked = [
+        (at, lines[at : lines.find(b"\n", at) + 1 or None]) for at in sorted(found)
+    ]
+    return [
+        (at, raw)
+        for at, raw in marked
+        if raw.startswith(b"/") or raw[: len(_INCLUDE)].lower() == _INCLUDE
+    ]
 
 
 def keyword(block: Block) -> tuple[str, ...]:
@@ -62,7 +75,11 @@ def keyword(block: Block) -> tuple[str, ...]:
 
     The name of the run in ``/RUN/name/1`` is in upper case too: `Card.block` has it as written.
     """
-    return tuple(word.strip().upper() for word in block.head[1:].split("/")) if block.head.startswith("/") else ()
+    return (
+        tuple(word.strip().upper() for word in block.head[1:].split("/"))
+        if block.head.startswith("/")
+        else ()
+    )
 
 
 def whole(text: str) -> int:
@@ -102,11 +119,15 @@ class Leg:
     name: str
     number: int
     stop: Value[float]
-    switched: list[tuple[Card, bool, tuple[Value[int], ...]]] = field(default_factory=list)  # True: made rigid
+    switched: list[tuple[Card, bool, tuple[Value[int], ...]]] = field(
+        default_factory=list
+    )  # True: made rigid
     cap: Value[float] | None = None
     version: str = ""
     starts: list[Start] = field(default_factory=list)
-    resets: list[int] = field(default_factory=list)  # sensors that are reset at its start
+    resets: list[int] = field(
+        default_factory=list
+    )  # sensors that are reset at its start
     sensor: int = 0  # which ends it, at a time that nobody knows before
 
 
@@ -125,8 +146,20 @@ def read_legs(source: SourceFile) -> list[Leg]:
 
 def kept_off(legs: Sequence[Leg]) -> tuple[int, ...]:
     """Main nodes of the bodies that the first leg puts off and none puts on, in the order of the file."""
-    states = {node.value: rigid for leg in legs[:1] for _, rigid, nodes in leg.switched for node in nodes if node.value}
-    on = {node.value for leg in legs for _, rigid, nodes in leg.switched for node in nodes if rigid}
+    states = {
+        node.value: rigid
+        for leg in legs[:1]
+        for _, rigid, nodes in leg.switched
+        for node in nodes
+        if node.value
+    }
+    on = {
+        node.value
+        for leg in legs
+        for _, rigid, nodes in leg.switched
+        for node in nodes
+        if rigid
+    }
     return tuple(node for node, rigid in states.items() if not rigid and node not in on)
 
 
@@ -139,7 +172,9 @@ def _leg(card: Card) -> Leg:
 def _take(leg: Leg, card: Card) -> None:
     words = card.words
     if words[:2] in {("RBODY", "ON"), ("RBODY", "OFF")}:
-        leg.switched.append((card, words[1] == "ON", tuple(_integer(value) for value in numbers(card))))
+        leg.switched.append(
+            (card, words[1] == "ON", tuple(_integer(value) for value in numbers(card)))
+        )
     elif words[:2] == ("STOP", "LSENSOR"):
         leg.sensor = next((int(value.value) for value in numbers(card)), 0)
     elif words[:2] == ("SENS", "RESET"):
@@ -162,7 +197,11 @@ def _start(card: Card) -> Start:
     ids = [_integer(value).value for value in numbers(card)][before:]
     if type_ == 2:
         return Start(card, (), ids[0] if ids else 0)
-    pairs = zip(ids[::2], ids[1::2], strict=False) if type_ == 1 else zip(ids, ids, strict=True)
+    pairs = (
+        zip(ids[::2], ids[1::2], strict=False)
+        if type_ == 1
+        else zip(ids, ids, strict=True)
+    )
     return Start(card, tuple(pairs), 0)
 
 
@@ -186,15 +225,29 @@ def _integer(value: Value[float]) -> Value[int]:
     return Value(int(value.value), value.field, value.problem)
 
 
-WITHOUT_FRAME: Final = {"TETRA4", "TETRA10", "BRIC20", "SHEL16"}  # their stresses do not turn with a rigid body
+WITHOUT_FRAME: Final = {
+    "TETRA4",
+    "TETRA10",
+    "BRIC20",
+    "SHEL16",
+}  # their stresses do not turn with a rigid body
 _WIDTH: Final = 10
-_OF_BODY: Final = (0, 1, 6, 7)  # main node, sensor, group, Ikrem in columns of 10: the mass between takes two
+_OF_BODY: Final = (
+    0,
+    1,
+    6,
+    7,
+)  # main node, sensor, group, Ikrem in columns of 10: the mass between takes two
 # /PART of a rigid part: Irigid in its first line, main node and sensor in its second.
 _IRIGID: Final = 5
 _OF_RIGID_PART: Final = (0, 5)
 _RIGID_PARTS_SINCE: Final = 2612  # version of the format
 _ICOROTATIONAL: Final = 2  # Iframe
-_NOT_TURNED: Final = {1, 2, 12}  # Isolid of bricks without a co-rotating frame; 12 by the help up to 2017
+_NOT_TURNED: Final = {
+    1,
+    2,
+    12,
+}  # Isolid of bricks without a co-rotating frame; 12 by the help up to 2017
 _DEFAULT_ISOLID: Final = 1
 SOLIDS: Final = {"SOLID", "TYPE14", "SOL_ORTH", "TYPE6"}
 
@@ -250,7 +303,9 @@ class Starter:
             for row in below_title(card)[: number_of(card) > 0]:
                 node, sensor, group, keeps = (card.integer(row, at) for at in _OF_BODY)
                 stays = bool(sensor.value or keeps.value)
-                yield Body(number_of(card), node, sensor.value, group.value, card, stays)
+                yield Body(
+                    number_of(card), node, sensor.value, group.value, card, stays
+                )
 
     def _bodies_of_parts(self) -> Iterator[Body]:
         """Bodies that the starter makes of parts with Irigid 1."""
@@ -258,12 +313,22 @@ class Starter:
             if len(card.rows) > 2 and card.integer(card.rows[1], _IRIGID).value == 1:
                 node, sensor = (card.integer(card.rows[2], at) for at in _OF_RIGID_PART)
                 part = number_of(card)
-                yield Body(0, node, sensor.value, MADE_HERE + part, card, bool(sensor.value), part)
+                yield Body(
+                    0,
+                    node,
+                    sensor.value,
+                    MADE_HERE + part,
+                    card,
+                    bool(sensor.value),
+                    part,
+                )
 
     def _merges(self) -> Iterator[Merge]:
         for card in self.named("MERGE"):
             for row in below_title(card) if card.words[1:2] == ("RBODY",) else ():
-                main, main_kind, other, kind = (card.integer(row, at).value for at in range(4))
+                main, main_kind, other, kind = (
+                    card.integer(row, at).value for at in range(4)
+                )
                 yield Merge(main_kind or BODY, main, kind or BODY, other)
 
     def _last_node(self) -> int:
@@ -275,7 +340,10 @@ class Starter:
     def parts(self) -> Mapping[int, PartLine]:
         """What /PART says, by the ids of the parts."""
         return {
-            number_of(card): PartLine(card.rows[0].text.strip(), *(card.integer(row, at).value for at in range(3)))
+            number_of(card): PartLine(
+                card.rows[0].text.strip(),
+                *(card.integer(row, at).value for at in range(3)),
+            )
             for card in self.named("PART")
             for row in below_title(card)[:1]
         }
@@ -283,20 +351,29 @@ class Starter:
     @cached_property
     def subsets(self) -> Mapping[int, tuple[int, ...]]:
         """Ids of the subsets in each."""
-        return {number_of(card): _ids(below_title(card)) for card in self.named("SUBSET")}
+        return {
+            number_of(card): _ids(below_title(card)) for card in self.named("SUBSET")
+        }
 
     @cached_property
     def groups(self) -> Mapping[int, tuple[str, tuple[int, ...]]]:
         """What a group of nodes is made of, and the ids of that."""
         found = (card for card in self.named("GRNOD") if card.words[1:])
-        written = {number_of(card, 2): (card.words[1], _ids(below_title(card))) for card in found}
-        rigid_parts = {body.group: ("PART", (body.part,)) for body in self._bodies_of_parts()}
+        written = {
+            number_of(card, 2): (card.words[1], _ids(below_title(card)))
+            for card in found
+        }
+        rigid_parts = {
+            body.group: ("PART", (body.part,)) for body in self._bodies_of_parts()
+        }
         return {**written, **rigid_parts, **self.rigid.groups}
 
     @cached_property
     def sensors(self) -> Mapping[int, Card]:
         """Cards of the sensors by id."""
-        return {number_of(card, 2): card for card in self.named("SENSOR") if card.words[1:]}
+        return {
+            number_of(card, 2): card for card in self.named("SENSOR") if card.words[1:]
+        }
 
     @property
     def moved(self) -> bool:
@@ -311,20 +388,38 @@ class Starter:
     @property
     def unturned(self) -> dict[int, str]:
         """Parts of solids whose stresses do not turn with a rigid body, and of which kind these are."""
-        defaults = [_isolid_and_iframe(card, card.rows[0]) for card in self.named("DEF_SOLID") if card.rows]
+        defaults = [
+            _isolid_and_iframe(card, card.rows[0])
+            for card in self.named("DEF_SOLID")
+            if card.rows
+        ]
         isolid, iframe = defaults[0] if defaults else (0, 0)  # the first one counts
-        solids = (card for card in self.named("PROP") if card.words[1:2] and card.words[1] in SOLIDS and card.rows[1:])
-        flags = {number_of(card, 2): _isolid_and_iframe(card, card.rows[1]) for card in solids}  # it may be blank
+        solids = (
+            card
+            for card in self.named("PROP")
+            if card.words[1:2] and card.words[1] in SOLIDS and card.rows[1:]
+        )
+        flags = {
+            number_of(card, 2): _isolid_and_iframe(card, card.rows[1])
+            for card in solids
+        }  # it may be blank
         props = {
             prop
             for prop, (own, frame) in flags.items()
-            if (own or isolid or _DEFAULT_ISOLID) in _NOT_TURNED and (frame or iframe) != _ICOROTATIONAL
+            if (own or isolid or _DEFAULT_ISOLID) in _NOT_TURNED
+            and (frame or iframe) != _ICOROTATIONAL
         }
         bricks = {number_of(card) for card in self.named("BRICK")}
-        turned = [part for part, line in self.parts.items() if part in bricks and line.prop in props]
+        turned = [
+            part
+            for part, line in self.parts.items()
+            if part in bricks and line.prop in props
+        ]
         found = dict.fromkeys(turned, "bricks with Isolid 1, 2 or 12 without Iframe 2")
         others = map(number_of, self.named(*WITHOUT_FRAME))
-        return found | dict.fromkeys(others, "tetrahedra, 20-node bricks or 16-node shells")
+        return found | dict.fromkeys(
+            others, "tetrahedra, 20-node bricks or 16-node shells"
+        )
 
     def group_members(self, group: int) -> tuple[set[int], set[int]] | None:
         """Nodes and whole parts of a group of nodes; None where they cannot be known."""
@@ -336,7 +431,9 @@ class Starter:
                 parts.update(ids)
             elif kind == "SUBSET":
                 below = {*reached(ids, lambda one: self.subsets.get(one, ()))}
-                parts.update(part for part, line in self.parts.items() if line.subset in below)
+                parts.update(
+                    part for part, line in self.parts.items() if line.subset in below
+                )
             elif kind != "GRNOD" or any(one <= 0 for one in ids):
                 return None
         return nodes, parts
@@ -355,10 +452,17 @@ def _isolid_and_iframe(card: Card, row: Row) -> tuple[int, int]:
 
 def _ids(rows: Iterable[Row]) -> tuple[int, ...]:
     """Ids on lines of 10 columns; a word ends what can be followed and counts as -1."""
-    cells = [row.text[start : start + _WIDTH].strip() for row in rows for start in range(0, len(row.text), _WIDTH)]
+    cells = [
+        row.text[start : start + _WIDTH].strip()
+        for row in rows
+        for start in range(0, len(row.text), _WIDTH)
+    ]
     return tuple(whole(cell) or -1 for cell in cells if cell)
 
 
 def reals(row: Row, count: int) -> list[float]:
     """Read numbers of 20 columns each; a blank is 0, NaN what is none."""
-    return [real(row.text[at : at + 2 * _WIDTH]) for at in range(0, count * 2 * _WIDTH, 2 * _WIDTH)]
+    return [
+        real(row.text[at : at + 2 * _WIDTH])
+        for at in range(0, count * 2 * _WIDTH, 2 * _WIDTH)
+    ]

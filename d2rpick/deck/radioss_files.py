@@ -43,7 +43,11 @@ _NAME: Final = rb"(?mi)^/BEGIN[^\n]*\n(?:[#$][^\n]*\n)*([^\n]*)|^/RUN/([^/\n]+)"
 def recognises(head: bytes) -> bool:
     """Whether a file that begins like this is a starter deck or an engine file."""
     first = _KEYWORD.search(head)
-    return first is not None and first[0] == b"/" and bool(re.search(STARTER, head) or re.search(ENGINE, head))
+    return (
+        first is not None
+        and first[0] == b"/"
+        and bool(re.search(STARTER, head) or re.search(ENGINE, head))
+    )
 
 
 def run_files(path: str) -> list[str]:

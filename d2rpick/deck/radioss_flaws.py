@@ -46,19 +46,33 @@ class NodeGroups:
         known = self._starter.group_members(group)
         if known is None or any(part not in self.by_part for part in known[1]):
             return None
-        return frozenset(known[0]).union(*(self.by_part[part].tolist() for part in known[1]))
+        return frozenset(known[0]).union(
+            *(self.by_part[part].tolist() for part in known[1])
+        )
 
     @cached_property
     def by_part(self) -> Mapping[int, Integers]:
         """Ids of nodes by part; a part with particles, which are not followed, is left out."""
-        found: dict[int, list[Integers]] = {part: [np.empty(0, np.int64)] for part in self._starter.parts}
+        found: dict[int, list[Integers]] = {
+            part: [np.empty(0, np.int64)] for part in self._starter.parts
+        }
         for card in self._starter.named(*KINDS):
             if card.words[1:]:
                 part = found.setdefault(number_of(card), [np.empty(0, np.int64)])
                 part += [np.unique(nodes) for _, _, nodes in elements_of(card)]
-        unknown = {number_of(card) for card in self._starter.named(*NOT_COUNTED) if card.words[1:]}
-        joined = {part: np.unique(np.concatenate(nodes)) for part, nodes in found.items()}
-        return {part: nodes[nodes > 0] for part, nodes in joined.items() if part not in unknown}
+        unknown = {
+            number_of(card)
+            for card in self._starter.named(*NOT_COUNTED)
+            if card.words[1:]
+        }
+        joined = {
+            part: np.unique(np.concatenate(nodes)) for part, nodes in found.items()
+        }
+        return {
+            part: nodes[nodes > 0]
+            for part, nodes in joined.items()
+            if part not in unknown
+        }
 
     @cached_property
     def placed(self) -> tuple[Integers, Reals]:
@@ -72,7 +86,11 @@ def flaws_of(run: Run, switched: Collection[int]) -> tuple[Flaw, ...]:
     `NOT_FOLLOWED` tells what is not known, and why.
     """
     starter = run.starter
-    bodies = [body for body in starter.bodies if body.node.value in switched] if starter else []
+    bodies = (
+        [body for body in starter.bodies if body.node.value in switched]
+        if starter
+        else []
+    )
     if starter is None or not bodies or not run.pushed:
         return ()
     if starter.moved:
@@ -80,8 +98,14 @@ def flaws_of(run: Run, switched: Collection[int]) -> tuple[Flaw, ...]:
         return (Flaw(NOT_FOLLOWED, bodies[0].card.here, why),)
     groups = NodeGroups(starter)
     unknown = [body for body in bodies if groups.members(body.group) is None]
-    found = [_unknown(body.group, _numbered([body]), body.card.here) for body in unknown]
-    found += [flaw for wall in starter.named("RWALL") for flaw in _of_wall(wall, starter, groups, bodies)]
+    found = [
+        _unknown(body.group, _numbered([body]), body.card.here) for body in unknown
+    ]
+    found += [
+        flaw
+        for wall in starter.named("RWALL")
+        for flaw in _of_wall(wall, starter, groups, bodies)
+    ]
     found += [*_of_starts(run, groups, bodies)]
     if not run.deck.unread:  # else a velocity may stand in what was not read
         found += _of_velocities(run, starter, groups, bodies)
@@ -104,7 +128,9 @@ def _within(body: Body, groups: NodeGroups) -> frozenset[int]:
 # Rigid walls.
 
 
-def _of_wall(card: Card, starter: Starter, groups: NodeGroups, bodies: Sequence[Body]) -> Iterator[Flaw]:
+def _of_wall(
+    card: Card, starter: Starter, groups: NodeGroups, bodies: Sequence[Body]
+) -> Iterator[Flaw]:
     """Find the bodies whose nodes the starter takes from a wall.
 
     A body keeps them by its Ikrem; OpenRadioss takes the Ikrem of the /RBODY with the highest id for that of all.
@@ -114,7 +140,9 @@ def _of_wall(card: Card, starter: Starter, groups: NodeGroups, bodies: Sequence[
     rows = card.rows[1:]
     if not bodies or len(rows) < 2:
         return
-    node, _, added, left_out, form = (card.integer(rows[0], at).value for at in range(5))
+    node, _, added, left_out, form = (
+        card.integer(rows[0], at).value for at in range(5)
+    )
     if form > 0 and starter.version >= _PENALTY_SINCE:
         return
     wall = f"/{card.name}"
@@ -123,7 +151,11 @@ def _of_wall(card: Card, starter: Starter, groups: NodeGroups, bodies: Sequence[
             yield _unknown(group, wall, card.here)
     near, without = _near(card, node, starter, groups), groups.members(left_out)
     if near is None:
-        yield Flaw(NOT_FOLLOWED, card.here, f"which nodes lie near {wall} is not known: it was not judged by them")
+        yield Flaw(
+            NOT_FOLLOWED,
+            card.here,
+            f"which nodes lie near {wall} is not known: it was not judged by them",
+        )
     if without is None:
         return
     nodes = ((groups.members(added) or frozenset()) | (near or frozenset())) - without
@@ -133,11 +165,15 @@ def _of_wall(card: Card, starter: Starter, groups: NodeGroups, bodies: Sequence[
         count = len(frozenset[int]().union(*(taken for _, taken in lost)))
         found = f"the starter takes {count} of {len(nodes)} nodes from {wall}, those of {_numbered(owners)}, also while"
         why = "the bodies are off (warning 446): they go through the wall"
-        way_out = "give every /RBODY Ikrem 1, and let none be on while it touches the wall"
+        way_out = (
+            "give every /RBODY Ikrem 1, and let none be on while it touches the wall"
+        )
         yield Flaw(THROUGH_WALL, card.here, f"{found} {why}; {way_out}")
 
 
-def _near(card: Card, node: int, starter: Starter, groups: NodeGroups) -> frozenset[int] | None:
+def _near(
+    card: Card, node: int, starter: Starter, groups: NodeGroups
+) -> frozenset[int] | None:
     """Nodes within the distance of a wall in front of it; None where they are not known."""
     rows = card.rows[1:]
     reach, _, diameter = reals(rows[1], 3)
@@ -155,7 +191,13 @@ def _near(card: Card, node: int, starter: Starter, groups: NodeGroups) -> frozen
         points[0] = places[ids == node][0]
     with np.errstate(invalid="ignore", over="ignore"):  # of a field that is no number
         distance = _distance(kind, places, points, diameter / 2)
-    return None if distance is None else frozenset(ids[(distance >= 0) & (distance <= reach) & (ids != node)].tolist())
+    return (
+        None
+        if distance is None
+        else frozenset(
+            ids[(distance >= 0) & (distance <= reach) & (ids != node)].tolist()
+        )
+    )
 
 
 def _distance(kind: str, places: Reals, points: Reals, radius: float) -> Reals | None:
@@ -172,13 +214,19 @@ def _distance(kind: str, places: Reals, points: Reals, radius: float) -> Reals |
         return None
     normal = normal / length
     ahead = off @ normal
-    return np.asarray(np.linalg.norm(off - np.outer(ahead, normal), axis=1) - radius if kind == "CYL" else ahead)
+    return np.asarray(
+        np.linalg.norm(off - np.outer(ahead, normal), axis=1) - radius
+        if kind == "CYL"
+        else ahead
+    )
 
 
 # Initial velocities.
 
 
-def _of_velocities(run: Run, starter: Starter, groups: NodeGroups, bodies: Sequence[Body]) -> Iterator[Flaw]:
+def _of_velocities(
+    run: Run, starter: Starter, groups: NodeGroups, bodies: Sequence[Body]
+) -> Iterator[Flaw]:
     """Find the bodies with moving nodes whose main node is in no /INIVEL.
 
     The starter gives all nodes of a body the velocity of its main node, also where the first leg puts the body off.
@@ -194,26 +242,38 @@ def _of_velocities(run: Run, starter: Starter, groups: NodeGroups, bodies: Seque
     started = run.legs[0].starts if run.legs else []
     moving = frozenset().union(*(nodes for _, _, nodes in given))
     resting = [body for body in bodies if body.node.value not in moving]
-    resting = [body for body in resting if not any(_reached(one, groups, _within(body, groups)) for one in started)]
+    resting = [
+        body
+        for body in resting
+        if not any(_reached(one, groups, _within(body, groups)) for one in started)
+    ]
     for card, group, nodes in given:
         held = [body for body in resting if nodes & _within(body, groups)]
         if held:
             mains = ", ".join(in_rows(body.node.value for body in held))
             found = f"/{card.name} moves nodes of {_numbered(held)}, and no /INIVEL the main node ({mains})"
             why = "the starter gives all nodes of a body the velocity of its main node, also where it is off: they rest"
-            yield Flaw(AT_REST, card.here, f"{found}: {why}; move it too" + f" (node group {group})" * bool(group))
+            yield Flaw(
+                AT_REST,
+                card.here,
+                f"{found}: {why}; move it too" + f" (node group {group})" * bool(group),
+            )
 
 
 def _moved(card: Card) -> tuple[int, frozenset[int]]:
     """Group of nodes of an /INIVEL, or the nodes that it lists; neither where it moves nothing, or later."""
     kind, rows = "".join(card.name.split("/")[1:2]), card.rows[1:]
     if kind == "NODE":
-        return 0, frozenset(node for row in rows if (node := card.integer(row, 0).value) > 0)
+        return 0, frozenset(
+            node for row in rows if (node := card.integer(row, 0).value) > 0
+        )
     axis = kind == "AXIS"
     if kind == "FVM" or len(rows) < 1 + axis:
         return 0, frozenset()
     speeds, later = reals(rows[axis], 3 + axis), rows[1 + axis : 2 + axis]
-    if not any(speeds) or any(reals(row, 1)[0] or card.integer(row, 2).value for row in later):
+    if not any(speeds) or any(
+        reals(row, 1)[0] or card.integer(row, 2).value for row in later
+    ):
         return 0, frozenset()
     return card.integer(rows[0], 2 if axis else 6).value, frozenset()
 
@@ -226,21 +286,32 @@ def _of_starts(run: Run, groups: NodeGroups, bodies: Sequence[Body]) -> Iterator
             named = {node.value for node in nodes}
             on = on | named if rigid else on - named
         mains = frozenset(body.node.value for body in bodies if body.node.value in on)
-        resting = mains - frozenset().union(*(_reached(start, groups, mains) for start in leg.starts))
+        resting = mains - frozenset().union(
+            *(_reached(start, groups, mains) for start in leg.starts)
+        )
         for start in leg.starts:
             if groups.members(start.group) is None:
                 yield _unknown(start.group, f"/{start.card.name}", start.card.here)
             held = [body for body in bodies if body.node.value in resting]
-            held = [body for body in held if _reached(start, groups, _within(body, groups))]
+            held = [
+                body for body in held if _reached(start, groups, _within(body, groups))
+            ]
             if held:
                 found = (
-                    f"/{start.card.name} moves nodes of {_numbered(held)}, on in leg {leg.number}, not the main node"
+                    f"/{start.card.name} moves nodes of {_numbered(held)}, on in leg {leg.number}, "
+                    f"not the main node"
                 )
                 why = "a body that is on has the velocity of its main node, so this gives it none"
-                yield Flaw(AT_REST, start.card.here, f"{found}: {why}; move the main node too")
+                yield Flaw(
+                    AT_REST, start.card.here, f"{found}: {why}; move the main node too"
+                )
 
 
 def _reached(start: Start, groups: NodeGroups, nodes: frozenset[int]) -> frozenset[int]:
     """Those of some nodes that an /INIV moves."""
-    listed = (node for node in nodes if any(first <= node <= last for first, last in start.ranges))
+    listed = (
+        node
+        for node in nodes
+        if any(first <= node <= last for first, last in start.ranges)
+    )
     return frozenset(listed) | (nodes & (groups.members(start.group) or frozenset()))

@@ -15,7 +15,17 @@ from d2rpick.deck import formulations, model
 from d2rpick.deck.expression import real
 from d2rpick.deck.mesh import KINDS, NOT_COUNTED, Mesh, elements_of, nodes_of
 from d2rpick.deck.model import Formulation, Inventory, Material, PartData, Section
-from d2rpick.deck.radioss_deck import SOLIDS, Starter, below_title, blocks, kept_off, keyword, number_of, reals, whole
+from d2rpick.deck.radioss_deck import (
+    SOLIDS,
+    Starter,
+    below_title,
+    blocks,
+    kept_off,
+    keyword,
+    number_of,
+    reals,
+    whole,
+)
 from d2rpick.deck.radioss_flaws import flaws_of
 from d2rpick.deck.radioss_run import (
     Run,
@@ -37,12 +47,29 @@ if TYPE_CHECKING:
 _WIDTH, _REAL = 10, 20
 
 _ELASTIC: Final = {
-    *("ELAST", "LAW1", "LAW01", "PLAS_JOHNS", "LAW2", "LAW02", "PLAS_ZERIL", "PLAS_BRIT", "LAW27", "PLAS_TAB", "LAW36"),
+    *(
+        "ELAST",
+        "LAW1",
+        "LAW01",
+        "PLAS_JOHNS",
+        "LAW2",
+        "LAW02",
+        "PLAS_ZERIL",
+        "PLAS_BRIT",
+        "LAW27",
+        "PLAS_TAB",
+        "LAW36",
+    ),
     *("COWPER", "LAW44", "DAMA", "LAW22", "LAW22_DAMA"),
 }  # density, then Young's modulus and Poisson's ratio
 _VOID: Final = {"VOID", "LAW0", "LAW00"}
 _AIRBAG: Final = {"FABRI", "FABR_A", "LAW19", "LAW58"}
-_PLAIN_SHELLS: Final = {"SHELL", "TYPE1", "SH_ORTH", "TYPE9"}  # with their thickness in the same columns
+_PLAIN_SHELLS: Final = {
+    "SHELL",
+    "TYPE1",
+    "SH_ORTH",
+    "TYPE9",
+}  # with their thickness in the same columns
 _SHELLS: Final = {*_PLAIN_SHELLS, "SH_COMP", "TYPE10", "SH_SANDW", "TYPE11", "SH_FABR", "TYPE16", "STACK", "TYPE17",
                   "TYPE51"}  # fmt: skip
 _AREA_LINE: Final = {"BEAM": 2, "TYPE3": 2, "TRUSS": 0, "TYPE2": 0}  # below the title
@@ -67,13 +94,26 @@ def read(run: Run) -> Inventory:
     """Collect the parts and elements of a run whose starter deck was read."""
     starter = run.starter
     if starter is None:
-        return Inventory("radioss", {}, (), np.empty((0, 3)), ("no starter deck (NAME_0000.rad) was found",), False)
+        return Inventory(
+            "radioss",
+            {},
+            (),
+            np.empty((0, 3)),
+            ("no starter deck (NAME_0000.rad) was found",),
+            False,
+        )
     ids, coordinates = nodes_of(starter.named("NODE"))
-    mesh = Mesh.of([one for card in starter.named(*KINDS) for one in elements_of(card)], ids, coordinates)
+    mesh = Mesh.of(
+        [one for card in starter.named(*KINDS) for one in elements_of(card)],
+        ids,
+        coordinates,
+    )
     notes = (*_notes(run, starter), *mesh.doubts(starter.parts.keys(), "/"))
     windows = find_run_windows(run).windows.windows if run.legs else ()
     joints = _joints(run, starter)
-    switched = run.named if run.legs else {body.node.value for body in starter.bodies}  # all without an engine file
+    switched = (
+        run.named if run.legs else {body.node.value for body in starter.bodies}
+    )  # all without an engine file
     rigid = _always_rigid(windows) | find_parts_of_fixed_bodies(run)
     return Inventory(
         "radioss", _parts(starter, mesh, rigid), mesh.elements, mesh.coordinates, notes,
@@ -88,35 +128,68 @@ def read(run: Run) -> Inventory:
 
 def _watched(starter: Starter) -> Integers:
     """Ids of the nodes of /TH/NODE, below a line of a title and one of variables."""
-    rows = [row for card in starter.named("TH") if card.words[1:2] == ("NODE",) for row in below_title(card)]
+    rows = [
+        row
+        for card in starter.named("TH")
+        if card.words[1:2] == ("NODE",)
+        for row in below_title(card)
+    ]
     ids = (row.text[:_WIDTH].strip() for row in rows)
-    return np.unique(np.array([int(one) for one in ids if one.isdecimal() and int(one)], np.int64))
+    return np.unique(
+        np.array([int(one) for one in ids if one.isdecimal() and int(one)], np.int64)
+    )
 
 
 def _notes(run: Run, starter: Starter) -> Iterator[str]:
     """Say what may be missing."""
-    yield from (f"{card.at}: elements of /{card.name} are not followed" for card in starter.named(*NOT_COUNTED))
-    yield from (f"{block.source.name}: {told}" for block, told in cuts(run.deck) if holds_mesh(block))
-    yield from (f"{one.name.at}: {one.name.text} was not read: {one.reason}" for one in run.deck.unread)
+    yield from (
+        f"{card.at}: elements of /{card.name} are not followed"
+        for card in starter.named(*NOT_COUNTED)
+    )
+    yield from (
+        f"{block.source.name}: {told}"
+        for block, told in cuts(run.deck)
+        if holds_mesh(block)
+    )
+    yield from (
+        f"{one.name.at}: {one.name.text} was not read: {one.reason}"
+        for one in run.deck.unread
+    )
     if starter.moved:
         yield "ids of a //SUBMODEL may be moved, which is not followed"
 
 
 def _parts(starter: Starter, mesh: Mesh, rigid: set[int]) -> Mapping[int, PartData]:
     materials, properties = dict(_materials(starter)), dict(_properties(starter))
-    kinds, unturned, unswitchable = mesh.kinds, starter.unturned, find_unswitchable_in_radioss(starter)
+    kinds, unturned, unswitchable = (
+        mesh.kinds,
+        starter.unturned,
+        find_unswitchable_in_radioss(starter),
+    )
     sensors = find_sensors_of_parts(starter)
     found: dict[int, PartData] = {}
     for part, line in starter.parts.items():
-        section = _section(properties.get(line.prop), kinds.get(part, set()), turns=part not in unturned)
-        made_of = _material(materials.get(line.material), properties.get(line.prop), part in rigid)
-        by_sensor = f"the deck switches it by sensor {sensors[part]} already" if part in sensors else ""
+        section = _section(
+            properties.get(line.prop),
+            kinds.get(part, set()),
+            turns=part not in unturned,
+        )
+        made_of = _material(
+            materials.get(line.material), properties.get(line.prop), part in rigid
+        )
+        by_sensor = (
+            f"the deck switches it by sensor {sensors[part]} already"
+            if part in sensors
+            else ""
+        )
         why = unswitchable[part].reason if part in unswitchable else by_sensor
         found[part] = PartData(part, line.title, made_of, section, why)
     return found
 
 
-def _material(found: Material | None, prop: _Property | None, rigid: bool) -> Material | None:
+def _material(
+    found: Material | None, prop: _Property | None, rigid: bool
+) -> Material | None:
     """Material of a part: a spring has its stiffness in its property, and a rigid body takes whole parts."""
     if prop and prop.type in _OF_SPRINGS:
         return Material(f"PROP/{prop.type}", "spring")
@@ -127,7 +200,11 @@ def _material(found: Material | None, prop: _Property | None, rigid: bool) -> Ma
 
 def _always_rigid(windows: Sequence[Window]) -> set[int]:
     """Parts in a rigid body that is on from the start to the end; none where no engine file tells."""
-    return {one.unit.id for one in windows if not one.unit.is_body and one.tr == 0 and one.td is None}
+    return {
+        one.unit.id
+        for one in windows
+        if not one.unit.is_body and one.tr == 0 and one.td is None
+    }
 
 
 def _materials(starter: Starter) -> Iterator[tuple[int, Material]]:
@@ -138,11 +215,17 @@ def _materials(starter: Starter) -> Iterator[tuple[int, Material]]:
         known = law in _ELASTIC
         modulus, poisson = (_at(rows, 1, at) if known else None for at in (0, _REAL))
         kind = "void" if law in _VOID else "airbag" if law in _AIRBAG else "deformable"
-        yield number_of(card, 2), Material(f"MAT/{law}", kind, _at(rows, 0, 0), modulus, poisson)
+        yield (
+            number_of(card, 2),
+            Material(f"MAT/{law}", kind, _at(rows, 0, 0), modulus, poisson),
+        )
 
 
 def _properties(starter: Starter) -> Iterator[tuple[int, _Property]]:
-    defaults = {card.words[0]: _flags(card, card.lines) for card in starter.named("DEF_SHELL", "DEF_SOLID")}
+    defaults = {
+        card.words[0]: _flags(card, card.lines)
+        for card in starter.named("DEF_SHELL", "DEF_SOLID")
+    }
     shell, _, triangle = defaults.get("DEF_SHELL", [0, 0, 0])[:3]
     solid = defaults.get("DEF_SOLID", [0])[0]
     for card in starter.named("PROP"):
@@ -150,9 +233,16 @@ def _properties(starter: Starter) -> Iterator[tuple[int, _Property]]:
             continue
         below, type_ = below_title(card), card.words[1]
         flags, rows = _flags(card, below), [row.text for row in below]
-        shells = (flags[0] or shell or _DEFAULT_SHELL, flags[2] or triangle or _DEFAULT_TRIANGLE)
+        shells = (
+            flags[0] or shell or _DEFAULT_SHELL,
+            flags[2] or triangle or _DEFAULT_TRIANGLE,
+        )
         bricks = flags[0] or solid or _DEFAULT_SOLID
-        found = _Property(type_, *(shells if type_ in _SHELLS else (0, 0)), bricks if type_ in SOLIDS else 0)
+        found = _Property(
+            type_,
+            *(shells if type_ in _SHELLS else (0, 0)),
+            bricks if type_ in SOLIDS else 0,
+        )
         yield number_of(card, 2), found._replace(section=_section_of(type_, rows))
 
 
@@ -182,14 +272,18 @@ def _of_springs(rows: Sequence[str]) -> Section:
     """Mass and stiffness of a spring, which a function of its length would replace."""
     linear = len(rows) < 3 or not rows[2][:_WIDTH].strip(" 0")
     return Section(
-        damped=_at(rows, 1, _REAL) is not None, mass=_at(rows, 0, 0), stiffness=_at(rows, 1, 0) if linear else None
+        damped=_at(rows, 1, _REAL) is not None,
+        mass=_at(rows, 0, 0),
+        stiffness=_at(rows, 1, 0) if linear else None,
     )
 
 
 def _of_plain_shells(rows: Sequence[str]) -> Section:
     """Thickness and integration points through it; 0 points stand for global integration, which is one."""
     points = rows[2][:_WIDTH].strip() if len(rows) > 2 else None
-    layers = None if points is None else max(int(points) if points.isdecimal() else 0, 1)
+    layers = (
+        None if points is None else max(int(points) if points.isdecimal() else 0, 1)
+    )
     return Section(thickness=_at(rows, 2, 20), layers=layers)
 
 
@@ -215,10 +309,14 @@ def _boundary(run: Run, starter: Starter) -> model.Boundary:
     """Collect what acts on the model from outside."""
     if starter.moved and starter.named("GRAV", "BCS", *_MOTIONS):
         return model.Boundary(
-            notes=("ids of a //SUBMODEL may be moved: supports and gravity of the deck are not followed",)
+            notes=(
+                "ids of a //SUBMODEL may be moved: supports and gravity of the deck are not followed",
+            )
         )
     found = [*_holds(run, starter)]
-    found += [*_of_bodies(run, starter, [one for one in found if isinstance(one, model.Hold)])]
+    found += [
+        *_of_bodies(run, starter, [one for one in found if isinstance(one, model.Hold)])
+    ]
     return model.Boundary.of(found, [*_gravity(starter)], whole=not run.deck.unread)
 
 
@@ -231,7 +329,9 @@ def _name(card: Card) -> str:
 
 def _holds(run: Run, starter: Starter) -> Iterator[model.Hold | str]:
     engine = [source for source in run.deck.sources if source not in starter.sources]
-    lifted = any(keyword(block)[:1] == ("BCSR",) for source in engine for block in blocks(source))
+    lifted = any(
+        keyword(block)[:1] == ("BCSR",) for source in engine for block in blocks(source)
+    )
     for card in starter.named("BCS", *_MOTIONS):
         words, rows = card.words, below_title(card)
         if not rows:
@@ -244,11 +344,15 @@ def _holds(run: Run, starter: Starter) -> Iterator[model.Hold | str]:
             yield model.Hold(_name(card), nodes, group, counts=True)
         else:
             held = _support(card, rows) if words[0] == "BCS" else _motion(card, rows)
-            members = starter.group_members(card.integer(rows[0], 2 if words[0] == "BCS" else 4).value)
+            members = starter.group_members(
+                card.integer(rows[0], 2 if words[0] == "BCS" else 4).value
+            )
             if members is None:
                 yield f"{_name(card)}: the nodes of its group are not followed"
             elif held:
-                yield held._replace(nodes=model.ids(members[0]), parts=frozenset(members[1]))
+                yield held._replace(
+                    nodes=model.ids(members[0]), parts=frozenset(members[1])
+                )
 
 
 def _support(card: Card, rows: Sequence[Row]) -> model.Hold | None:
@@ -263,21 +367,35 @@ def _support(card: Card, rows: Sequence[Row]) -> model.Hold | None:
 
 def _motion(card: Card, rows: Sequence[Row]) -> model.Hold:
     """Give the times of an imposed motion; with a sensor, or units of its own, these are all."""
-    timed = len(rows) > 1 and not card.integer(rows[0], 3).value and not number_of(card, 2)
+    timed = (
+        len(rows) > 1 and not card.integer(rows[0], 3).value and not number_of(card, 2)
+    )
     start, stop = reals(rows[1], 4)[2:] if timed else (0.0, 0.0)
     known = np.isfinite([start, stop]).all()
     return model.Hold(
-        _name(card), model.ids(()), counts=True, start=start if known else 0.0, end=stop if known and stop else inf
+        _name(card),
+        model.ids(()),
+        counts=True,
+        start=start if known else 0.0,
+        end=stop if known and stop else inf,
     )
 
 
-def _of_bodies(run: Run, starter: Starter, holds: Sequence[model.Hold]) -> Iterator[model.Hold]:
+def _of_bodies(
+    run: Run, starter: Starter, holds: Sequence[model.Hold]
+) -> Iterator[model.Hold]:
     """What holds the main node of a rigid body that is on holds all of its nodes."""
     for body in starter.bodies:
-        members = None if body.sensor or body.node.value in run.named else starter.group_members(body.group)
+        members = (
+            None
+            if body.sensor or body.node.value in run.named
+            else starter.group_members(body.group)
+        )
         for one in holds if members else ():
             if members and body.node.value in one.nodes:
-                yield one._replace(nodes=model.ids(members[0]), parts=frozenset(members[1]))
+                yield one._replace(
+                    nodes=model.ids(members[0]), parts=frozenset(members[1])
+                )
 
 
 # Gravity.
@@ -286,22 +404,44 @@ def _of_bodies(run: Run, starter: Starter, holds: Sequence[model.Hold]) -> Itera
 def _gravity(starter: Starter) -> Iterator[model.Gravity | str]:
     loads = [card for card in starter.named("GRAV") if below_title(card)]
     functions = dict(_functions(starter)) if loads else {}
-    units = next((card.rows[2:4] for card in starter.named("BEGIN") if len(card.words) == 1), ())
-    converted = len(units) > 1 and units[0].text.split() != units[1].text.split() and units[1].text.strip() != ""
+    units = next(
+        (card.rows[2:4] for card in starter.named("BEGIN") if len(card.words) == 1), ()
+    )
+    converted = (
+        len(units) > 1
+        and units[0].text.split() != units[1].text.split()
+        and units[1].text.strip() != ""
+    )
     for card in loads:
-        found = None if converted or number_of(card, 2) else _of_card(card, starter, functions)
-        yield found or f"{_name(card)} is not followed: whether gravity acts is seen in the run alone"
+        found = (
+            None
+            if converted or number_of(card, 2)
+            else _of_card(card, starter, functions)
+        )
+        yield (
+            found
+            or f"{_name(card)} is not followed: whether gravity acts is seen in the run alone"
+        )
 
 
-def _of_card(card: Card, starter: Starter, functions: Mapping[int, tuple[float, ...]]) -> model.Gravity | None:
+def _of_card(
+    card: Card, starter: Starter, functions: Mapping[int, tuple[float, ...]]
+) -> model.Gravity | None:
     """Give the values and nodes of a /GRAV, None where they are not known; before its sensor it is off."""
     row = below_title(card)[0]
     function, skew, sensor, group = (card.integer(row, at).value for at in (0, 2, 3, 4))
     scale = reals(row, 5)[4] or 1.0
-    values = model.plateaus(functions.get(function, ()), scale) if function else (scale,)
+    values = (
+        model.plateaus(functions.get(function, ()), scale) if function else (scale,)
+    )
     members = starter.group_members(group) if group else (set[int](), set[int]())
     direction = row.text[_WIDTH : 2 * _WIDTH].strip().upper() or "Z"
-    if not values or not np.isfinite(values).all() or members is None or direction not in _AXES:
+    if (
+        not values
+        or not np.isfinite(values).all()
+        or members is None
+        or direction not in _AXES
+    ):
         return None
     axis = None if skew else _AXES.index(direction)
     values = (0.0, *values) if sensor else values
@@ -317,7 +457,12 @@ def _functions(starter: Starter) -> Iterator[tuple[int, tuple[float, ...]]]:
     moved = {number_of(card) for card in starter.named("MOVE_FUNCT") if card.words[1:]}
     for card in starter.named("FUNCT"):
         number = number_of(card)
-        yield number, () if number in moved else tuple(reals(row, 2)[1] for row in below_title(card))
+        yield (
+            number,
+            ()
+            if number in moved
+            else tuple(reals(row, 2)[1] for row in below_title(card)),
+        )
 
 
 # Joints hold parts together that share no nodes: ties, and rigid bodies that are always on.  While a part is rigid,
@@ -330,7 +475,11 @@ def _joints(run: Run, starter: Starter) -> model.Joints:
     A rigid body that no engine file and no sensor switches is always on, and joins what it has nodes of.  Without
     engine files all are taken for those that are switched.
     """
-    of_parts = (card for card in starter.named("SURF") if card.words[1:2] == ("PART",) and card.words[2:])
+    of_parts = (
+        card
+        for card in starter.named("SURF")
+        if card.words[1:2] == ("PART",) and card.words[2:]
+    )
     surfaces = {number_of(card, -1): card for card in of_parts}
     found, switched, unknown = list[model.Joint](), list[model.Joint](), list[str]()
     for card in starter.named("INTER", *_OTHER_TIES):
@@ -344,24 +493,36 @@ def _joints(run: Run, starter: Starter) -> model.Joints:
         always = bool(run.legs) and not body.sensor and body.node.value not in run.named
         members = starter.group_members(body.group)
         if members:
-            held = model.Joint("rigid body", model.ids(members[0] | {body.node.value}), frozenset(members[1]))
+            held = model.Joint(
+                "rigid body",
+                model.ids(members[0] | {body.node.value}),
+                frozenset(members[1]),
+            )
             (found if always else switched).append(held)
         elif always:
             unknown.append(f"/RBODY/{body.id} ({body.card.at})")
     return model.Joints(tuple(found), tuple(unknown), tuple(switched))
 
 
-def _of_interface(card: Card, starter: Starter, surfaces: dict[int, Card]) -> model.Joint | None:
+def _of_interface(
+    card: Card, starter: Starter, surfaces: dict[int, Card]
+) -> model.Joint | None:
     rows = below_title(card)
-    group, surface = (card.integer(rows[0], at).value for at in range(2)) if rows else (0, 0)
+    group, surface = (
+        (card.integer(rows[0], at).value for at in range(2)) if rows else (0, 0)
+    )
     members = starter.group_members(group)
     main = frozenset(_listed(surfaces[surface]) if surface in surfaces else ())
     if members is None or len(main) != 1:
         return None
-    return model.Joint("tied interface", model.ids(members[0]), frozenset(members[1]) | main)
+    return model.Joint(
+        "tied interface", model.ids(members[0]), frozenset(members[1]) | main
+    )
 
 
 def _listed(card: Card) -> Iterator[int]:
     """Ids below the title of a surface."""
     for row in below_title(card):
-        yield from (value for at in range(10) if (value := card.integer(row, at).value) > 0)
+        yield from (
+            value for at in range(10) if (value := card.integer(row, at).value) > 0
+        )

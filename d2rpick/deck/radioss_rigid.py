@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 
 # What a line of /MERGE/RBODY names: a body by its id, a node, a group of nodes, the body of a part with Irigid.
 BODY, NODE, GROUP, OF_PART = 1, 2, 3, 4
-MADE_HERE: Final = 10**10  # ids from here on are beyond those of a deck: groups of nodes that are made here
+MADE_HERE: Final = (
+    10**10
+)  # ids from here on are beyond those of a deck: groups of nodes that are made here
 
 
 class Body(NamedTuple):
@@ -65,7 +67,9 @@ class RigidBodies(NamedTuple):
     groups: Mapping[int, Group]
 
 
-def make_rigid_bodies(in_deck: Sequence[Body], merges: Sequence[Merge], last_node: Callable[[], int]) -> RigidBodies:
+def make_rigid_bodies(
+    in_deck: Sequence[Body], merges: Sequence[Merge], last_node: Callable[[], int]
+) -> RigidBodies:
     """Give the bodies of a deck as the engine has them.
 
     Parameters
@@ -80,44 +84,67 @@ def make_rigid_bodies(in_deck: Sequence[Body], merges: Sequence[Merge], last_nod
     bodies = [*_add_main_nodes(in_deck, last_node)]
     if not merges:
         return RigidBodies(tuple(bodies), {}, {})
-    by_name = {(OF_PART, body.part) if body.part else (BODY, body.id): body for body in bodies}
+    by_name = {
+        (OF_PART, body.part) if body.part else (BODY, body.id): body for body in bodies
+    }
     mains: dict[int, int] = {}
     further_groups: dict[int, list[Group]] = {}
     for merge in merges:
-        main, joined = by_name.get((merge.main_kind, merge.main)), by_name.get((merge.kind, merge.other))
+        main, joined = (
+            by_name.get((merge.main_kind, merge.main)),
+            by_name.get((merge.kind, merge.other)),
+        )
         if main is None:
             continue
         if joined and joined is not main:
             mains[joined.node.value] = main.node.value
         elif merge.kind in (NODE, GROUP):
             group = "GRNOD" if merge.kind == GROUP else "NODE"
-            further_groups.setdefault(main.node.value, []).append((group, (merge.other,)))
+            further_groups.setdefault(main.node.value, []).append(
+                (group, (merge.other,))
+            )
 
     def find_top(node: int) -> int:
-        return reached([node], lambda node_above: [mains[node_above]] if node_above in mains else [])[-1]
+        return reached(
+            [node],
+            lambda node_above: [mains[node_above]] if node_above in mains else [],
+        )[-1]
 
     members: dict[int, list[Group]] = {}
     for body in bodies:
         own_group = [("GRNOD", (body.group,))] if body.group else []
-        members.setdefault(find_top(body.node.value), []).extend([*own_group, *further_groups.get(body.node.value, ())])
+        members.setdefault(find_top(body.node.value), []).extend(
+            [*own_group, *further_groups.get(body.node.value, ())]
+        )
     groups: dict[int, Group] = {}
     by_node: dict[int, Body] = {}
     for body in bodies:
         node = body.node.value
         if node not in mains:
             by_node[node] = body._replace(group=_unite(members[node], groups))
-    joined_to = {node: by_node[find_top(node)] for node in mains if find_top(node) in by_node}
+    joined_to = {
+        node: by_node[find_top(node)] for node in mains if find_top(node) in by_node
+    }
     return RigidBodies(tuple(by_node.values()), joined_to, groups)
 
 
-def _add_main_nodes(in_deck: Sequence[Body], last_node: Callable[[], int]) -> Iterator[Body]:
+def _add_main_nodes(
+    in_deck: Sequence[Body], last_node: Callable[[], int]
+) -> Iterator[Body]:
     """Number the main nodes that the starter makes: above all nodes, by the ids of the bodies, those of parts last."""
-    lacking = sorted((body for body in in_deck if not body.node.value), key=lambda body: (body.part, body.id))
+    lacking = sorted(
+        (body for body in in_deck if not body.node.value),
+        key=lambda body: (body.part, body.id),
+    )
     first = last_node() + 1 if lacking else 0
     numbers = {body: number for number, body in enumerate(lacking, start=first)}
     for body in in_deck:
         number = numbers.get(body)
-        yield body if number is None else body._replace(node=replace(body.node, value=number))
+        yield (
+            body
+            if number is None
+            else body._replace(node=replace(body.node, value=number))
+        )
 
 
 def _unite(members: Sequence[Group], groups: dict[int, Group]) -> int:

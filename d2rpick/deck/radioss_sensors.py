@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 
     Spans = tuple[tuple[float, float], ...]  # of time
 
-STOPS_SINCE: Final = 2023  # version of the format in whose description a sensor of time has an end
+STOPS_SINCE: Final = (
+    2023  # version of the format in whose description a sensor of time has an end
+)
 NEVER: Final = 1e20
 _OF_FORCES: Final = ("INTER", "RWALL")
 # Ties, fluids, and parts of other contacts: they push nothing that flies.
@@ -42,7 +44,12 @@ class Course(NamedTuple):
 _UNKNOWN: Final = Course()
 
 
-def active_spans(starter: Starter, number: int, course: Course = _UNKNOWN, above: tuple[int, ...] = ()) -> Spans | str:
+def active_spans(
+    starter: Starter,
+    number: int,
+    course: Course = _UNKNOWN,
+    above: tuple[int, ...] = (),
+) -> Spans | str:
     """Find when a sensor is active: spans (from, to) in order, or what cannot be followed, in words.
 
     ``above`` are sensors that ask for this one.  A sensor of time that is reset is active for one more cycle at most:
@@ -61,7 +68,9 @@ def active_spans(starter: Starter, number: int, course: Course = _UNKNOWN, above
         stop = reals(rows[1], 1)[0] if len(rows) > 1 else 0.0
         if math.isnan(delay) or math.isnan(stop):
             return f"sensor {number}, whose time is no number"
-        stop = min(stop if 0 < stop < NEVER else math.inf, course.resets.get(number, math.inf))
+        stop = min(
+            stop if 0 < stop < NEVER else math.inf, course.resets.get(number, math.inf)
+        )
         return ((max(delay, 0.0), stop),) if delay < stop else ()
     if len(rows) < 2:
         return f"sensor {number}, which names no other"
@@ -73,39 +82,64 @@ def active_spans(starter: Starter, number: int, course: Course = _UNKNOWN, above
     known = [one for one in found if not isinstance(one, str)]
     if kind == "OR":
         return either(known)
-    return inactive(either([inactive(one) for one in known]) if kind == "AND" else known[0])
+    return inactive(
+        either([inactive(one) for one in known]) if kind == "AND" else known[0]
+    )
 
 
-def _while_pushed(starter: Starter, number: int, rows: Sequence[Row], course: Course) -> Spans | str:
+def _while_pushed(
+    starter: Starter, number: int, rows: Sequence[Row], course: Course
+) -> Spans | str:
     """Follow a sensor of any force: active from the force on, or Tmin later, to Tdelay after it."""
     name = f"sensor {number} (/SENSOR/{starter.sensors[number].words[1]}), which waits for a force"
     if course.contacts is None or len(rows) < 2:
         return name
-    lowest, highest, needed = reals(Row(rows[1].block, rows[1].distance, rows[1].text[2 * _WIDTH :], _WIDTH), 3)
+    lowest, highest, needed = reals(
+        Row(rows[1].block, rows[1].distance, rows[1].text[2 * _WIDTH :], _WIDTH), 3
+    )
     wait = reals(rows[0], 1)[0]
     if not (lowest < 0 and highest == 0) or math.isnan(wait + needed):
         return f"{name} of a size that is not followed"
     if number in course.resets:
         return f"{name} and is reset"
-    return either([tuple((start + needed, end + wait) for start, end in course.contacts if end - start >= needed)])
+    return either(
+        [
+            tuple(
+                (start + needed, end + wait)
+                for start, end in course.contacts
+                if end - start >= needed
+            )
+        ]
+    )
 
 
 def waits_for_force(starter: Starter, number: int) -> bool:
     """Whether a sensor, or one that it asks for, waits for a force."""
     asked = reached([number], lambda one: _asked(starter, one))
-    return any(one in starter.sensors and starter.sensors[one].words[1] in _OF_FORCES for one in asked)
+    return any(
+        one in starter.sensors and starter.sensors[one].words[1] in _OF_FORCES
+        for one in asked
+    )
 
 
 def _asked(starter: Starter, number: int) -> Sequence[int]:
     """Sensors that another one asks for."""
     card = starter.sensors.get(number)
     rows = below_title(card) if card and card.words[1] in ("OR", "AND", "NOT") else ()
-    return [card.integer(rows[1], at).value for at in range(2)] if card and len(rows) > 1 else []
+    return (
+        [card.integer(rows[1], at).value for at in range(2)]
+        if card and len(rows) > 1
+        else []
+    )
 
 
 def only_force(starter: Starter) -> bool:
     """Whether a deck has one contact or rigid wall that pushes: then what pushes by the momenta is that."""
-    contacts = [card for card in starter.named("INTER") if card.words[1:] and card.words[1] not in WITHOUT_FORCE]
+    contacts = [
+        card
+        for card in starter.named("INTER")
+        if card.words[1:] and card.words[1] not in WITHOUT_FORCE
+    ]
     return len(contacts) + len(starter.named("RWALL")) == 1
 
 

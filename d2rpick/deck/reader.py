@@ -14,7 +14,16 @@ from typing import TYPE_CHECKING, Final
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import DeckError
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.deck.card import LONG, STANDARD, Card, Field, Problem, Row, Scope, Transform
+from d2rpick.deck.card import (
+    LONG,
+    STANDARD,
+    Card,
+    Field,
+    Problem,
+    Row,
+    Scope,
+    Transform,
+)
 from d2rpick.deck.source import Block, SourceFile
 
 if TYPE_CHECKING:
@@ -65,21 +74,37 @@ def _names(card: Card) -> Iterator[tuple[Field, list[Row]]]:
         text = first.text.rstrip()
         while text.endswith(_CONTINUED) and waiting:
             text = text.removesuffix(_CONTINUED).rstrip() + waiting.pop(0).text.strip()
-        yield first.field(0)._replace(text=card.scope.text(text.strip().strip('"'))), waiting
+        yield (
+            first.field(0)._replace(text=card.scope.text(text.strip().strip('"'))),
+            waiting,
+        )
 
 
 def _transform(card: Card, rows: list[Row]) -> tuple[Transform, tuple[Problem, ...]]:
     """Numbers of ``*INCLUDE_TRANSFORM``; a row left out, a blank and a factor 0 mean no change."""
     places = ((0, 0), (0, 2), (0, 3), (0, 4), (1, 0))
-    offsets = [card.integer(rows[row], position) if row < len(rows) else None for row, position in places]
-    factors = [card.real(rows[2], at, 1.0) for at in range(_FACTORS)] if len(rows) > 2 else []
+    offsets = [
+        card.integer(rows[row], position) if row < len(rows) else None
+        for row, position in places
+    ]
+    factors = (
+        [card.real(rows[2], at, 1.0) for at in range(_FACTORS)] if len(rows) > 2 else []
+    )
     factor = factors[_OF_TIME] if factors else None
-    node, part, material, set_, rest = (value.value if value else 0 for value in offsets)
+    node, part, material, set_, rest = (
+        value.value if value else 0 for value in offsets
+    )
     time = (factor.value if factor else 0.0) or 1.0
-    problems = tuple((value.field, value.problem) for value in (*offsets, factor) if value and value.problem)
+    problems = tuple(
+        (value.field, value.problem)
+        for value in (*offsets, factor)
+        if value and value.problem
+    )
     scaled = any(one.value not in (0.0, 1.0) for one in factors)
     turn = card.integer(rows[3], 0) if len(rows) > 3 else None
-    moved = turn is not None and (bool(turn.problem) or turn.value != 0)  # what cannot be read may move them
+    moved = turn is not None and (
+        bool(turn.problem) or turn.value != 0
+    )  # what cannot be read may move them
     return Transform(node, part, material, set_, rest, time, scaled, moved), problems
 
 
@@ -94,15 +119,41 @@ def _portable(name: str) -> str:
 
 
 _KEPT: Final = (
-    *("DEFORMABLE_TO_RIGID", "RIGID_DEFORMABLE", "CONTROL_TERMINATION", "DATABASE_GLSTAT", "DATABASE_MATSUM"),
-    *("PART", "SET_PART", "MAT_", "ELEMENT_", "SECTION_", "NODE", "CONTACT_", "RIGIDWALL_"),
-    *("SET_NODE", "CONSTRAINED_", "DATABASE_HISTORY_NODE", "BOUNDARY_SPC", "BOUNDARY_PRESCRIBED_MOTION"),
+    *(
+        "DEFORMABLE_TO_RIGID",
+        "RIGID_DEFORMABLE",
+        "CONTROL_TERMINATION",
+        "DATABASE_GLSTAT",
+        "DATABASE_MATSUM",
+    ),
+    *(
+        "PART",
+        "SET_PART",
+        "MAT_",
+        "ELEMENT_",
+        "SECTION_",
+        "NODE",
+        "CONTACT_",
+        "RIGIDWALL_",
+    ),
+    *(
+        "SET_NODE",
+        "CONSTRAINED_",
+        "DATABASE_HISTORY_NODE",
+        "BOUNDARY_SPC",
+        "BOUNDARY_PRESCRIBED_MOTION",
+    ),
     *("LOAD_", "AIRBAG_", "INITIAL_VELOCITY", "DEFINE_CURVE", "SENSOR_CONTROL"),
 )
 _READ_INCLUDES: Final = ("INCLUDE", "INCLUDE_TRANSFORM")
-_PATHS: Final = ("INCLUDE_PATH", "INCLUDE_PATH_RELATIVE")  # both relative to the folder of the main deck
+_PATHS: Final = (
+    "INCLUDE_PATH",
+    "INCLUDE_PATH_RELATIVE",
+)  # both relative to the folder of the main deck
 _LONG: Final = r"\bLONG\s*=\s*([YSK])"  # compiled where it is needed
-SWITCHING: Final = re.compile(r"\*\s*(DEFORMABLE|RIGID.DEFORMABLE)", re.IGNORECASE)  # keywords meant to switch
+SWITCHING: Final = re.compile(
+    r"\*\s*(DEFORMABLE|RIGID.DEFORMABLE)", re.IGNORECASE
+)  # keywords meant to switch
 _SUFFIXES: Final = "+-%"
 _DEEPEST = 60  # includes in includes
 _MOST_FILES = 10_000
@@ -161,7 +212,11 @@ class Deck:
     @property
     def silencing(self) -> list[Card]:
         """Cards before which a comment silences rules."""
-        return [card for card in self._all if card.block.source.silences and card.block.silenced]
+        return [
+            card
+            for card in self._all
+            if card.block.source.silences and card.block.silenced
+        ]
 
     @property
     def _all(self) -> list[Card]:
@@ -180,7 +235,9 @@ class Deck:
 @lru_cache(1024)  # decks use the same keywords
 def _stems(name: str) -> tuple[str, ...]:
     """Give a name, and what stands there before an ``_``."""
-    return tuple(name[:at] for at in range(len(name), 0, -1) if name[at : at + 1] in ("", "_"))
+    return tuple(
+        name[:at] for at in range(len(name), 0, -1) if name[at : at + 1] in ("", "_")
+    )
 
 
 def read_deck(path: str, content: bytes | SourceFile | None = None) -> Deck:
@@ -208,11 +265,16 @@ def read_deck(path: str, content: bytes | SourceFile | None = None) -> Deck:
     main = content if isinstance(content, SourceFile) else SourceFile(path, content)
     if next(main.blocks(), None) is None:
         if main.marks:
-            found, wanted = "only *END was found, no keyword before it", "*KEYWORD and the cards"
+            found, wanted = (
+                "only *END was found, no keyword before it",
+                "*KEYWORD and the cards",
+            )
         else:
             found = "no keyword was found"
             wanted = "an LS-DYNA deck (lines that begin with *) or a file of a Radioss run (/BEGIN, /RUN)"
-        raise DeckError(f"{path}: {found}; {wanted} {'were' if main.marks else 'was'} expected")
+        raise DeckError(
+            f"{path}: {found}; {wanted} {'were' if main.marks else 'was'} expected"
+        )
     _Reader(deck).read(main, _Context(deck.scope))
     return deck
 
@@ -230,7 +292,9 @@ class _Reader:
     def __init__(self, deck: Deck) -> None:
         self.deck = deck
         self.folders: list[Path] = []  # those of *INCLUDE_PATH, in order
-        self.sources: dict[str, SourceFile] = {}  # by path: a file that is included twice is the same each time
+        self.sources: dict[
+            str, SourceFile
+        ] = {}  # by path: a file that is included twice is the same each time
 
     def read(self, source: SourceFile, context: _Context) -> None:
         self.deck.sources.append(source)
@@ -245,22 +309,37 @@ class _Reader:
                 self.deck.encrypted.append(block)
                 continue
             name, suffix = _keyword(block.head)
-            if name == "KEYWORD" and "=" in block.head and (found := re.search(_LONG, block.head, re.IGNORECASE)):
+            if (
+                name == "KEYWORD"
+                and "=" in block.head
+                and (found := re.search(_LONG, block.head, re.IGNORECASE))
+            ):
                 width = LONG if found[1].upper() == "Y" else STANDARD
                 if not context.chain:
                     self.deck.long = width == LONG
             own = LONG if "+" in suffix else STANDARD if "-" in suffix else width
-            self.take(Card(name, block, context.scope.as_of_now(), own, context.transform), context, width)
+            self.take(
+                Card(name, block, context.scope.as_of_now(), own, context.transform),
+                context,
+                width,
+            )
 
     def take(self, card: Card, context: _Context, width: int) -> None:
         """Keep a card, or do what it asks the reader to do."""
         if card.name.startswith("COMMENT"):
-            if re.search(r"\*(DEFORMABLE_TO_RIGID|RIGID_DEFORMABLE)", card.block.head, re.IGNORECASE):
+            if re.search(
+                r"\*(DEFORMABLE_TO_RIGID|RIGID_DEFORMABLE)",
+                card.block.head,
+                re.IGNORECASE,
+            ):
                 self.deck.disabled.append(card)
         elif card.name.startswith("PARAMETER"):
             context.scope.define(card.name, card.rows)
         elif card.name in _PATHS:
-            self.folders += [_folder(self.deck.path) / _portable(name.text) for name, _ in _names(card)]
+            self.folders += [
+                _folder(self.deck.path) / _portable(name.text)
+                for name, _ in _names(card)
+            ]
         elif card.name.startswith("INCLUDE"):
             self.deck.included.append(card)
             self.include(card, context, width)
@@ -280,7 +359,10 @@ class _Reader:
             elif path is not None:
                 if path not in self.sources:
                     self.sources[path] = SourceFile(path)
-                self.read(self.sources[path], _Context(Scope(context.scope), width, transform, chain))
+                self.read(
+                    self.sources[path],
+                    _Context(Scope(context.scope), width, transform, chain),
+                )
 
     def find(self, name: Field) -> str | None:
         """Path of an include as messages should show it, or None.
@@ -290,7 +372,11 @@ class _Reader:
         """
         for folder in (_folder(self.deck.path), *self.folders, _folder(name.file)):
             # the last has the bytes taken as the file system takes them, not as Latin-1
-            for spelling in (name.text, _portable(name.text), os.fsdecode(name.text.encode("latin-1", "replace"))):
+            for spelling in (
+                name.text,
+                _portable(name.text),
+                os.fsdecode(name.text.encode("latin-1", "replace")),
+            ):
                 path = str(folder / spelling)
                 if spelling and os.path.isfile(path):  # noqa: PTH113 - Path.is_file raises on names too long
                     return path
@@ -384,7 +470,11 @@ def _is_whole(block: Block) -> bool:
     if last.startswith(("$", "#") if block.head.startswith("/") else "$"):
         return True
     first = block.head[1:].split("/")[0].strip().upper()
-    return block.head.startswith("/") and not above and not any(name.startswith(first) for name in _WITH_VALUES)
+    return (
+        block.head.startswith("/")
+        and not above
+        and not any(name.startswith(first) for name in _WITH_VALUES)
+    )
 
 
 def _sign_of_cut(block: Block, *, main: bool) -> str:

@@ -47,14 +47,26 @@ def join_restarts(main: Deck, restarts: Sequence[str]) -> Deck:
     DeckError
         If a restart cannot be read.
     """
-    legs = sorted(map(read_deck, restarts), key=lambda deck: end.value if (end := _find_end(deck)) else float("inf"))
+    legs = sorted(
+        map(read_deck, restarts),
+        key=lambda deck: end.value if (end := _find_end(deck)) else float("inf"),
+    )
     ends = [_find_end(deck) for deck in (main, *legs)]
     known_ends = [end.value for end in ends if end]
     # the end of the last run is that of no other: it may be unknown
     timed = all(ends[:-1]) and all(one < other for one, other in pairwise(known_ends))
     run = Deck(main.path, scope=main.scope, long=main.long)
     for deck, end in zip((main, *legs), [None, *ends[:-1]], strict=True):
-        for name in ("cards", "disabled", "encrypted", "included", "unread", "problems", "sources", "ends"):
+        for name in (
+            "cards",
+            "disabled",
+            "encrypted",
+            "included",
+            "unread",
+            "problems",
+            "sources",
+            "ends",
+        ):
             getattr(run, name).extend(getattr(deck, name))
         if end and timed:
             run.restarts |= dict.fromkeys(deck.files, Restart(end.value, end.field))
@@ -63,6 +75,8 @@ def join_restarts(main: Deck, restarts: Sequence[str]) -> Deck:
 
 def _find_end(deck: Deck) -> Value[float] | None:
     """Give the ENDTIM of a deck; None for none above 0."""
-    rows = [(card, card.rows[0]) for card in deck.named("CONTROL_TERMINATION") if card.rows]
+    rows = [
+        (card, card.rows[0]) for card in deck.named("CONTROL_TERMINATION") if card.rows
+    ]
     found = rows[-1][0].real(rows[-1][1], 0) if rows else None
     return found if found and not found.problem and found.value > 0 else None

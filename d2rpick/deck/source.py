@@ -21,17 +21,25 @@ if TYPE_CHECKING:
     from d2rpick.deck.stored import OnDisk
 
 
-_SEARCHED: Final = 3 << 18  # bytes looked at together: they stay in the cache, always in the same place
+_SEARCHED: Final = (
+    3 << 18
+)  # bytes looked at together: they stay in the cache, always in the same place
 _HELPERS: Final = 1  # threads beside the first: the system copies bytes for all at once, but one at a time searches
 _ALONE: Final = 4  # pieces that one thread searches before another one would have begun
 _LOOKBACK: Final = 32  # bytes in front of a piece, where blanks before its first mark stand, or a head that it cuts
 _PGP: Final = b"-----BEGIN PGP MESSAGE"
-_ANCHOR: Final = _PGP.index(b"G")  # a letter that mesh data never holds: looking for it alone costs nothing
+_ANCHOR: Final = _PGP.index(
+    b"G"
+)  # a letter that mesh data never holds: looking for it alone costs nothing
 BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"  # of UTF-8
 
 
 def find_marks(
-    file: Held | OnDisk, piece: int = _SEARCHED, *, alone: int = _ALONE, helpers: int = _HELPERS
+    file: Held | OnDisk,
+    piece: int = _SEARCHED,
+    *,
+    alone: int = _ALONE,
+    helpers: int = _HELPERS,
 ) -> Sequence[int]:
     """Offsets of the ``*`` that begin a line (blanks before it allowed) and of encrypted blocks, ascending.
 
@@ -52,18 +60,28 @@ class _Search:
 
     def __init__(self, file: Held | OnDisk, piece: int) -> None:
         self._file, self._piece = file, piece
-        self._first = len(BYTE_ORDER_MARK) if file.read(0, len(BYTE_ORDER_MARK)) == BYTE_ORDER_MARK else 0
+        self._first = (
+            len(BYTE_ORDER_MARK)
+            if file.read(0, len(BYTE_ORDER_MARK)) == BYTE_ORDER_MARK
+            else 0
+        )
         self.pieces = range(self._first, file.size, piece)
-        self._room: Callable[[Iterable[int]], MutableSequence[int]] = list if len(self.pieces) == 1 else _compact
+        self._room: Callable[[Iterable[int]], MutableSequence[int]] = (
+            list if len(self.pieces) == 1 else _compact
+        )
         self._waiting: Iterator[int] = iter(self.pieces)
         self._found: dict[int, Sequence[int]] = {}
-        self._helping: list[_thread.LockType] = []  # each is released by its thread in the end
+        self._helping: list[
+            _thread.LockType
+        ] = []  # each is released by its thread in the end
 
     def call_for_help(self) -> None:
         """Have a thread begin beside this one, which does not wait until it runs."""
         helping = _thread.allocate_lock()
         helping.acquire()
-        with suppress(RuntimeError):  # there may be no more threads: then there is no help
+        with suppress(
+            RuntimeError
+        ):  # there may be no more threads: then there is no help
             _thread.start_new_thread(self._help, (helping,))
             self._helping.append(helping)
 
@@ -83,9 +101,17 @@ class _Search:
             while (begin := next(self._waiting, None)) is not None:
                 low = max(self._first, begin - _LOOKBACK)
                 size = fill(piece, low, min(begin + self._piece, self._file.size))
-                places = _starred(piece, begin - low, size) + _encrypted(piece, begin - low, size)
-                found[begin] = self._room([low + place for place in sorted(places)]) if places else ()
-        self._found |= found  # not before: only now it is sure that the file did not change
+                places = _starred(piece, begin - low, size) + _encrypted(
+                    piece, begin - low, size
+                )
+                found[begin] = (
+                    self._room([low + place for place in sorted(places)])
+                    if places
+                    else ()
+                )
+        self._found |= (
+            found  # not before: only now it is sure that the file did not change
+        )
 
     def stop(self) -> None:
         """Let nothing wait, so that no other thread goes on where this one was interrupted, and wait for those."""
@@ -105,7 +131,9 @@ class _Search:
 
 
 def _compact(places: Iterable[int]) -> MutableSequence[int]:
-    from array import array  # not above: most files are small, and a list of few is as good
+    from array import (
+        array,
+    )  # not above: most files are small, and a list of few is as good
 
     return array("q", places)
 
@@ -139,7 +167,9 @@ def _encrypted(piece: bytearray, first: int, end: int) -> list[int]:
 
 
 _PIECE: Final = 4 << 20  # bytes of whole lines that are looked at together
-_COUNTED: Final = 16  # line ends are counted in this part of a piece, which stays in the cache
+_COUNTED: Final = (
+    16  # line ends are counted in this part of a piece, which stays in the cache
+)
 _GZIP: Final = b"\x1f\x8b\x08"
 _FIRST: Final = 1 << 16  # bytes in which the first line end is looked for
 _HEAD: Final = 1024  # longest keyword line that is looked at
@@ -160,10 +190,23 @@ class SourceFile:
         If it cannot be opened; from any method, if the file was rewritten or replaced since then.
     """
 
-    def __init__(self, name: str, content: bytes | Held | OnDisk | None = None, piece: int = _PIECE) -> None:
+    def __init__(
+        self,
+        name: str,
+        content: bytes | Held | OnDisk | None = None,
+        piece: int = _PIECE,
+    ) -> None:
         self.name, self._piece = name, piece
-        self._file = stored(name) if content is None else Held(content) if isinstance(content, bytes) else content
-        self._counted = [(0, 1)]  # (offset, number of the line that holds it), ascending
+        self._file = (
+            stored(name)
+            if content is None
+            else Held(content)
+            if isinstance(content, bytes)
+            else content
+        )
+        self._counted = [
+            (0, 1)
+        ]  # (offset, number of the line that holds it), ascending
         self._longest = bound("LINE")
 
     @cached_property
@@ -171,15 +214,24 @@ class SourceFile:
         """Offsets of all keywords and encrypted blocks; DeckError for a file that no reader of decks would take."""
         first = self.read(0, _FIRST)
         if first.startswith(_GZIP):
-            raise DeckError(f"{self.name}: compressed with gzip, a deck as its solver reads it was expected; unpack it")
+            raise DeckError(
+                f"{self.name}: compressed with gzip, a deck as its solver reads it was expected; unpack it"
+            )
         if b"\r" in first and b"\n" not in first:
-            raise DeckError(f"{self.name}: lines end in CR alone, line ends LF or CR LF were expected")
+            raise DeckError(
+                f"{self.name}: lines end in CR alone, line ends LF or CR LF were expected"
+            )
         return find_marks(self._file)
 
     def blocks(self) -> Iterator[Block]:
         """Keyword blocks and encrypted blocks in the order of the file, up to ``*END``."""
         for start, end in zip_longest(self.marks, islice(self.marks, 1, None)):
-            head = self.read(start, start + _HEAD).partition(b"\n")[0].rstrip(b"\r").decode("latin-1")
+            head = (
+                self.read(start, start + _HEAD)
+                .partition(b"\n")[0]
+                .rstrip(b"\r")
+                .decode("latin-1")
+            )
             if head.upper().startswith("*END") and not head[4:5].strip():
                 return
             yield Block(self, start, end, head)
@@ -211,7 +263,9 @@ class SourceFile:
 
     def _refuse_long_line(self, data: bytes, start: int) -> None:
         if len(data) > self._longest and (at := long_line(data, self._longest)) >= 0:
-            raise DeckError(f"{self.name}:{self.line_at(start + at)}: the line has {beyond('LINE')}")
+            raise DeckError(
+                f"{self.name}:{self.line_at(start + at)}: the line has {beyond('LINE')}"
+            )
 
     def sha256(self) -> str:
         """SHA-256 of the bytes; DeckError where the file was rewritten since it was read."""
@@ -276,10 +330,16 @@ class Block:
         """Read the data lines, with their distance to the keyword, without comments."""
         comment = self._comment
         *lines, rest = self.source.text(self.start, self.end).split("\n")
-        if rest and self.end is None:  # otherwise these are the blanks in front of the next keyword
+        if (
+            rest and self.end is None
+        ):  # otherwise these are the blanks in front of the next keyword
             lines.append(rest)
         found = enumerate(lines[1:], start=1)
-        return [(distance, line.rstrip("\r")) for distance, line in found if not line.startswith(comment)]
+        return [
+            (distance, line.rstrip("\r"))
+            for distance, line in found
+            if not line.startswith(comment)
+        ]
 
     @cached_property
     def silenced(self) -> tuple[str, ...]:
@@ -287,8 +347,12 @@ class Block:
 
         Only what stands directly behind it counts, so that a reason may follow; a word that is no id is given too.
         """
-        above = self.source.read(max(0, self.start - _BEFORE), self.start).removeprefix(BYTE_ORDER_MARK)
-        lines = above.decode("latin-1").split("\n")[:-1]  # without the blanks in front of the keyword
+        above = self.source.read(max(0, self.start - _BEFORE), self.start).removeprefix(
+            BYTE_ORDER_MARK
+        )
+        lines = above.decode("latin-1").split("\n")[
+            :-1
+        ]  # without the blanks in front of the keyword
         rules: list[str] = []
         while lines and (line := lines.pop()).startswith(self._comment):
             if found := re.match(_SILENCE, line, re.IGNORECASE):

@@ -19,12 +19,20 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from io import FileIO
 
-    Filling = Callable[[bytearray, int, int], int]  # puts the bytes from one place to another first, and counts them
+    Filling = Callable[
+        [bytearray, int, int], int
+    ]  # puts the bytes from one place to another first, and counts them
 
 
-HELD_UP_TO: Final = 1 << 18  # a file up to this size is held in memory: a deck may have thousands of them
-_WINDOW: Final = 1 << 16  # bytes read at a time where few are wanted: more will be, close to them
-_KEPT: Final = 8  # windows held: the ends of a deck's large blocks are looked at again and again
+HELD_UP_TO: Final = (
+    1 << 18
+)  # a file up to this size is held in memory: a deck may have thousands of them
+_WINDOW: Final = (
+    1 << 16
+)  # bytes read at a time where few are wanted: more will be, close to them
+_KEPT: Final = (
+    8  # windows held: the ends of a deck's large blocks are looked at again and again
+)
 
 
 class Held:
@@ -68,7 +76,9 @@ class OnDisk:
             return self._read(begin, end)
         low = begin // self._window * self._window
         if end > low + len(window := self._windows.get(low, b"")):
-            window = self._read(low, min(-(-end // self._window) * self._window, self.size))
+            window = self._read(
+                low, min(-(-end // self._window) * self._window, self.size)
+            )
             self._windows[low] = window
             if len(self._windows) > _KEPT:
                 del self._windows[next(iter(self._windows))]
@@ -130,7 +140,11 @@ def _opened(name: str) -> FileIO:
     try:
         return open(name, "rb", buffering=0)  # noqa: PTH123  start-up; it is given back
     except FileNotFoundError:
-        raise DeckError(f"{name}: no such file; check the name and the folder") from None
+        raise DeckError(
+            f"{name}: no such file; check the name and the folder"
+        ) from None
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
         reason = getattr(error, "strerror", None) or error
-        raise DeckError(f"{name}: cannot be read ({reason}); check the name and the permissions") from None
+        raise DeckError(
+            f"{name}: cannot be read ({reason}); check the name and the permissions"
+        ) from None

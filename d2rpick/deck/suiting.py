@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.deck.ls_dyna_parts import Constraint, element_cards, read_constraints, read_parts
+from d2rpick.deck.ls_dyna_parts import (
+    Constraint,
+    element_cards,
+    read_constraints,
+    read_parts,
+)
 from d2rpick.deck.radioss_files import root_of, run_files
 from d2rpick.deck.radioss_run import Run, in_order, read_run
 from d2rpick.deck.reader import Deck, read_deck
@@ -44,7 +49,9 @@ def find_suiting(path: str, parts: Collection[int]) -> Suiting:
         run = read_run(path)
         legs = run.legs
         has_end = bool(legs) and in_order(legs) and not legs[-1].sensor
-        return Suiting("radioss", find_name_of_files(run), legs[-1].stop.value if has_end else None)
+        return Suiting(
+            "radioss", find_name_of_files(run), legs[-1].stop.value if has_end else None
+        )
     deck = read_deck(path)
     bodies = [*read_constraints(deck, "nodal rigid body")]
     further = [*read_constraints(deck, "extra nodes", "joint")]
@@ -67,7 +74,9 @@ def _find_free_ids(deck: Deck) -> tuple[int, int]:
     return first, first + 1
 
 
-def _lie_on(constraints: Sequence[Constraint], parts: Collection[int], deck: Deck) -> bool:
+def _lie_on(
+    constraints: Sequence[Constraint], parts: Collection[int], deck: Deck
+) -> bool:
     """Whether there are constraints, and each lies on these parts alone: to delete them is to delete all of a kind."""
     if not constraints:
         return False
@@ -77,6 +86,7 @@ def _lie_on(constraints: Sequence[Constraint], parts: Collection[int], deck: Dec
     rest = read_parts(deck).materials.keys() - set(parts)
     touching, beyond = first_parts(cards, parts), first_parts(cards, rest)
     return all(
-        constraint.part in parts or (constraint.nodes & touching.keys() and not constraint.nodes & beyond.keys())
+        constraint.part in parts
+        or (constraint.nodes & touching.keys() and not constraint.nodes & beyond.keys())
         for constraint in constraints
     )

@@ -12,15 +12,22 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.printed_card import Printing
 
-_SET_HEAD = "$#   swset      code     time1     time2     time3     entno     relsw    paired"
+_SET_HEAD = (
+    "$#   swset      code     time1     time2     time3     entno     relsw    paired"
+)
 _COUNT_HEAD = "$#    nrbf      ncsf       rwf     dtmax       d2r       r2d    offset"
 
 
-def to_rigid(ids: Sequence[int], printing: Printing, part_sets: PartSets = NO_SETS) -> Iterator[str]:
+def to_rigid(
+    ids: Sequence[int], printing: Printing, part_sets: PartSets = NO_SETS
+) -> Iterator[str]:
     """Write the parts that become rigid, those that lead first, or the sets that they make up."""
     yield "$#     pid       lrb     ptype"
     for lead, some in group_by_lead(ids, printing).items():
-        yield from (f"{name:10d}{lead:10d}{kind:>10}" for name, kind in name_parts(some, part_sets))
+        yield from (
+            f"{name:10d}{lead:10d}{kind:>10}"
+            for name, kind in name_parts(some, part_sets)
+        )
 
 
 def to_deformable(ids: Sequence[int], part_sets: PartSets = NO_SETS) -> Iterator[str]:

@@ -36,12 +36,30 @@ _KINDS: Final[dict[str, Kind]] = {
     "RIGID_DEFORMABLE_R2D": "restart",
 }
 _HEADER_ROWS = 2
-_FIRST_LINE = (int, int, float, float, float, int, int, int)  # how the fields of a header are read
+_FIRST_LINE = (
+    int,
+    int,
+    float,
+    float,
+    float,
+    int,
+    int,
+    int,
+)  # how the fields of a header are read
 _SECOND_LINE = (int, int, float, float, int, int, float)
 _COUNTS_FIELD = 4  # of the second line: D2R
 _PTYPES: Final = {"PART", "PSET"}
-_INERTIA_ROWS: Final = ("the first line (PID)", "the second line (XC to TM)", "the third line (IXX to IZZ)")
-_REALS: Final = {"automatic": (4, 0), "inertia": (4, 6), "restart": (0, 0), "plain": (0, 0)}
+_INERTIA_ROWS: Final = (
+    "the first line (PID)",
+    "the second line (XC to TM)",
+    "the third line (IXX to IZZ)",
+)
+_REALS: Final = {
+    "automatic": (4, 0),
+    "inertia": (4, 6),
+    "restart": (0, 0),
+    "plain": (0, 0),
+}
 
 
 class Switched(NamedTuple):
@@ -88,7 +106,9 @@ class SwitchSet:
     values: tuple[Value[int] | Value[float] | Value[str], ...]
     count_problem: str = ""
     part: Value[int] | None = None  # of *DEFORMABLE_TO_RIGID_INERTIA
-    restart: Restart | None = None  # in which it stands, where it is known when that begins
+    restart: Restart | None = (
+        None  # in which it stands, where it is known when that begins
+    )
 
     @cached_property
     def time(self) -> float | None:
@@ -98,7 +118,12 @@ class SwitchSet:
         if self.kind == "plain":
             return 0.0
         header = self.header
-        if header is None or header.code.problem or header.time1.problem or header.code.value != BY_TIME:
+        if (
+            header is None
+            or header.code.problem
+            or header.time1.problem
+            or header.code.value != BY_TIME
+        ):
             return None
         return header.time1.value * self.card.transform.time
 
@@ -117,14 +142,18 @@ class SwitchSet:
     @property
     def parameters(self) -> tuple[str, ...]:
         """Parameters the card uses."""
-        return tuple(dict.fromkeys(name for value in self.values for name in value.parameters))
+        return tuple(
+            dict.fromkeys(name for value in self.values for name in value.parameters)
+        )
 
 
 def read_switching(deck: Deck) -> tuple[SwitchSet, ...]:
     """Return all switching cards of a deck, in reading order."""
     kinds = ((card, _KINDS.get(card.name)) for card in deck.cards)
     return tuple(
-        _automatic(card) if kind == "automatic" else _simple(card, kind, deck.restarts.get(card.file))
+        _automatic(card)
+        if kind == "automatic"
+        else _simple(card, kind, deck.restarts.get(card.file))
         for card, kind in kinds
         if kind is not None
     )
@@ -145,10 +174,20 @@ def _simple(card: Card, kind: Kind, restart: Restart | None) -> SwitchSet:
     rows = card.lines
     if kind == "inertia":
         part = [_moved(card.integer(rows[0], 0), card.transform.part)] if rows else []
-        reals = [card.real(row, at) for row, count in zip(rows[1:], _REALS[kind], strict=False) for at in range(count)]
+        reals = [
+            card.real(row, at)
+            for row, count in zip(rows[1:], _REALS[kind], strict=False)
+            for at in range(count)
+        ]
         missing = _INERTIA_ROWS[len(rows) :]
-        problem = f"{' and '.join(missing)} {'are' if len(missing) > 1 else 'is'} missing" if missing else ""
-        return SwitchSet(card, kind, None, (), (*part, *reals), problem, next(iter(part), None))
+        problem = (
+            f"{' and '.join(missing)} {'are' if len(missing) > 1 else 'is'} missing"
+            if missing
+            else ""
+        )
+        return SwitchSet(
+            card, kind, None, (), (*part, *reals), problem, next(iter(part), None)
+        )
     if card.name.endswith("_CONTROL"):
         values = [card.real(row, at) for row in rows[:1] for at in range(4)]
         return SwitchSet(card, kind, None, (), tuple(values), restart=restart)
@@ -170,26 +209,39 @@ def _automatic(card: Card) -> SwitchSet:
     rigid, deformable = header.to_rigid.value, header.to_deformable.value
     problem = ""
     if rigid < 0 or deformable < 0:
-        problem = f"D2R is {rigid} and R2D is {deformable}, counts from 0 on were expected"
+        problem = (
+            f"D2R is {rigid} and R2D is {deformable}, counts from 0 on were expected"
+        )
     elif len(lines) != rigid + deformable:
         problem = f"D2R is {rigid} and R2D is {deformable}, but {_lines(len(lines))} of parts follow"
         problem += "" if lines else ": the third line, with the first part, is missing"
     elif not lines:
-        short = sum(bool(rows[1].cell(at)) for at in range(_COUNTS_FIELD + 1)) <= _COUNTS_FIELD
+        short = (
+            sum(bool(rows[1].cell(at)) for at in range(_COUNTS_FIELD + 1))
+            <= _COUNTS_FIELD
+        )
         lost = "; is the second line (NRBF to OFFSET) missing?" if short else ""
         problem = f"D2R and R2D are 0, so the card switches nothing{lost}"
     elif any(row.blank for row in lines):
         problem = "a line is empty where a part was expected"
     rigid, deformable = max(rigid, 0), max(deformable, 0)
-    switched = [_line(card, row, to_rigid=True, ptype=True) for row in lines[:rigid] if not row.blank]
+    switched = [
+        _line(card, row, to_rigid=True, ptype=True)
+        for row in lines[:rigid]
+        if not row.blank
+    ]
     back = lines[rigid : rigid + deformable]
-    switched += [_line(card, row, to_rigid=False, ptype=True) for row in back if not row.blank]
+    switched += [
+        _line(card, row, to_rigid=False, ptype=True) for row in back if not row.blank
+    ]
     return _with(card, "automatic", header, switched, problem)
 
 
 def _missing(rows: Sequence[Row]) -> str:
     """Say which of the two first lines are missing: they are, too, where a line of a part stands in their place."""
-    both = "the first line (SWSET to PAIRED) and the second (NRBF to OFFSET) are missing"
+    both = (
+        "the first line (SWSET to PAIRED) and the second (NRBF to OFFSET) are missing"
+    )
     if not rows:
         return both
     if _is_of_part(rows[0]):
@@ -213,9 +265,17 @@ def _header(card: Card, first: Row, second: Row) -> Header:
     values = card.numbers(first, _FIRST_LINE) + card.numbers(second, _SECOND_LINE)
     swset, code, time1, time2, time3, entno, relsw, *others = values
     if not code.problem and not BY_TIME <= code.value <= BY_SENSOR:
-        code = replace(code, problem=f"CODE is {code.value}, {BY_TIME} to {BY_SENSOR} was expected", parameters=())
+        code = replace(
+            code,
+            problem=f"CODE is {code.value}, {BY_TIME} to {BY_SENSOR} was expected",
+            parameters=(),
+        )
     if not swset.problem and swset.value <= 0:
-        swset = replace(swset, problem=f"SWSET is {swset.value}, a positive number was expected", parameters=())
+        swset = replace(
+            swset,
+            problem=f"SWSET is {swset.value}, a positive number was expected",
+            parameters=(),
+        )
     if code.value == BY_TIME and not time1.problem and _runs_over(first):
         problem = f"TIME1 runs over its columns into TIME2 ({time1.field.text} and {first.cell(3)})"
         time1 = replace(time1, problem=problem, parameters=())
@@ -227,8 +287,13 @@ def _runs_over(row: Row) -> bool:
     """Whether digits of TIME1 seem to go on as TIME2: a number of its own that fills its field has a point."""
     border = 3 * row.width
     rest = row.text[border : border + row.width].strip()
-    touching = row.text[border - 1 : border].isdigit() and row.text[border : border + 1].isdigit()
-    return touching and "," not in row.text and "." not in rest and rest.strip("0") != ""
+    touching = (
+        row.text[border - 1 : border].isdigit()
+        and row.text[border : border + 1].isdigit()
+    )
+    return (
+        touching and "," not in row.text and "." not in rest and rest.strip("0") != ""
+    )
 
 
 _Line = tuple[Switched, Value[str]]
@@ -236,27 +301,62 @@ _Line = tuple[Switched, Value[str]]
 
 def _line(card: Card, row: Row, *, to_rigid: bool, ptype: bool) -> _Line:
     """Part, LRB where the line has it, and PTYPE: column 21 of a D2R line, column 11 of an R2D line."""
-    kind = card.word(row, 2 if to_rigid else 1, "PART") if ptype else Value("PART", card.here)
+    kind = (
+        card.word(row, 2 if to_rigid else 1, "PART")
+        if ptype
+        else Value("PART", card.here)
+    )
     if kind.value not in _PTYPES:
-        kind = Value("PART", kind.field, f"PTYPE is {kind.field.text!r}, PART or PSET was expected")
+        kind = Value(
+            "PART",
+            kind.field,
+            f"PTYPE is {kind.field.text!r}, PART or PSET was expected",
+        )
     by_set = kind.value == "PSET"
-    part = _moved(card.integer(row, 0), card.transform.set_ if by_set else card.transform.part)
+    part = _moved(
+        card.integer(row, 0), card.transform.set_ if by_set else card.transform.part
+    )
     if not part.problem and part.value <= 0:
-        part = Value(0, part.field, f"{part.field.text!r} is not a part id; a positive number was expected")
+        part = Value(
+            0,
+            part.field,
+            f"{part.field.text!r} is not a part id; a positive number was expected",
+        )
     lead = _moved(card.integer(row, 1), card.transform.part) if to_rigid else None
     return Switched(part, by_set, to_rigid, lead), kind
 
 
 def _moved(value: Value[int], offset: int) -> Value[int]:
     """Add the offset of the include to an id; 0 stays none."""
-    return value if value.problem or not value.value or not offset else replace(value, value=value.value + offset)
+    return (
+        value
+        if value.problem or not value.value or not offset
+        else replace(value, value=value.value + offset)
+    )
 
 
-def _with(card: Card, kind: Kind, header: Header | None, lines: Sequence[_Line], count_problem: str = "") -> SwitchSet:
+def _with(
+    card: Card,
+    kind: Kind,
+    header: Header | None,
+    lines: Sequence[_Line],
+    count_problem: str = "",
+) -> SwitchSet:
     values: list[Value[int] | Value[float] | Value[str]] = list(header or ())
     for switched, ptype in lines:
-        values += [switched.part, ptype] if switched.lead is None else [switched.part, switched.lead, ptype]
-    return SwitchSet(card, kind, header, tuple(line for line, _ in lines), tuple(values), count_problem)
+        values += (
+            [switched.part, ptype]
+            if switched.lead is None
+            else [switched.part, switched.lead, ptype]
+        )
+    return SwitchSet(
+        card,
+        kind,
+        header,
+        tuple(line for line, _ in lines),
+        tuple(values),
+        count_problem,
+    )
 
 
 # Windows.
@@ -335,14 +435,20 @@ def find_windows(sets: Iterable[SwitchSet], parts: Parts) -> Windows:
     orphans: list[Event] = []
     for unit in sorted(timed):
         # at equal times the way back counts as the earlier one: both at once is no window
-        found, left = follow(unit, sorted(timed[unit], key=lambda timed: (timed[0], timed[1].line.to_rigid)))
+        found, left = follow(
+            unit,
+            sorted(timed[unit], key=lambda timed: (timed[0], timed[1].line.to_rigid)),
+        )
         if left and found and found[-1].td is None:
             td, closed = left.pop()
             found[-1] = found[-1]._replace(td=td, closed=closed)
         windows += found
         orphans += [event for _, event in left]
     other = [event for event in events if event.by.time is None]
-    rigid, back = (frozenset(one.unit for one in other if one.line.to_rigid == way) for way in (True, False))
+    rigid, back = (
+        frozenset(one.unit for one in other if one.line.to_rigid == way)
+        for way in (True, False)
+    )
     return Windows(tuple(windows), tuple(orphans), events, rigid, back)
 
 
@@ -357,7 +463,9 @@ def _events(card: SwitchSet, parts: Parts) -> Iterable[Event]:
             yield from (Event(Unit(part), card, line) for part in members)
 
 
-def follow(unit: Unit, events: Iterable[tuple[float, Event]]) -> tuple[list[Window], list[tuple[float, Event]]]:
+def follow(
+    unit: Unit, events: Iterable[tuple[float, Event]]
+) -> tuple[list[Window], list[tuple[float, Event]]]:
     """Windows of a unit by its events and their times, in order; and the events that find it deformable already."""
     windows: list[Window] = []
     orphans: list[tuple[float, Event]] = []

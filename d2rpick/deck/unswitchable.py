@@ -37,9 +37,22 @@ _REFERENCE_BY_NAME: Final = re.compile(
     r"MAT_(BLATZ-KO|MOONEY-RIVLIN|FRAZER_NASH|FRAZER-NASH|HYPERELASTIC|OGDEN|ARRUDA_BOYCE|SIMPLIFIED_RUBBER"
     r"|SOFT_TISSUE|LOW_DENSITY_FOAM|FU_CHANG_FOAM|ORTHOTROPIC_ELASTIC|ANISOTROPIC_ELASTIC)"
 )
-_REFERENCE_BY_NUMBER: Final = re.compile(r"MAT_0*(2|7|27|31|57|77|77_[HO]|83|91|92|127|181)(_|\Z)")
+_REFERENCE_BY_NUMBER: Final = re.compile(
+    r"MAT_0*(2|7|27|31|57|77|77_[HO]|83|91|92|127|181)(_|\Z)"
+)
 _LAWS_WITH_REFERENCE: Final = {
-    *("LAW42", "OGDEN", "LAW62", "VISC_HYP", "LAW69", "LAW82", "LAW88", "TABULATED", "LAW92", "ARRUDA_BOYCE"),
+    *(
+        "LAW42",
+        "OGDEN",
+        "LAW62",
+        "VISC_HYP",
+        "LAW69",
+        "LAW82",
+        "LAW88",
+        "TABULATED",
+        "LAW92",
+        "ARRUDA_BOYCE",
+    ),
     *("LAW94", "YEOH", "LAW95", "BERGSTROM_BOYCE", "LAW100", "MNF", "LAW111", "MARLOW"),
 }
 _TOTAL_STRAIN: Final = {10, 11, 12}  # Ismstr of solids
@@ -50,12 +63,21 @@ _GAINS: Final = "so it may gain stress when it is switched back"
 def find_unswitchable_in_ls_dyna(deck: Deck, parts: Parts) -> dict[int, Unswitchable]:
     """Find the parts of a deck that must not be switched, by their sections and materials."""
     sections = read_sections(deck)
-    laws = {material_of(card, card.data[0], 0): card.name for card in deck.named("MAT") if card.data}
+    laws = {
+        material_of(card, card.data[0], 0): card.name
+        for card in deck.named("MAT")
+        if card.data
+    }
     reasons: dict[int, Unswitchable] = {}
     for part, material in parts.materials.items():
-        section, law = sections.get(parts.sections.get(part, 0)), laws.get(material, "").removesuffix("_TITLE")
+        section, law = (
+            sections.get(parts.sections.get(part, 0)),
+            laws.get(material, "").removesuffix("_TITLE"),
+        )
         if section and section.kind == "SOLID" and section.elform in _FLOWING:
-            reasons[part] = _flowing(f"{_FLOWING[section.elform]}, ELFORM {section.elform}")
+            reasons[part] = _flowing(
+                f"{_FLOWING[section.elform]}, ELFORM {section.elform}"
+            )
         elif _REFERENCE_BY_NAME.match(law) or _REFERENCE_BY_NUMBER.match(law):
             reasons[part] = _with_reference(f"*{law}")
     return reasons
@@ -63,12 +85,20 @@ def find_unswitchable_in_ls_dyna(deck: Deck, parts: Parts) -> dict[int, Unswitch
 
 def find_unswitchable_in_radioss(starter: Starter) -> dict[int, Unswitchable]:
     """Find the parts of a starter deck that must not be switched, by their materials and properties."""
-    from d2rpick.deck.radioss_deck import number_of  # not above: a deck of LS-DYNA does without
+    from d2rpick.deck.radioss_deck import (
+        number_of,
+    )  # not above: a deck of LS-DYNA does without
 
     flowing = {
-        number_of(card, 2): card.words[0] for card in starter.named("ALE", "EULER") if card.words[1:2] == ("MAT",)
+        number_of(card, 2): card.words[0]
+        for card in starter.named("ALE", "EULER")
+        if card.words[1:2] == ("MAT",)
     }
-    laws = {number_of(card, 2): card.words[1] for card in starter.named("MAT") if card.words[2:]}
+    laws = {
+        number_of(card, 2): card.words[1]
+        for card in starter.named("MAT")
+        if card.words[2:]
+    }
     strains = _strains(starter)
     reasons: dict[int, Unswitchable] = {}
     for part, line in starter.parts.items():
@@ -85,8 +115,16 @@ def _strains(starter: Starter) -> Mapping[int, int]:
     """Give Ismstr of the properties of solids, by their ids."""
     from d2rpick.deck.radioss_deck import SOLIDS, below_title, number_of
 
-    solids = [card for card in starter.named("PROP") if card.words[2:] and card.words[1] in SOLIDS]
-    return {number_of(card, 2): card.integer(row, _ISMSTR).value for card in solids for row in below_title(card)[:1]}
+    solids = [
+        card
+        for card in starter.named("PROP")
+        if card.words[2:] and card.words[1] in SOLIDS
+    ]
+    return {
+        number_of(card, 2): card.integer(row, _ISMSTR).value
+        for card in solids
+        for row in below_title(card)[:1]
+    }
 
 
 def _flowing(how: str) -> Unswitchable:
@@ -94,4 +132,6 @@ def _flowing(how: str) -> Unswitchable:
 
 
 def _with_reference(how: str) -> Unswitchable:
-    return Unswitchable(False, f"its law keeps a stress-free reference ({how}), {_GAINS}")
+    return Unswitchable(
+        False, f"its law keeps a stress-free reference ({how}), {_GAINS}"
+    )

@@ -34,7 +34,9 @@ class Described(NamedTuple):
     alpha: float | None = None
 
 
-def find_flight(history: History, td: float, seen: Seen, described: Described | None) -> Flight:
+def find_flight(
+    history: History, td: float, seen: Seen, described: Described | None
+) -> Flight:
     """Choose the best answer to when the load is over: by the evidence, by the oscillator, by the energy.
 
     ``seen`` is what the evidence shows, ``described`` what an oscillator does.
@@ -47,7 +49,15 @@ def find_flight(history: History, td: float, seen: Seen, described: Described | 
             gravity = _load_beside(history, described._replace(start=first, end=last))
         end, by_oscillator = last if end_seen else None, described is not None
         return Flight(
-            first, end, seen.source, parts, damping, seen.refusal, seen.doubts, gravity=gravity, described=by_oscillator
+            first,
+            end,
+            seen.source,
+            parts,
+            damping,
+            seen.refusal,
+            seen.doubts,
+            gravity=gravity,
+            described=by_oscillator,
         )
     if seen.refusal:
         return Flight(refusal=seen.refusal, doubts=seen.doubts)
@@ -56,34 +66,67 @@ def find_flight(history: History, td: float, seen: Seen, described: Described | 
         if refusal:
             return Flight(refusal=refusal)
         load = _load_beside(history, described)
-        return Flight(described.start, _end_of(history, described), "oscillator", gravity=load, described=True)
+        return Flight(
+            described.start,
+            _end_of(history, described),
+            "oscillator",
+            gravity=load,
+            described=True,
+        )
     quiet = quiet_time(history, td)
     if quiet is None:
         return Flight()
     if refusal := _fed(history, quiet.start, td):
         return Flight(refusal=refusal)
     end = quiet.end if quiet.end is not None and quiet.end < history.time[-1] else None
-    known = history.balance is not None and history.balance.kinetic_and_internal is not None
-    return Flight(quiet.start, end, "energy", settled=quiet.settled, gravity=nan if known else 0.0)
+    known = (
+        history.balance is not None and history.balance.kinetic_and_internal is not None
+    )
+    return Flight(
+        quiet.start, end, "energy", settled=quiet.settled, gravity=nan if known else 0.0
+    )
 
 
-def begun_at(history: History, flight: Flight, td: float, after: float, described: Described | None) -> Flight:
+def begun_at(
+    history: History,
+    flight: Flight,
+    td: float,
+    after: float,
+    described: Described | None,
+) -> Flight:
     """Let the flight around td begin where the user says that the load ends, ``after`` [time].
 
     What the evidence has against that becomes a doubt.  A contact that it shows between ``after`` and td still ends
     the flight, as the user has not spoken of that.
     """
-    if flight.start is None or flight.source == "energy" or _lies_elsewhere(flight, td, after):
+    if (
+        flight.start is None
+        or flight.source == "energy"
+        or _lies_elsewhere(flight, td, after)
+    ):
         if described is None:  # many td have the same one
-            end = history.known.once(("landing", after), lambda: landing_after(history, after))
+            end = history.known.once(
+                ("landing", after), lambda: landing_after(history, after)
+            )
         else:
             end = _end_of(history, described)
-        return Flight(after, end, "given", doubts=_with_refusal(flight), described=described is not None)
+        return Flight(
+            after,
+            end,
+            "given",
+            doubts=_with_refusal(flight),
+            described=described is not None,
+        )
     if flight.end is not None and after >= flight.end:
         ended = f"the {spoken(flight.source)} shows that the flight had ended at {flight.end:.6g}, before `after`"
         return Flight(refusal=flight.refusal or ended, doubts=flight.doubts)
-    doubts, shows_start = flight.doubts, flight.source != "oscillator"  # which is sought from `after` on
-    if shows_start and after < flight.start - same_within(history, *flight.within(history.time)):
+    doubts, shows_start = (
+        flight.doubts,
+        flight.source != "oscillator",
+    )  # which is sought from `after` on
+    if shows_start and after < flight.start - same_within(
+        history, *flight.within(history.time)
+    ):
         shown = f"the {spoken(flight.source)} shows that the flight begins at {flight.start:.6g}"
         doubts = (*doubts, f"{shown}, after `after` {after:.6g}, which is used")
     return flight._replace(start=after, source="given", doubts=doubts)
@@ -97,10 +140,16 @@ def landed_at(history: History, flight: Flight, td: float, landing: float) -> Fl
     if flight.start is None or landing <= flight.start:
         return flight
     if flight.refusal and flight.end is not None and flight.end <= td <= landing:
-        return flight._replace(end=landing, refusal=None, source="given", doubts=_with_refusal(flight))
+        return flight._replace(
+            end=landing, refusal=None, source="given", doubts=_with_refusal(flight)
+        )
     doubts = flight.doubts
     room = same_within(history, *flight.within(history.time))
-    if flight.end is not None and flight.end < landing - room and flight.source not in ("energy", "given"):
+    if (
+        flight.end is not None
+        and flight.end < landing - room
+        and flight.source not in ("energy", "given")
+    ):
         shown = f"the {spoken(flight.source)} shows that the flight ends at {flight.end:.6g}"
         doubts = (*doubts, f"{shown}, before `landing` {landing:.6g}, which is used")
         flight = flight._replace(source="given")
@@ -118,7 +167,10 @@ def _with_refusal(flight: Flight) -> tuple[str, ...]:
     """Doubts of a flight that is given, with what the evidence has against it."""
     if not flight.refusal:
         return flight.doubts
-    return (*flight.doubts, f"the flight is used as it is given, although {flight.refusal}")
+    return (
+        *flight.doubts,
+        f"the flight is used as it is given, although {flight.refusal}",
+    )
 
 
 def _end_of(history: History, described: Described) -> float | None:
@@ -129,7 +181,11 @@ def _load_beside(history: History, described: Described) -> float:
     """Give NaN if energies change in a window by more than the damping of its vibration takes, else 0."""
     from d2rpick.flight.work import taken_by_damping
 
-    taken = None if history.balance is None else taken_by_damping(history.balance, *described)
+    taken = (
+        None
+        if history.balance is None
+        else taken_by_damping(history.balance, *described)
+    )
     return nan if taken is False else 0.0
 
 
@@ -139,7 +195,10 @@ def _fed(history: History, start: float, end: float) -> str | None:
     if balance is None or energy is None or balance.kinetic_and_internal is None:
         return None
     turns = int(np.count_nonzero((history.turns > start) & (history.turns < end)))
-    if turns < _LEAST_TURNS and float(np.ptp(history.between(start, end)[1])) > MOST_WORK * energy:
+    if (
+        turns < _LEAST_TURNS
+        and float(np.ptp(history.between(start, end)[1])) > MOST_WORK * energy
+    ):
         return f"from {start:.6g} to {end:.6g} the internal energy turns {turns} times: too few to tell a flight by it"
     from d2rpick.flight.work import change_of_balance
 
@@ -149,6 +208,7 @@ def _fed(history: History, start: float, end: float) -> str | None:
         return f"{found}, at a mean internal energy of {energy:.3g}: a load works there"
     if not moves_as_a_whole(balance, start, end):
         return (
-            f"from {start:.6g} to {end:.6g} there is no more kinetic energy than that of the vibration: it does not fly"
+            f"from {start:.6g} to {end:.6g} there is no more kinetic energy than that of "
+            "the vibration: it does not fly"
         )
     return None

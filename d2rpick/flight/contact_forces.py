@@ -38,7 +38,9 @@ class Touches(NamedTuple):
     acts: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, forces: Sequence[ContactForce], whole: Momenta | None = None) -> Touches | None:
+    def of(
+        cls, forces: Sequence[ContactForce], whole: Momenta | None = None
+    ) -> Touches | None:
         """Put the forces of all contacts together that act at some times and not at others; None without.
 
         A contact that always acts holds parts together, as a tied one; one that never acts may not be of these parts.
@@ -49,7 +51,10 @@ class Touches(NamedTuple):
         telling = telling if whole is None else _from_outside(telling, whole)
         if not telling:
             return None
-        start, end = max(force.time[0] for force in telling), min(force.time[-1] for force in telling)
+        start, end = (
+            max(force.time[0] for force in telling),
+            min(force.time[-1] for force in telling),
+        )
         every = union(*(force.time for force in telling))
         time = every[(every >= start) & (every <= end)]
         if time.size < FEWEST:
@@ -75,7 +80,9 @@ class Touches(NamedTuple):
         place = int(np.searchsorted(acting, after))
         first = int(acting[place - 1]) if place else 0
         last = int(acting[place]) - 1 if place < acting.size else time.size - 1
-        long_enough = float(time[last] - time[first]) >= SHORTEST * float(time[-1] - time[0])
+        long_enough = float(time[last] - time[first]) >= SHORTEST * float(
+            time[-1] - time[0]
+        )
         if last - first + 1 < FEWEST or not long_enough:
             return None
         return FreeFlight.of(time, (first, last), gravity=float("nan"))
@@ -93,19 +100,29 @@ def _from_outside(forces: Sequence[ContactForce], whole: Momenta) -> list[Contac
     steps = np.diff(whole.time)
     changes = np.diff(whole.of(range(whole.values.shape[1])), axis=0).ravel()
     by_gravity = [np.outer(steps, axis).ravel() for axis in np.eye(3)]
-    columns = np.stack([*(_between(force, whole.time).ravel() for force in known), *by_gravity], axis=1)
+    columns = np.stack(
+        [*(_between(force, whole.time).ravel() for force in known), *by_gravity], axis=1
+    )
     sizes = np.linalg.norm(columns, axis=0)
     sizes[sizes == 0] = 1.0
-    shares = np.abs(np.linalg.lstsq(columns / sizes, changes, rcond=None)[0] / sizes)[: len(known)]
+    shares = np.abs(np.linalg.lstsq(columns / sizes, changes, rcond=None)[0] / sizes)[
+        : len(known)
+    ]
     whole_share = float(shares.max()) if whole.velocity else 1.0
-    inner = {id(force) for force, share in zip(known, shares.tolist(), strict=True) if share < _INNER * whole_share}
+    inner = {
+        id(force)
+        for force, share in zip(known, shares.tolist(), strict=True)
+        if share < _INNER * whole_share
+    }
     return [force for force in forces if id(force) not in inner]
 
 
 def _between(force: ContactForce, time: Samples) -> Samples:
     """Impulses between other times (m,), of shape (m - 1, 3)."""
     sums = np.cumsum(force.impulses, axis=0)
-    return np.diff(np.stack([np.interp(time, force.time, axis) for axis in sums.T], axis=1), axis=0)
+    return np.diff(
+        np.stack([np.interp(time, force.time, axis) for axis in sums.T], axis=1), axis=0
+    )
 
 
 def is_deformed(history: History, flight: FreeFlight) -> bool:
@@ -114,6 +131,8 @@ def is_deformed(history: History, flight: FreeFlight) -> bool:
     In flight it vibrates about its level, or falls by damping.
     """
     energy = history.between(flight.start, flight.end)[1]
-    means = np.array([piece.mean() for piece in np.array_split(energy, _PIECES) if piece.size])
+    means = np.array(
+        [piece.mean() for piece in np.array_split(energy, _PIECES) if piece.size]
+    )
     rise = means - np.minimum.accumulate(means)
     return float(rise.max(initial=0.0)) > _RISE * float(np.abs(history.energy).max())

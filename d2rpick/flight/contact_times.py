@@ -59,8 +59,13 @@ def find_contact_times(momenta: Momenta) -> ContactTimes | None:
     pushes = np.diff(momentum, axis=0) - gravity * np.diff(time)[:, np.newaxis]
     sizes = np.linalg.norm(pushes, axis=1)
     least = _SEEN * max(2 * momenta.noise(members), float(sizes[first:last].max()))
-    room = np.maximum(least, _OF_WEIGHT * float(np.linalg.norm(gravity)) * np.diff(time))
-    spans = tuple((float(time[part.start]), float(time[part.stop])) for part in stretches(sizes > room))
+    room = np.maximum(
+        least, _OF_WEIGHT * float(np.linalg.norm(gravity)) * np.diff(time)
+    )
+    spans = tuple(
+        (float(time[part.start]), float(time[part.stop]))
+        for part in stretches(sizes > room)
+    )
     mass = momenta.mass(members)
     speed = float(np.linalg.norm(momentum[last])) / mass if mass > 0 else None
     return ContactTimes(spans, float(np.diff(time).max()), speed)
@@ -69,5 +74,7 @@ def find_contact_times(momenta: Momenta) -> ContactTimes | None:
 def _find_members(momenta: Momenta, parts: object) -> tuple[int, ...]:
     """Give the places of the parts that fly; those of the chosen ones where the momentum is that of the model."""
     flying = {part.id for part in parts} if isinstance(parts, tuple) else set()
-    places = tuple(place for place, part in enumerate(momenta.parts or ()) if part.id in flying)
+    places = tuple(
+        place for place, part in enumerate(momenta.parts or ()) if part.id in flying
+    )
     return places or momenta.chosen

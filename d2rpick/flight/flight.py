@@ -69,7 +69,10 @@ class Flight(NamedTuple):
     def within(self, time: Samples) -> tuple[float, float]:
         """Give it as a window within a record of these times (n,) [time]."""
         first, last = float(time[0]), float(time[-1])
-        return first if self.start is None else self.start, last if self.end is None else self.end
+        return (
+            first if self.start is None else self.start,
+            last if self.end is None else self.end,
+        )
 
     @property
     def by_parts(self) -> bool:
@@ -106,10 +109,23 @@ class Witness(NamedTuple):
     decisive: bool
 
     @classmethod
-    def of(cls, source: str, time: Samples, around: Callable[[float], FreeFlight | None], *, decisive: bool) -> Witness:
+    def of(
+        cls,
+        source: str,
+        time: Samples,
+        around: Callable[[float], FreeFlight | None],
+        *,
+        decisive: bool,
+    ) -> Witness:
         """Give the source that shows flights over ``time`` (n,), which looks around no time, and for all, only once."""
         once = cache(around)
-        return cls(source, time, once, cache(partial(all_windows, time, partial(_of_middle, time, once))), decisive)
+        return cls(
+            source,
+            time,
+            once,
+            cache(partial(all_windows, time, partial(_of_middle, time, once))),
+            decisive,
+        )
 
     def holding(self, td: float) -> FreeFlight | None:
         """Give the flight that it shows around td: that of the first mark whose flight holds td, else td's own."""
@@ -120,16 +136,28 @@ class Witness(NamedTuple):
         return self.decisive or bool(self.flights())
 
 
-def _holding(time: Samples, around: Callable[[float], FreeFlight | None], td: float) -> FreeFlight | None:
+def _holding(
+    time: Samples, around: Callable[[float], FreeFlight | None], td: float
+) -> FreeFlight | None:
     shared = filter(None, map(around, marks(time, td)))
-    return next((flight for flight in shared if flight.start <= td <= flight.end), None) or around(td)
+    return next(
+        (flight for flight in shared if flight.start <= td <= flight.end), None
+    ) or around(td)
 
 
-def _of_middle(time: Samples, around: Callable[[float], FreeFlight | None], moment: float) -> FreeFlight | None:
+def _of_middle(
+    time: Samples, around: Callable[[float], FreeFlight | None], moment: float
+) -> FreeFlight | None:
     """Give the flight around a time as it is told of a td in its middle: so that a flight is listed as it is used."""
     flight = around(moment)
-    of_middle = _holding(time, around, (flight.start + flight.end) / 2) if flight else None
-    return of_middle if of_middle and of_middle.start <= moment <= of_middle.end else flight
+    of_middle = (
+        _holding(time, around, (flight.start + flight.end) / 2) if flight else None
+    )
+    return (
+        of_middle
+        if of_middle and of_middle.start <= moment <= of_middle.end
+        else flight
+    )
 
 
 class Seen(NamedTuple):
@@ -156,7 +184,11 @@ def seen_flight(history: History, td: float) -> Seen:
     if held is None:
         return _seen(history, td)
     seen = None if history.parts else _seen(history, td)
-    return seen if seen and seen.flight and seen.flight.parts else Seen(refusal=held, held=True)
+    return (
+        seen
+        if seen and seen.flight and seen.flight.parts
+        else Seen(refusal=held, held=True)
+    )
 
 
 def _seen(history: History, td: float) -> Seen:
@@ -167,11 +199,16 @@ def _seen(history: History, td: float) -> Seen:
             found.append((witness.source, flight))
         elif (not found or _may_deny(witness, found[0][1])) and witness.counts():
             refusal = _refusal(history, witness, td)
-            doubts = tuple(f"the {source} shows a flight there, but {refusal}" for source, _ in found)
+            doubts = tuple(
+                f"the {source} shows a flight there, but {refusal}"
+                for source, _ in found
+            )
             return _nearest(witness, td, refusal, doubts)
     if not found:
         return Seen()
-    return history.known.once(("confirmed", *found), lambda: _confirmed(history, found))  # many td lie in the same
+    return history.known.once(
+        ("confirmed", *found), lambda: _confirmed(history, found)
+    )  # many td lie in the same
 
 
 def _refusal(history: History, witness: Witness, td: float) -> str:
@@ -179,7 +216,10 @@ def _refusal(history: History, witness: Witness, td: float) -> str:
     if witness.source == "momentum":
         from d2rpick.flight.momentum import flight_around, to_be_asked
 
-        if any(flight_around(one, td, history.balance) for one in to_be_asked(history.momenta)):
+        if any(
+            flight_around(one, td, history.balance)
+            for one in to_be_asked(history.momenta)
+        ):
             found = f"the momentum is that of free flight at td = {td:.6g}, but the internal energy keeps no level"
             return f"{found}: parts of the model may touch each other, or energies are wrong"
     return f"the {spoken(witness.source)} shows no free flight at td = {td:.6g}"
@@ -192,11 +232,18 @@ def all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
         kept, flights = [], witness.flights()
         for flight in flights:
             middle = (flight.start + flight.end) / 2
-            may_deny = (one for one in asked[place + 1 :] if _may_deny(one, flight) and one.counts())
+            may_deny = (
+                one
+                for one in asked[place + 1 :]
+                if _may_deny(one, flight) and one.counts()
+            )
             others = [(one.source, one.around(middle)) for one in may_deny]
             if not all(other for _, other in others):
                 continue
-            found = [(witness.source, flight), *((source, other) for source, other in others if other)]
+            found = [
+                (witness.source, flight),
+                *((source, other) for source, other in others if other),
+            ]
             seen = _confirmed(history, found)
             if seen.flight and not seen.refusal:
                 kept.append((witness.source, seen.flight))
@@ -226,11 +273,19 @@ def _witnesses(history: History) -> Iterator[Witness]:
         around = partial(_first, history, momenta)
         decisive = any(momentum.tells(one) for one in momenta)
         yield Witness.of("momentum", momenta[0].time, around, decisive=decisive)
-    forces, whole = history.evidence.forces, next((one for one in history.momenta if one.parts is None), None)
+    forces, whole = (
+        history.evidence.forces,
+        next((one for one in history.momenta if one.parts is None), None),
+    )
     touches = Touches.of(forces, whole) if forces else None
     balance, is_better_known = history.balance, bool(history.momenta)
     if touches is not None:
-        by_forces = Witness.of("contact-force", touches.time, partial(_by_forces, history, touches), decisive=False)
+        by_forces = Witness.of(
+            "contact-force",
+            touches.time,
+            partial(_by_forces, history, touches),
+            decisive=False,
+        )
         is_better_known = is_better_known or bool(by_forces.flights())
         yield by_forces
     if balance is None:
@@ -238,35 +293,57 @@ def _witnesses(history: History) -> Iterator[Witness]:
     from d2rpick.flight import work
 
     if work.shows_contacts(balance):
-        around = partial(_by_energies, history, work.plateau_around, level=not is_better_known)
+        around = partial(
+            _by_energies, history, work.plateau_around, level=not is_better_known
+        )
         yield Witness.of("contact-energy", balance.time, around, decisive=False)
     if work.can_tell(balance):
         around = partial(_by_energies, history, work.balanced_around, level=True)
-        yield Witness.of("energy-balance", balance.time, around, decisive=balance.worked is not None)
+        yield Witness.of(
+            "energy-balance", balance.time, around, decisive=balance.worked is not None
+        )
 
 
-def _first(history: History, momenta: Sequence[Momenta], td: float) -> FreeFlight | None:
+def _first(
+    history: History, momenta: Sequence[Momenta], td: float
+) -> FreeFlight | None:
     """Give the flight by the momentum of the parts, or else of the whole model."""
     from d2rpick.flight.momentum import flight_around
 
     for one in momenta:
         found = flight_around(one, td, history.balance)
         if found:
-            return found if one.parts is not None or one.flying else _keeping_level(history, found, td, one)
+            return (
+                found
+                if one.parts is not None or one.flying
+                else _keeping_level(history, found, td, one)
+            )
     return None
 
 
 def _by_energies(
-    history: History, look: Callable[[Balance, float], FreeFlight | None], td: float, *, level: bool
+    history: History,
+    look: Callable[[Balance, float], FreeFlight | None],
+    td: float,
+    *,
+    level: bool,
 ) -> FreeFlight | None:
     """Give the flight around td by energies; of those that do not see a wall that does no work it keeps a ``level``."""
     assert history.balance
     found = look(history.balance, td)
     if level:
         found = _keeping_level(history, found, td)
-        if found and isinf(found.gravity) and history.surroundings.gravity_on(None) == (0.0,):
+        if (
+            found
+            and isinf(found.gravity)
+            and history.surroundings.gravity_on(None) == (0.0,)
+        ):
             return None  # no gravity feeds the energies
-        found = found if found and moves_as_a_whole(history.balance, found.start, found.end) else None
+        found = (
+            found
+            if found and moves_as_a_whole(history.balance, found.start, found.end)
+            else None
+        )
     return unheld(history.surroundings, found, history.parts, td)
 
 
@@ -276,7 +353,11 @@ def _by_forces(history: History, touches: Touches, td: float) -> FreeFlight | No
     Before any contact has ended a load of another kind may act, which only the external work shows.
     """
     found, balance = touches.flight_around(td), history.balance
-    if found and found.start <= touches.time[0] and (balance is None or balance.external_work is None):
+    if (
+        found
+        and found.start <= touches.time[0]
+        and (balance is None or balance.external_work is None)
+    ):
         return None
     if found and is_deformed(history, found):
         found = _keeping_level(history, found, td)
@@ -286,7 +367,10 @@ def _by_forces(history: History, touches: Touches, td: float) -> FreeFlight | No
 
 
 def _keeping_level(
-    history: History, flight: FreeFlight | None, td: float, momenta: Momenta | None = None
+    history: History,
+    flight: FreeFlight | None,
+    td: float,
+    momenta: Momenta | None = None,
 ) -> FreeFlight | None:
     """Give what of a flight of the whole model the internal energy keeps its level in, or None where td is before.
 
@@ -294,16 +378,34 @@ def _keeping_level(
     """
     if flight is None:
         return None
-    balance, damped, time, energy, unseen = history.balance, None, history.time, history.energy, 0.0
-    if balance and balance.kinetic_and_internal is not None and balance.internal is not None:
+    balance, damped, time, energy, unseen = (
+        history.balance,
+        None,
+        history.time,
+        history.energy,
+        0.0,
+    )
+    if (
+        balance
+        and balance.kinetic_and_internal is not None
+        and balance.internal is not None
+    ):
         from d2rpick.flight.work import lowered_by_damping
 
         sums, unseen = lowered_by_damping(balance, flight, momenta)
-        damped = np.stack([np.interp(time, balance.time, one) for one in sums]) if sums else None
+        damped = (
+            np.stack([np.interp(time, balance.time, one) for one in sums])
+            if sums
+            else None
+        )
         if history.parts is not None:
             energy = np.interp(time, balance.time, balance.internal)
     start = settled_from(time, energy, damped, flight.start, flight.end, unseen)
-    if start is None or start > td or flight.end - start < SHORTEST * (time[-1] - time[0]):
+    if (
+        start is None
+        or start > td
+        or flight.end - start < SHORTEST * (time[-1] - time[0])
+    ):
         return None
     if damped is not None and not flight.gravity:
         first, last = np.interp((flight.start, start), time, damped[0])
@@ -312,7 +414,9 @@ def _keeping_level(
     return flight._replace(start=start)
 
 
-def _nearest(witness: Witness, td: float, refusal: str, doubts: tuple[str, ...]) -> Seen:
+def _nearest(
+    witness: Witness, td: float, refusal: str, doubts: tuple[str, ...]
+) -> Seen:
     """Give the last flight before ``td``, or else the first one after it, where nothing flies at td."""
     flights = witness.flights()
     before = [one for one in flights if one.end < td]
@@ -338,12 +442,21 @@ def _confirmed(history: History, found: Sequence[tuple[str, FreeFlight]]) -> See
         if other not in _AGREEING or best.parts is not None:
             continue
         if abs(flight.start - best.start) > room or abs(flight.end - best.end) > room:
-            one, two = (f"{f.start:.6g} to {f.end:.6g} by the {spoken(n)}" for n, f in (found[0], (other, flight)))
-            doubts.append(f"the flight lasts from {one}, from {two}; the later start and the earlier end count")
+            one, two = (
+                f"{f.start:.6g} to {f.end:.6g} by the {spoken(n)}"
+                for n, f in (found[0], (other, flight))
+            )
+            doubts.append(
+                f"the flight lasts from {one}, from {two}; the later start and the earlier end count"
+            )
         if flight.end < end:
             end, end_seen = flight.end, flight.end_seen
         start = max(start, flight.start)
-    return Seen(best._replace(start=start, end=end, end_seen=end_seen), source, doubts=tuple(doubts))
+    return Seen(
+        best._replace(start=start, end=end, end_seen=end_seen),
+        source,
+        doubts=tuple(doubts),
+    )
 
 
 def same_within(history: History, start: float, end: float) -> float:
@@ -373,5 +486,12 @@ def _is_subset(history: History, flight: FreeFlight) -> bool:
     momenta = next((one for one in history.momenta if one.parts is not None), None)
     if momenta is None or momenta.parts is None or flight.parts is None:
         return False
-    members, moves = {part.id for part in flight.parts}, np.ptp(momenta.values, axis=0).any(axis=1)
-    return any(part.id not in members for part, one in zip(momenta.parts, moves, strict=True) if one)
+    members, moves = (
+        {part.id for part in flight.parts},
+        np.ptp(momenta.values, axis=0).any(axis=1),
+    )
+    return any(
+        part.id not in members
+        for part, one in zip(momenta.parts, moves, strict=True)
+        if one
+    )

@@ -69,11 +69,15 @@ class Laws:
     ``gravities`` (0: none acts for a time); where these are None, times that of the earth, in whatever units.
     """
 
-    def __init__(self, momenta: Momenta, members: tuple[int, ...], balance: Balance | None) -> None:
+    def __init__(
+        self, momenta: Momenta, members: tuple[int, ...], balance: Balance | None
+    ) -> None:
         time, momentum = momenta.time, momenta.of(members)
         self.fit, self.noise = FreeFall(time, momentum), momenta.noise(members)
         self.balance, self.velocity = balance, momenta.velocity
-        self.gravities = momenta.surroundings.gravity_on(momenta.parts and [momenta.parts[i] for i in members])
+        self.gravities = momenta.surroundings.gravity_on(
+            momenta.parts and [momenta.parts[i] for i in members]
+        )
         self.mass = 1.0 if momenta.velocity else momenta.mass(members)
         complete = set(momenta.moving) <= set(members)
         self.extent = float(np.ptp(momentum, axis=0).max())
@@ -93,7 +97,9 @@ class Laws:
         if window:
             return (None if self._carried else window), None
         window = self._lasting(self._steady, td, self._enough)
-        if window and not self._falls_across:  # a push that balances the weight for a moment leaves it as steady
+        if (
+            window and not self._falls_across
+        ):  # a push that balances the weight for a moment leaves it as steady
             return (None if self._carried else window), None
         return self._under_gravity(td)
 
@@ -104,8 +110,12 @@ class Laws:
         """
         return None if self._braked(first, last) else self._gravity((first, last))
 
-    def _lasting(self, law: Law, td: float, enough: float = 0.0) -> tuple[int, int] | None:
-        return lasting_window(law, td, self.extent, self.noise, fades=True, enough=enough)
+    def _lasting(
+        self, law: Law, td: float, enough: float = 0.0
+    ) -> tuple[int, int] | None:
+        return lasting_window(
+            law, td, self.extent, self.noise, fades=True, enough=enough
+        )
 
     @property
     def _carried(self) -> bool:
@@ -115,11 +125,16 @@ class Laws:
     def _is_gravity(self, acceleration: float, error: float = _ALIKE) -> bool:
         if self.gravities is None:
             return is_gravity(acceleration, error)
-        return any(one > 0 and abs(acceleration - one) <= error * one for one in self.gravities)
+        return any(
+            one > 0 and abs(acceleration - one) <= error * one for one in self.gravities
+        )
 
     def _braked(self, first: int, last: int) -> bool:
         """Whether what looks like damping is a brake: faster than the states show, or it has taken nearly all."""
-        largest, left = (float(np.abs(self.fit.momentum[slice(at, last + 1)]).max()) for at in (0, first))
+        largest, left = (
+            float(np.abs(self.fit.momentum[slice(at, last + 1)]).max())
+            for at in (0, first)
+        )
         length = float(self.fit.time[last] - self.fit.time[first])
         damping = self.fit.damping(first, last)
         return damping * length > max(_DAMPED, _SHOWN * (last - first)) or (
@@ -144,12 +159,20 @@ class Laws:
             if window is None:
                 enough = self._enough if across else TOLERANCE
                 window = self._lasting(law, td, enough)
-                window = window if window and (across or self._fades_out(window, weight)) else None
+                window = (
+                    window
+                    if window and (across or self._fades_out(window, weight))
+                    else None
+                )
             if window and self._slowed(window, weight):
                 return None, None
             found.append((window, float(np.linalg.norm(weight)) / self.mass))
         windows = [(one, gravity) for one, gravity in found if one]
-        return max(windows, key=lambda one: float(np.ptp(time[[*one[0]]])), default=(None, None))
+        return max(
+            windows,
+            key=lambda one: float(np.ptp(time[[*one[0]]])),
+            default=(None, None),
+        )
 
     def _around(self, td: float) -> tuple[int, int]:
         """States around ``td`` in which a load that fades, or a constant one, bends the momentum by little."""
@@ -160,37 +183,56 @@ class Laws:
         """Weights (3,) along an axis that show across a load of one direction: only along it is the momentum bent."""
         if last - first < FEWEST or not self.mass > 0:
             return
-        time, momentum = self.fit.time[first : last + 1], self.fit.momentum[first : last + 1]
+        time, momentum = (
+            self.fit.time[first : last + 1],
+            self.fit.momentum[first : last + 1],
+        )
         rest = bent(time, momentum)
         along = np.linalg.svd(rest, full_matrices=False)[2][0]
         across = np.eye(along.size) - np.outer(along, along)
         room = _REACH_OF_NOISE * max(self.noise, ROUND_OFF * self.extent)
-        if np.abs(rest @ across).max() > room or np.abs(rest @ along).max() < _CLEARLY * room:
+        if (
+            np.abs(rest @ across).max() > room
+            or np.abs(rest @ along).max() < _CLEARLY * room
+        ):
             return
         slope = across @ np.polyfit(time - time[0], momentum, 1)[0]
         for axis, seen in zip(np.eye(along.size), across, strict=True):
             if seen @ seen > _SEEN**2:
                 size = float(slope @ seen) / float(seen @ seen)
-                if np.linalg.norm(slope - size * seen) <= _ALIKE * abs(size) and self._is_gravity(
-                    abs(size) / self.mass
-                ):
+                if np.linalg.norm(slope - size * seen) <= _ALIKE * abs(
+                    size
+                ) and self._is_gravity(abs(size) / self.mass):
                     yield size * axis
 
     def _weights_near(self, first: int, last: int) -> Iterator[Samples]:
         """Weights (3,) of decks that are roughly as large as the mean force between two states."""
         time = self.fit.time[first : last + 1]
-        slope = np.polyfit(time - time[0], self.fit.momentum[first : last + 1], 1)[0] / self.mass
+        slope = (
+            np.polyfit(time - time[0], self.fit.momentum[first : last + 1], 1)[0]
+            / self.mass
+        )
         size = float(np.linalg.norm(slope))
         if size > 0:
-            direction = np.round(slope / size) if np.abs(slope / size).max() > _ALONG_AXIS else slope / size
-            yield from (direction * (self.mass * gravity) for gravity in _gravities_near(size, self.gravities))
+            direction = (
+                np.round(slope / size)
+                if np.abs(slope / size).max() > _ALONG_AXIS
+                else slope / size
+            )
+            yield from (
+                direction * (self.mass * gravity)
+                for gravity in _gravities_near(size, self.gravities)
+            )
 
     def _fades_out(self, window: tuple[int, int], weight: Samples) -> bool:
         """Whether what acts in a window beside the ``weight`` (3,) fades, and is little of it at the end."""
         third = (window[1] - window[0]) // 3
         at = [window[0], window[0] + third, window[1] - third, window[1]]
         time = self.fit.time[at]
-        beside = np.diff(self.fit.momentum[at], axis=0) / np.diff(time)[:, np.newaxis] - weight
+        beside = (
+            np.diff(self.fit.momentum[at], axis=0) / np.diff(time)[:, np.newaxis]
+            - weight
+        )
         first, _, last = np.linalg.norm(beside, axis=1)
         return bool(last <= _FADED * first and last <= _LITTLE * np.linalg.norm(weight))
 
@@ -201,16 +243,28 @@ class Laws:
         """
         start, end = self.fit.time[[*window]].tolist()
         vector = self.fit.gravity(*window)
-        force, mass = float(np.linalg.norm(vector)), self.mass if self.mass > 0 else float("nan")
+        force, mass = (
+            float(np.linalg.norm(vector)),
+            self.mass if self.mass > 0 else float("nan"),
+        )
         if force * (end - start) <= _UNSEEN * (TOLERANCE * self.extent + self.noise):
             return None if self._carried else 0.0
-        if self._is_gravity(force / mass, _ALIKE + _REACH_OF_DIGITS * self.noise / (force * (end - start))):
+        if self._is_gravity(
+            force / mass,
+            _ALIKE + _REACH_OF_DIGITS * self.noise / (force * (end - start)),
+        ):
             return None if self._slowed(window, vector) else force / mass
         if self.velocity:  # what changes it is an acceleration already
             return None
         found = None
         if self.balance is not None:
-            found = acceleration_by_work(self.balance, self.fit.time, self.fit.momentum @ (vector / force), start, end)
+            found = acceleration_by_work(
+                self.balance,
+                self.fit.time,
+                self.fit.momentum @ (vector / force),
+                start,
+                end,
+            )
         if found is None:
             return float("nan") if self._may_fall and np.isnan(mass) else None
         if self._is_gravity(found):
@@ -224,17 +278,26 @@ class Laws:
         energy swings by.
         """
         balance, squares = self.balance, np.sum(self.fit.momentum**2, axis=1)
-        if balance is None or balance.kinetic is None or balance.internal is None or self.velocity:
+        if (
+            balance is None
+            or balance.kinetic is None
+            or balance.internal is None
+            or self.velocity
+        ):
             return False
         kinetic = np.interp(self.fit.time, balance.time, balance.kinetic)
-        ratios = np.divide(squares, 2 * kinetic, out=np.zeros_like(squares), where=kinetic > 0)
+        ratios = np.divide(
+            squares, 2 * kinetic, out=np.zeros_like(squares), where=kinetic > 0
+        )
         best = int(np.argmax(ratios))
         if self.mass > (1 + _CLEARLY_HEAVIER) * ratios[best]:
             return False  # it is written
         swing = float(np.ptp(balance.internal[window(balance.time, start, end)]))
         largest = force / self.mass
         least = largest * (1 - swing / float(kinetic[best]))
-        return any(least <= one <= largest for one in _gravities_near(largest, self.gravities))
+        return any(
+            least <= one <= largest for one in _gravities_near(largest, self.gravities)
+        )
 
     def _slowed(self, window: tuple[int, int], force: Samples) -> bool:
         """Whether a constant force (3,) is rather friction than gravity: all it does is to slow down.
@@ -247,7 +310,9 @@ class Laws:
         forward = momentum @ along
         if self.gravities is not None or (forward >= 0).any():
             return False
-        across = float(np.linalg.norm(momentum - np.outer(forward, along), axis=1).max())
+        across = float(
+            np.linalg.norm(momentum - np.outer(forward, along), axis=1).max()
+        )
         straight = across <= _STRAIGHT * float(np.abs(forward).max())
         usual = is_gravity(size / self.mass, _ROUGHLY, decades=3)
         return float(np.abs(along).max()) < _ALONG_AXIS or (straight and not usual)
@@ -263,18 +328,25 @@ class Laws:
         if not self.noise < TOLERANCE * self.extent or self.fit.time.size < FEWEST:
             return False
         windows = (self._lasting(self.fit, td) for td in moments(self.fit.time))
-        return any((self._gravity(one) or 0.0) > 0 for one in windows if one and not self._braked(*one))
+        return any(
+            (self._gravity(one) or 0.0) > 0
+            for one in windows
+            if one and not self._braked(*one)
+        )
 
     @cached_property
     def _falls_across(self) -> bool:
         """Whether gravity shows across a load at some time."""
         return any(
-            next(self._weights_across(*self._around(td)), None) is not None and self._under_gravity(td)[0]
+            next(self._weights_across(*self._around(td)), None) is not None
+            and self._under_gravity(td)[0]
             for td in moments(self.fit.time)
         )
 
 
-def _gravities_near(acceleration: float, known: tuple[float, ...] | None) -> Iterator[float]:
+def _gravities_near(
+    acceleration: float, known: tuple[float, ...] | None
+) -> Iterator[float]:
     """What decks have for gravity, roughly as large as an acceleration: the ``known`` ones, if they are."""
     if known is not None:
         yield from (one for one in known if abs(acceleration - one) < _ROUGHLY * one)
@@ -298,10 +370,15 @@ def is_gravity(acceleration: float, error: float = _ALIKE, decades: int = 1) -> 
     if not acceleration > 0:
         return False
     powers = np.log10(acceleration / np.array(_GRAVITY))
-    return bool(np.abs(powers - decades * np.round(powers / decades)).min() <= np.log10(1 + error))
+    return bool(
+        np.abs(powers - decades * np.round(powers / decades)).min()
+        <= np.log10(1 + error)
+    )
 
 
-def acceleration_by_work(balance: Balance, time: Samples, momentum: Samples, start: float, end: float) -> float | None:
+def acceleration_by_work(
+    balance: Balance, time: Samples, momentum: Samples, start: float, end: float
+) -> float | None:
     """Acceleration by which the external work grows on a momentum, or else kinetic and internal energy [length/time^2].
 
     Gravity g works by the integral of g p, whatever part of the model it moves; what is fixed has no momentum.
@@ -323,7 +400,9 @@ def acceleration_by_work(balance: Balance, time: Samples, momentum: Samples, sta
     inside = window(balance.time, start, end)
     if work is None or balance.time[inside].size < _LEAST_STATES:
         return None
-    impulse = integral(balance.time[inside], np.interp(balance.time[inside], time, momentum))
+    impulse = integral(
+        balance.time[inside], np.interp(balance.time[inside], time, momentum)
+    )
     columns = [np.ones_like(impulse), impulse]
     if balance.kinetic is not None:
         columns.append(integral(balance.time[inside], balance.kinetic[inside]))
@@ -340,7 +419,9 @@ class FreeFall(Law):
         super().__init__(time)
         self.momentum = momentum
         self.integral = integral(time, momentum)
-        self._both = np.asfortranarray(np.hstack([momentum, self.integral]))  # columns lie whole: windows are long
+        self._both = np.asfortranarray(
+            np.hstack([momentum, self.integral])
+        )  # columns lie whole: windows are long
 
     def _misfit(self, first: int, last: int) -> float:
         if last - first < 3:  # three numbers per component fit any three states
@@ -356,8 +437,12 @@ class FreeFall(Law):
         """Least-squares g between two states, by default of all, shape (components,) [momentum/time]."""
         last %= self.time.size
         states = slice(first, last + 1)
-        undamped = self.momentum[states] + self.damping(first, last) * self.integral[states]
-        return np.asarray(np.polyfit(self.time[states] - self.time[first], undamped, 1)[0])
+        undamped = (
+            self.momentum[states] + self.damping(first, last) * self.integral[states]
+        )
+        return np.asarray(
+            np.polyfit(self.time[states] - self.time[first], undamped, 1)[0]
+        )
 
     def _fitted(self, first: int, last: int) -> tuple[Samples, Samples, float]:
         """What is not straight of momentum and impulse, and the alpha >= 0 that explains the one by the other."""
@@ -365,4 +450,8 @@ class FreeFall(Law):
         rest, half = bent(self.time[states], self._both[states]), self.momentum.shape[1]
         p, impulse = rest[:, :half], rest[:, half:]
         power = float((impulse * impulse).sum())
-        return p, impulse, max(0.0, -float((impulse * p).sum()) / power) if power > 0 else 0.0
+        return (
+            p,
+            impulse,
+            max(0.0, -float((impulse * p).sum()) / power) if power > 0 else 0.0,
+        )

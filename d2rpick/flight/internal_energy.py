@@ -56,15 +56,30 @@ def quiet_time(history: History, td: float) -> QuietTime | None:
     """Find the window around ``td`` [time] in which the energy stays in its band on one level, or None."""
     start, least = float(history.time[0]), round_off(history)
     before = history.between(start, td)[1]
-    fallen = least > 0 and before.size >= FEWEST and max(before.max(), -before.min()) <= least
-    if fallen and td - start >= SHORTEST * (history.time[-1] - start):  # nothing has happened since the start
+    fallen = (
+        least > 0
+        and before.size >= FEWEST
+        and max(before.max(), -before.min()) <= least
+    )
+    if fallen and td - start >= SHORTEST * (
+        history.time[-1] - start
+    ):  # nothing has happened since the start
         return QuietTime(start, _burst(history, start, td), start)
     settled = end_of_load(history, td)
     if settled is None:
         return None
     settled = _last_push(history, _last_excursion(history, settled, td), td)
-    changes = [time for time in (_burst(history, settled, td), _change_of_level(history, settled, td)) if time]
-    return QuietTime(settled + _WAIT * (td - settled), min(changes, default=None), settled)
+    changes = [
+        time
+        for time in (
+            _burst(history, settled, td),
+            _change_of_level(history, settled, td),
+        )
+        if time
+    ]
+    return QuietTime(
+        settled + _WAIT * (td - settled), min(changes, default=None), settled
+    )
 
 
 def landing_after(history: History, start: float) -> float | None:
@@ -77,14 +92,23 @@ def landing_after(history: History, start: float) -> float | None:
     if time.size < FEWEST:
         return None
     known = np.searchsorted(time, start + _KNOWN * (time - start), side="right") - 1
-    top, bottom = np.maximum.accumulate(energy)[known], np.minimum.accumulate(energy)[known]
-    turns = np.searchsorted(history.turns, time[known]) - np.searchsorted(history.turns, start)
-    long_enough = (turns >= _TURNED) & (time - start >= SHORTEST * (history.time[-1] - history.time[0]))
+    top, bottom = (
+        np.maximum.accumulate(energy)[known],
+        np.minimum.accumulate(energy)[known],
+    )
+    turns = np.searchsorted(history.turns, time[known]) - np.searchsorted(
+        history.turns, start
+    )
+    long_enough = (turns >= _TURNED) & (
+        time - start >= SHORTEST * (history.time[-1] - history.time[0])
+    )
     beyond = np.flatnonzero(long_enough & (energy > 2 * top - bottom))
     if not beyond.size:
         return None
     first = int(beyond[0])
-    rising = np.flatnonzero(energy[: first + 1] <= top[first] + _BAND_RESERVE * (top[first] - bottom[first]))
+    rising = np.flatnonzero(
+        energy[: first + 1] <= top[first] + _BAND_RESERVE * (top[first] - bottom[first])
+    )
     return float(time[rising[-1] + 1])
 
 
@@ -129,7 +153,9 @@ def _last_push(history: History, start: float, td: float) -> float:
     time = history.time[inside]
     if time.size < FEWEST:
         return start
-    rates = history.known.once("rates", lambda: np.abs(np.diff(history.energy)) / np.diff(history.time))
+    rates = history.known.once(
+        "rates", lambda: np.abs(np.diff(history.energy)) / np.diff(history.time)
+    )
     rates = rates[inside.start : inside.stop - 1]
     usual = rates[time[1:] >= td - _LATEST * (td - start)].max(initial=0.0)
     fast = np.flatnonzero(rates > _FASTER * usual)
@@ -150,12 +176,18 @@ def _change_of_level(history: History, start: float, td: float) -> float | None:
     width = round(_LEVEL * (inside.stop - inside.start))
     if width < 1:
         return None
-    sums = history.known.once("sums", lambda: np.append(0.0, np.cumsum(history.energy)))[inside.start :]
+    sums = history.known.once(
+        "sums", lambda: np.append(0.0, np.cumsum(history.energy))
+    )[inside.start :]
     means = (sums[width:] - sums[:-width]) / width
     after = inside.stop - inside.start  # the first whose states all lie after td
     low, high = _widened(means[: after - width + 1], 1.0)
     off = np.flatnonzero((means[after:] < low) | (means[after:] > high))
-    return float(history.time[inside.stop + int(off[0]) + width // 2]) if off.size else None
+    return (
+        float(history.time[inside.stop + int(off[0]) + width // 2])
+        if off.size
+        else None
+    )
 
 
 def _widened(values: Samples, share: float) -> tuple[float, float]:
@@ -167,13 +199,22 @@ def _widened(values: Samples, share: float) -> tuple[float, float]:
 def round_off(history: History) -> float:
     """Energy below which an internal energy is round-off beside the energies of the run [energy]."""
     balance = history.balance
-    terms = (balance.internal, balance.kinetic, balance.external_work, balance.total) if balance else ()
-    return history.known.once("round-off", lambda: _ROUND_OFF * largest(history.energy, *terms))
+    terms = (
+        (balance.internal, balance.kinetic, balance.external_work, balance.total)
+        if balance
+        else ()
+    )
+    return history.known.once(
+        "round-off", lambda: _ROUND_OFF * largest(history.energy, *terms)
+    )
 
 
 def largest(*terms: Samples | None) -> float:
     """Largest size of some energies, of which some may be missing or empty; 0 without any [energy]."""
-    return max((float(np.abs(term).max(initial=0.0)) for term in terms if term is not None), default=0.0)
+    return max(
+        (float(np.abs(term).max(initial=0.0)) for term in terms if term is not None),
+        default=0.0,
+    )
 
 
 # The band of the last quarter of a flight, widened on both sides by this share of its width, holds all before it.
@@ -191,7 +232,12 @@ _TO_ZERO, _HARDLY = 0.05, 1e-3
 
 
 def settled_from(
-    time: Samples, energy: Samples, damped: Samples | None, start: float, end: float, unseen: float = 0.0
+    time: Samples,
+    energy: Samples,
+    damped: Samples | None,
+    start: float,
+    end: float,
+    unseen: float = 0.0,
 ) -> float | None:
     """Give the time in a window from which an internal energy keeps its level; None where it drifts to the end.
 
@@ -210,7 +256,11 @@ def settled_from(
     least = _ROUND_OFF * float(np.abs(energy).max(initial=0.0))
     first, last = inside.start, inside.stop
     while last - first >= FEWEST:
-        lost = np.full(last - first, np.inf) if damped is None else _still_lost(damped[:, first:last]) + unseen
+        lost = (
+            np.full(last - first, np.inf)
+            if damped is None
+            else _still_lost(damped[:, first:last]) + unseen
+        )
         states = energy[first:last], lost, least
         kept = 0 if _swings(*states) else _kept_from(*states)
         if kept is not None:
@@ -235,10 +285,15 @@ def _kept_from(energy: Samples, lost: Samples, least: float) -> int | None:
     low, high = float(energy[last:].min()), float(energy[last:].max())
     width = max(high - low, least)
     drift = float(energy[last:].mean() - energy[half:last].mean())
-    if abs(drift) > _DRIFT * width + (float(lost[half:last].mean()) if drift < 0 else 0.0):
+    if abs(drift) > _DRIFT * width + (
+        float(lost[half:last].mean()) if drift < 0 else 0.0
+    ):
         return None
     below = low - _RESERVE * width - np.where(np.isinf(lost), 0.0, lost)[:last]
-    outside = np.flatnonzero((energy[:last] < below) | (energy[:last] > high + _RESERVE * width + lost[:last]))
+    outside = np.flatnonzero(
+        (energy[:last] < below)
+        | (energy[:last] > high + _RESERVE * width + lost[:last])
+    )
     return int(outside[-1]) + 1 if outside.size else 0
 
 
@@ -273,9 +328,15 @@ def _large_swings(energy: Samples, least: float) -> int:
 def moves_as_a_whole(balance: Balance, start: float, end: float) -> bool:
     """Whether more moves in a window than the vibration that the internal energy shows."""
     inside = window(balance.time, start, end)
-    if balance.kinetic is None or balance.internal is None or not balance.time[inside].size:
+    if (
+        balance.kinetic is None
+        or balance.internal is None
+        or not balance.time[inside].size
+    ):
         return True
     kinetic, internal = balance.kinetic[inside], balance.internal[inside]
     top, bottom = float(internal.max()), float(internal.min())
-    least = _TO_ZERO * top if bottom <= _TO_ZERO * top else max(top - bottom, _HARDLY * top)
+    least = (
+        _TO_ZERO * top if bottom <= _TO_ZERO * top else max(top - bottom, _HARDLY * top)
+    )
     return float(kinetic[int(np.argmax(internal))]) > least

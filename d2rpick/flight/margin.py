@@ -41,7 +41,10 @@ class Margin(NamedTuple):
 
 
 def margin_before_contact(
-    history: History, flight: Flight, given: float | None = None, place: float | None = None
+    history: History,
+    flight: Flight,
+    given: float | None = None,
+    place: float | None = None,
 ) -> Margin:
     """Give the margin before the contact that ends a flight: the one given, else the time by which it may come earlier.
 
@@ -60,15 +63,28 @@ def margin_before_contact(
         return Margin(given, "given")
     if flight.end is None or flight.start is None:
         return Margin(0.0, "no-contact")
-    share, spread = SHARE * (flight.end - flight.start), landing_moves(history, flight, place)
-    kept = Margin(share, "flight", spread) if spread is None or spread <= share else Margin(spread, "landing", spread)
+    share, spread = (
+        SHARE * (flight.end - flight.start),
+        landing_moves(history, flight, place),
+    )
+    kept = (
+        Margin(share, "flight", spread)
+        if spread is None or spread <= share
+        else Margin(spread, "landing", spread)
+    )
     if not grazes(history, flight, kept.time):
         return kept
     earlier = grazing_moves(history, flight, place)
-    return kept if earlier is None or earlier <= kept.time else Margin(earlier, "grazing", earlier)
+    return (
+        kept
+        if earlier is None or earlier <= kept.time
+        else Margin(earlier, "grazing", earlier)
+    )
 
 
-def landing_moves(history: History, flight: Flight, place: float | None) -> float | None:
+def landing_moves(
+    history: History, flight: Flight, place: float | None
+) -> float | None:
     """Tell how far a switch may move the next landing: by its velocity error and by the place error of the body.
 
     A body that is out of place by ``place`` [length] reaches the contact earlier by that over the speed at which it
@@ -81,14 +97,18 @@ def landing_moves(history: History, flight: Flight, place: float | None) -> floa
     return out_of_place if spread is None else spread + out_of_place
 
 
-def grazing_moves(history: History, flight: Flight, place: float | None) -> float | None:
+def grazing_moves(
+    history: History, flight: Flight, place: float | None
+) -> float | None:
     r"""Tell how much earlier a grazing contact may come [time]; infinite without gravity, None if no error is known.
 
     Where surfaces move along each other their closing speed is next to nothing, and gravity g alone opens a gap of
     ``place`` and of the amplitude of the vibration: in :math:`\sqrt{2 e / g}`.
     """
     spread, speed = landing_spread(history, flight), _closing_speed(history, flight)
-    amplitude = None if spread is None or speed is None or np.isinf(spread) else spread * speed
+    amplitude = (
+        None if spread is None or speed is None or np.isinf(spread) else spread * speed
+    )
     if place is None and amplitude is None:
         return None
     error = (place or 0.0) + (amplitude or 0.0)
@@ -112,7 +132,11 @@ def grazes(history: History, flight: Flight, within: float) -> bool:
     time, momentum = momenta.time, momenta.of(members)
     inside = window(time, *flight.within(time))
     after = window(time, flight.end, flight.end + within)
-    if time[inside].size < _FEWEST or time[after].size < _FEWEST or time[-1] <= flight.end + within:
+    if (
+        time[inside].size < _FEWEST
+        or time[after].size < _FEWEST
+        or time[-1] <= flight.end + within
+    ):
         return False
     gravity = FreeFall(time[inside], momentum[inside]).gravity()
     force = np.linalg.norm(np.gradient(momentum, time, axis=0) - gravity, axis=1)
@@ -155,7 +179,12 @@ def landing_spread(history: History, flight: Flight) -> float | None:
     edge that lets 1 um of height move the landing after it by 70 ms is beyond any such margin.
     """
     balance, momentum = history.balance, _momentum(history, flight)
-    if balance is None or balance.internal is None or balance.kinetic is None or momentum is None:
+    if (
+        balance is None
+        or balance.internal is None
+        or balance.kinetic is None
+        or momentum is None
+    ):
         return None
     start, end = flight.within(history.time)
     inside = window(balance.time, start, end)
@@ -168,7 +197,9 @@ def landing_spread(history: History, flight: Flight) -> float | None:
     approach = float(balance.kinetic[inside][-1]) * _towards_ground(momentum)
     if vibration <= 0 or crossings == 0:
         return 0.0
-    return float(np.sqrt(vibration / approach) / omega) if approach > 0 else float("inf")
+    return (
+        float(np.sqrt(vibration / approach) / omega) if approach > 0 else float("inf")
+    )
 
 
 def energy_of_approach(history: History, flight: Flight) -> float | None:
@@ -196,7 +227,9 @@ def _momentum(history: History, flight: Flight) -> Samples | None:
     return values if len(values) > 1 else None
 
 
-def _of_flight(history: History, flight: Flight) -> tuple[Momenta, Sequence[int]] | None:
+def _of_flight(
+    history: History, flight: Flight
+) -> tuple[Momenta, Sequence[int]] | None:
     """Momenta that show what flies, and the places of it in them; None where none is written."""
     for momenta in history.momenta:
         if (momenta.parts is None) != (flight.parts is None):

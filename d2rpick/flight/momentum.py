@@ -13,7 +13,15 @@ import numpy as np
 
 from d2rpick.base.errors import FormatError
 from d2rpick.flight.free_fall import Laws
-from d2rpick.flight.window import FEWEST, TOLERANCE, FreeFlight, all_windows, lasting_window, moments, unheld
+from d2rpick.flight.window import (
+    FEWEST,
+    TOLERANCE,
+    FreeFlight,
+    all_windows,
+    lasting_window,
+    moments,
+    unheld,
+)
 from d2rpick.histories.samples import bent, stretches, window
 
 if TYPE_CHECKING:
@@ -51,7 +59,9 @@ def to_be_asked(momenta: Sequence[Momenta]) -> Sequence[Momenta]:
     return [one for one in momenta if one.flying] or momenta
 
 
-def flight_around(momenta: Momenta, td: float, balance: Balance | None = None) -> FreeFlight | None:
+def flight_around(
+    momenta: Momenta, td: float, balance: Balance | None = None
+) -> FreeFlight | None:
     """Find the set of parts that flies freely around ``td`` for clearly the longest time, and when.
 
     Unless the set is known, tried are the chosen parts, these with the parts that move most against them, and all.
@@ -74,44 +84,67 @@ def flight_around(momenta: Momenta, td: float, balance: Balance | None = None) -
         return None
     for members in [momenta.flying] if momenta.flying else _sets(momenta, td):
         found = flight_of(momenta, members, td, balance)
-        if found and (best is None or found.end - found.start > _LONGER * (best.end - best.start)):
+        if found and (
+            best is None or found.end - found.start > _LONGER * (best.end - best.start)
+        ):
             best = _of_its_bodies(momenta, members, td, found) or best
     return best
 
 
-def _of_its_bodies(momenta: Momenta, members: Sequence[int], td: float, flight: FreeFlight) -> FreeFlight | None:
+def _of_its_bodies(
+    momenta: Momenta, members: Sequence[int], td: float, flight: FreeFlight
+) -> FreeFlight | None:
     """Give what of the flight of a set is one of each body in it: bodies that hit each other keep their momentum."""
     for part in bodies_apart(momenta, members):
         alone = flight_of(momenta, (part,), td)
         if alone is None:
             return None
-        start, end_seen = max(flight.start, alone.start), flight.end_seen or alone.end < flight.end
-        flight = flight._replace(start=start, end=min(flight.end, alone.end), end_seen=end_seen)
+        start, end_seen = (
+            max(flight.start, alone.start),
+            flight.end_seen or alone.end < flight.end,
+        )
+        flight = flight._replace(
+            start=start, end=min(flight.end, alone.end), end_seen=end_seen
+        )
     return flight if flight.start < flight.end else None
 
 
 def bodies_apart(momenta: Momenta, members: Sequence[int]) -> tuple[int, ...]:
     """Give the parts among ``members`` that fly by themselves at some time, at a velocity that is not that of all."""
-    return momenta.known.once(("apart", *members), lambda: tuple(_apart(momenta, members)))
+    return momenta.known.once(
+        ("apart", *members), lambda: tuple(_apart(momenta, members))
+    )
 
 
 def _apart(momenta: Momenta, members: Sequence[int]) -> Iterator[int]:
     mass, masses = momenta.mass(members), momenta.masses
-    if not momenta.parts or len(members) < 2 or masses is None or not mass > 0 or momenta.time.size < FEWEST:
+    if (
+        not momenta.parts
+        or len(members) < 2
+        or masses is None
+        or not mass > 0
+        or momenta.time.size < FEWEST
+    ):
         return
     velocity = momenta.of(members) / mass
     room = _OF_ITS_OWN * float(np.abs(velocity).max())
-    least, spans = _BY_ITSELF * float(momenta.time[-1] - momenta.time[0]), np.gradient(momenta.time)
+    least, spans = (
+        _BY_ITSELF * float(momenta.time[-1] - momenta.time[0]),
+        np.gradient(momenta.time),
+    )
     for part in members:
         if not masses[part] > 0:
             continue
-        relative = np.linalg.norm(momenta.values[:, part] / masses[part] - velocity, axis=1)
+        relative = np.linalg.norm(
+            momenta.values[:, part] / masses[part] - velocity, axis=1
+        )
         if float(spans[relative > room].sum()) <= least:
             continue  # whatever flights it has
         apart = (
             flight.end - flight.start
             for flight in _alone(momenta, part)
-            if float(relative[window(momenta.time, flight.start, flight.end)].min()) > room
+            if float(relative[window(momenta.time, flight.start, flight.end)].min())
+            > room
         )
         if sum(apart) > least:
             yield part
@@ -119,10 +152,15 @@ def _apart(momenta: Momenta, members: Sequence[int]) -> Iterator[int]:
 
 def _alone(momenta: Momenta, part: int) -> tuple[FreeFlight, ...]:
     """Give the flights of one part by itself, looked for once."""
-    return momenta.known.once(("alone", part), lambda: all_windows(momenta.time, partial(flight_of, momenta, (part,))))
+    return momenta.known.once(
+        ("alone", part),
+        lambda: all_windows(momenta.time, partial(flight_of, momenta, (part,))),
+    )
 
 
-def flight_of(momenta: Momenta, members: Sequence[int], td: float, balance: Balance | None = None) -> FreeFlight | None:
+def flight_of(
+    momenta: Momenta, members: Sequence[int], td: float, balance: Balance | None = None
+) -> FreeFlight | None:
     """Find the window around ``td`` in which these parts together fly freely, or None."""
     time, momentum = momenta.time, momenta.of(members)
     if time.size < FEWEST or not time[0] <= td <= time[-1]:
@@ -132,7 +170,9 @@ def flight_of(momenta: Momenta, members: Sequence[int], td: float, balance: Bala
     parts = None if momenta.parts is None else tuple(momenta.parts[i] for i in members)
     gravities = momenta.surroundings.gravity_on(parts)
     if extent <= max(2 * noise, _CONSTANT * float(np.abs(momentum).max())):
-        known = float(np.abs(momentum).max()) > noise and _moves(momenta, members, noise)
+        known = float(np.abs(momentum).max()) > noise and _moves(
+            momenta, members, noise
+        )
         known = known and (gravities is None or 0.0 in gravities)
         whole = FreeFlight.of(time, (0, time.size - 1), parts)
         return unheld(momenta.surroundings, whole, parts, td) if known else None
@@ -144,7 +184,10 @@ def flight_of(momenta: Momenta, members: Sequence[int], td: float, balance: Bala
         return None  # what does not fall with the others is carried
     first, last = states
     inside = momentum[first : last + 1]
-    if float(np.abs(inside[inside.shape[0] // 2 :]).max()) <= _HELD * float(np.abs(momentum).max()) + noise:
+    if (
+        float(np.abs(inside[inside.shape[0] // 2 :]).max())
+        <= _HELD * float(np.abs(momentum).max()) + noise
+    ):
         steady = _VISIBLE * max(noise, float(np.ptp(inside, axis=0).max()))
         if gravity or float(np.abs(inside.mean(axis=0)).max()) <= steady:
             return None  # held, or at rest
@@ -153,10 +196,16 @@ def flight_of(momenta: Momenta, members: Sequence[int], td: float, balance: Bala
     return unheld(momenta.surroundings, found, parts, td)
 
 
-def laws_of(momenta: Momenta, members: tuple[int, ...], balance: Balance | None = None) -> Laws:
+def laws_of(
+    momenta: Momenta, members: tuple[int, ...], balance: Balance | None = None
+) -> Laws:
     """Give the laws of free flight for a set of parts, made once for all td."""
-    whole = balance if momenta.parts is None or np.isnan(momenta.mass(members)) else None
-    return momenta.known.once(("laws", members, whole is None), lambda: Laws(momenta, members, whole))
+    whole = (
+        balance if momenta.parts is None or np.isnan(momenta.mass(members)) else None
+    )
+    return momenta.known.once(
+        ("laws", members, whole is None), lambda: Laws(momenta, members, whole)
+    )
 
 
 def _falls(momenta: Momenta) -> bool:
@@ -166,7 +215,9 @@ def _falls(momenta: Momenta) -> bool:
     )
 
 
-def all_flights(momenta: Momenta, balance: Balance | None = None) -> tuple[FreeFlight, ...]:
+def all_flights(
+    momenta: Momenta, balance: Balance | None = None
+) -> tuple[FreeFlight, ...]:
     """Find all windows of free flight of the chosen parts and what flies with them, ascending in time."""
     return all_windows(momenta.time, partial(flight_around, momenta, balance=balance))
 
@@ -174,7 +225,9 @@ def all_flights(momenta: Momenta, balance: Balance | None = None) -> tuple[FreeF
 def tells(momenta: Momenta) -> bool:
     """Whether the chosen parts, or the model, move enough for their momentum to say that they do not fly."""
     change = momenta.change(momenta.chosen)
-    return momenta.time.size >= FEWEST and change > _VISIBLE * momenta.noise(momenta.chosen)
+    return momenta.time.size >= FEWEST and change > _VISIBLE * momenta.noise(
+        momenta.chosen
+    )
 
 
 def _moves(momenta: Momenta, members: Sequence[int], noise: float) -> bool:
@@ -185,7 +238,11 @@ def _moves(momenta: Momenta, members: Sequence[int], noise: float) -> bool:
     """
     parts = momenta.chosen if momenta.values[:, list(momenta.chosen)].any() else members
     change = momenta.change(parts)
-    size = change if change > 2 * momenta.noise(parts) else float(np.abs(momenta.values[:, list(parts)]).max())
+    size = (
+        change
+        if change > 2 * momenta.noise(parts)
+        else float(np.abs(momenta.values[:, list(parts)]).max())
+    )
     return size > _VISIBLE * noise
 
 
@@ -196,7 +253,10 @@ def _sets(momenta: Momenta, td: float) -> Iterator[tuple[int, ...]]:
     """
     chosen = tuple(momenta.chosen)
     yield chosen
-    if len(chosen) == momenta.values.shape[1] and len(apart := bodies_apart(momenta, chosen)) > 0:
+    if (
+        len(chosen) == momenta.values.shape[1]
+        and len(apart := bodies_apart(momenta, chosen)) > 0
+    ):
         yield apart
     attached = tuple(sorted({*chosen, *_attached(momenta, chosen, td)}))
     if attached != chosen:
@@ -217,22 +277,34 @@ def _attached(momenta: Momenta, chosen: Sequence[int], td: float) -> tuple[int, 
     if look.size < FEWEST:
         return ()
     rests = bent(time[look], momenta.values[look].reshape(look.size, -1))
-    rests = rests.reshape(look.size, -1, 3).transpose(1, 0, 2).reshape(momenta.values.shape[1], -1)
+    rests = (
+        rests.reshape(look.size, -1, 3)
+        .transpose(1, 0, 2)
+        .reshape(momenta.values.shape[1], -1)
+    )
     sizes = np.linalg.norm(rests, axis=1)
     moving = [i for i in momenta.moving if sizes[i] > 0]
     if not set(chosen) & set(moving):
         return ()
-    wider = len(moving) > rests.shape[1]  # else all of the left is there, and the right is large
-    left, values, _ = np.linalg.svd(rests[moving] / sizes[moving, np.newaxis], full_matrices=wider)
+    wider = (
+        len(moving) > rests.shape[1]
+    )  # else all of the left is there, and the right is large
+    left, values, _ = np.linalg.svd(
+        rests[moving] / sizes[moving, np.newaxis], full_matrices=wider
+    )
     values = np.append(values, np.zeros(len(moving) - values.size))
     null = left[:, values <= _CANCELS * values[0]]
     shares = (null @ null.T) / np.outer(sizes[moving], sizes[moving])
     rows = [moving.index(i) for i in chosen if i in moving]
     joined = (shares[rows] > np.diag(shares)[rows, np.newaxis] / 2).any(axis=0)
-    return _polished(rests, {*chosen, *np.array(moving)[joined].tolist()}, chosen, moving)
+    return _polished(
+        rests, {*chosen, *np.array(moving)[joined].tolist()}, chosen, moving
+    )
 
 
-def _polished(rests: Samples, members: set[int], chosen: Sequence[int], moving: Sequence[int]) -> tuple[int, ...]:
+def _polished(
+    rests: Samples, members: set[int], chosen: Sequence[int], moving: Sequence[int]
+) -> tuple[int, ...]:
     """Add or leave out single parts as long as what is bent of the sum, (parts, k), becomes less."""
     total = rests[sorted(members)].sum(axis=0)
     free = [i for i in moving if i not in chosen]
@@ -282,9 +354,13 @@ def deformable_parts(run: Run) -> tuple[Part, ...]:
     """Give the parts that ever have internal energy; FormatError where there are none."""
     parts = run.parts
     energies = run.part_energies(parts)  # says why there are none
-    found = tuple(part for part, energy in zip(parts, energies.T, strict=True) if energy.any())
+    found = tuple(
+        part for part, energy in zip(parts, energies.T, strict=True) if energy.any()
+    )
     if not found:
-        raise FormatError(f"{run.name}: no part ever has internal energy; name the parts to be switched")
+        raise FormatError(
+            f"{run.name}: no part ever has internal energy; name the parts to be switched"
+        )
     return found
 
 
@@ -330,8 +406,12 @@ def _cores(momenta: Momenta) -> Iterator[tuple[int, ...]]:
     found: set[tuple[int, ...]] = set()
     for td in moments(momenta.time):
         attached = _attached(momenta, (heaviest,), td)
-        core = tuple(sorted((heaviest, *(i for i in attached if not _slides(momenta, i, td)))))
-        if len(core) <= len(attached) and core not in found:  # with all of them it was tried before
+        core = tuple(
+            sorted((heaviest, *(i for i in attached if not _slides(momenta, i, td))))
+        )
+        if (
+            len(core) <= len(attached) and core not in found
+        ):  # with all of them it was tried before
             found.add(core)
             yield core
 
@@ -345,10 +425,14 @@ def _slides(momenta: Momenta, part: int, td: float) -> bool:
 
 def _with_momenta(run: Run) -> tuple[tuple[Part, ...], Momenta | None]:
     deformable = deformable_parts(run)
-    return deformable, next((one for one in run.momenta(deformable, None) if one.parts), None)
+    return deformable, next(
+        (one for one in run.momenta(deformable, None) if one.parts), None
+    )
 
 
-def _of_bodies(momenta: Momenta, bodies: Iterable[Iterable[int]]) -> Iterator[FreeFlight]:
+def _of_bodies(
+    momenta: Momenta, bodies: Iterable[Iterable[int]]
+) -> Iterator[FreeFlight]:
     """Find the flights of parts that hang together, by their numbers."""
     places = {part.id: place for place, part in enumerate(momenta.parts or ())}
     for body in bodies:
@@ -358,14 +442,28 @@ def _of_bodies(momenta: Momenta, bodies: Iterable[Iterable[int]]) -> Iterator[Fr
 
 
 def _heaviest(
-    run: Run, deformable: Sequence[Part], momenta: Momenta | None, found: Sequence[FreeFlight]
+    run: Run,
+    deformable: Sequence[Part],
+    momenta: Momenta | None,
+    found: Sequence[FreeFlight],
 ) -> tuple[Part, ...]:
     """Give the deformable parts of the flight with the largest product of mass and time."""
     if not found or momenta is None:
-        raise FormatError(f"{run.name}: no momenta show which parts fly together; name the parts to be switched")
-    masses = np.ones(len(run.parts)) if momenta.masses is None else np.nan_to_num(momenta.masses)
+        raise FormatError(
+            f"{run.name}: no momenta show which parts fly together; name the parts to be switched"
+        )
+    masses = (
+        np.ones(len(run.parts))
+        if momenta.masses is None
+        else np.nan_to_num(momenta.masses)
+    )
     mass = dict(zip(run.parts, masses.tolist(), strict=True))
-    best = max(found, key=lambda one: (one.end - one.start) * sum(mass[part] for part in one.parts or ()))
+    best = max(
+        found,
+        key=lambda one: (
+            (one.end - one.start) * sum(mass[part] for part in one.parts or ())
+        ),
+    )
     return tuple(part for part in deformable if part in (best.parts or ()))
 
 
@@ -377,7 +475,9 @@ def believed(momenta: Momenta, whole: Momenta | None) -> tuple[slice, ...]:
     return stretches(complete(momenta, whole), FEWEST)
 
 
-def complete(momenta: Momenta, whole: Momenta | None, before: float = 0.0) -> NDArray[np.bool_]:
+def complete(
+    momenta: Momenta, whole: Momenta | None, before: float = 0.0
+) -> NDArray[np.bool_]:
     """Whether the momenta of parts (n,) are together those of the whole model.
 
     ``before`` is the largest momentum of the whole model in states before these.
@@ -385,6 +485,8 @@ def complete(momenta: Momenta, whole: Momenta | None, before: float = 0.0) -> ND
     if whole is None or whole.velocity or whole.time.size != momenta.time.size:
         return np.ones(momenta.time.size, np.bool_)
     everything = range(momenta.values.shape[1])
-    largest = np.maximum(np.maximum.accumulate(np.abs(whole.values[:, 0]).max(axis=1)), before)
+    largest = np.maximum(
+        np.maximum.accumulate(np.abs(whole.values[:, 0]).max(axis=1)), before
+    )
     off = np.abs(momenta.of(everything) - whole.values[:, 0]).max(axis=1)
     return np.asarray(off <= _ALL_OF_IT * largest + 2 * momenta.noise(everything))

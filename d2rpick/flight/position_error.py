@@ -16,7 +16,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from d2rpick.base.caching import cached_property
-from d2rpick.flight.rotation import moving_apart, off_the_circle, periods_of, shows_rotation
+from d2rpick.flight.rotation import (
+    moving_apart,
+    off_the_circle,
+    periods_of,
+    shows_rotation,
+)
 from d2rpick.flight.turning import Flying, turning_in_flight
 from d2rpick.flight.window import FEWEST
 from d2rpick.histories.samples import integral, window
@@ -72,7 +77,13 @@ class Drift:
         self, time: Samples, place: Samples, path: Samples, part: Part, doubt: float, turning: Turning | None = None,
         *, moving: Sequence[int] = (), slow: bool = False,
     ) -> None:  # fmt: skip
-        self.time, self.place, self.path, self.part, self.doubt = time, place, path, part, doubt
+        self.time, self.place, self.path, self.part, self.doubt = (
+            time,
+            place,
+            path,
+            part,
+            doubt,
+        )
         self.turning, self.moving, self.slow = turning, tuple(moving), slow
 
     @cached_property
@@ -82,7 +93,11 @@ class Drift:
         A slow one of the part does.  So does that of the others, where it turns their frame by more than is said of
         the body, or where no deck tells that, moves them by a notable share of what the part does.
         """
-        moved = float(np.sqrt(np.mean(np.square(self.place - self.place.mean(axis=0)).sum(axis=1))))
+        moved = float(
+            np.sqrt(
+                np.mean(np.square(self.place - self.place.mean(axis=0)).sum(axis=1))
+            )
+        )
         if moved <= _HARDLY * self.limit:
             return False
         if self.slow or self.turning is None:
@@ -97,17 +112,28 @@ class Drift:
         """
         if self.turning:
             return self._inside(tr, td, self.turning.offsets(tr, td))
-        there = np.stack([np.interp([*tr.tolist(), td], self.time, axis) for axis in self.place.T], axis=1)
+        there = np.stack(
+            [np.interp([*tr.tolist(), td], self.time, axis) for axis in self.place.T],
+            axis=1,
+        )
         return self._inside(tr, td, there[:-1] - there[-1])
 
     def angles(self, tr: Samples, td: float) -> Samples:
         """By how much the body is turned at td from where it should be, for times tr (k,) [degrees]; NaN if unknown."""
-        turned = np.full((tr.size, 3), np.nan) if self.turning is None else self.turning.angles(tr, td)
+        turned = (
+            np.full((tr.size, 3), np.nan)
+            if self.turning is None
+            else self.turning.angles(tr, td)
+        )
         return np.degrees(self._inside(tr, td, turned))
 
     def _inside(self, tr: Samples, td: float, vectors: Samples) -> Samples:
         """Lengths of vectors (k, 3), NaN outside the flight."""
-        inside = (tr >= self.time[0]) & (tr <= self.time[-1]) & (self.time[0] <= td <= self.time[-1])
+        inside = (
+            (tr >= self.time[0])
+            & (tr <= self.time[-1])
+            & (self.time[0] <= td <= self.time[-1])
+        )
         return np.where(inside, np.linalg.norm(vectors, axis=1), np.nan)
 
     @cached_property
@@ -134,7 +160,11 @@ def drift_of(seen: Flying, placement: Placement | None = None) -> Drift | None:
         None where it is not known: a mass is not, there are fewer than three parts, or two with hardly any mass beside
         the third, or the others are no rigid body by far.
     """
-    momenta, masses, inside = seen.momenta, seen.masses, window(seen.momenta.time, seen.start, seen.end)
+    momenta, masses, inside = (
+        seen.momenta,
+        seen.masses,
+        window(seen.momenta.time, seen.start, seen.end),
+    )
     time, mass = momenta.time[inside], masses[list(seen.members)]
     if momenta.parts is None or time.size < FEWEST or not np.isfinite(mass).all():
         return None
@@ -142,7 +172,9 @@ def drift_of(seen: Flying, placement: Placement | None = None) -> Drift | None:
     mass = masses[members]
     if not shows_rotation(mass):
         return None
-    ways, path = _ways(time, momenta.values[inside][:, members] / mass[:, np.newaxis], mass)
+    ways, path = _ways(
+        time, momenta.values[inside][:, members] / mass[:, np.newaxis], mass
+    )
     stride = -(-time.size // _STATES)
     moving, rate, rest = moving_apart(time[::stride], ways[::stride], mass)
     if not moving:
@@ -151,12 +183,18 @@ def drift_of(seen: Flying, placement: Placement | None = None) -> Drift | None:
         np.nansum(masses[sorted({*seen.others, *members})])
     )  # unknown ones left out: no error is told too small
     share = float(mass[moving].sum()) / whole
-    doubt = share * float(np.sqrt(rest / ((mass.sum() - mass[moving].sum()) * -(-time.size // stride))))
+    doubt = share * float(
+        np.sqrt(rest / ((mass.sum() - mass[moving].sum()) * -(-time.size // stride)))
+    )
     offsets = _offsets(time, ways, mass, moving, rate) * float(mass.sum()) / whole
     against = [members[i] for i in moving]
     ids = [momenta.parts[i].id for i in against]
     part = momenta.parts[against[int(np.argmax(np.square(offsets).sum(axis=(0, 2))))]]
-    turning = turning_in_flight(seen._replace(members=members), against, placement) if placement else None
+    turning = (
+        turning_in_flight(seen._replace(members=members), against, placement)
+        if placement
+        else None
+    )
     place = offsets.sum(axis=1)
     slow = bool(rate.any()) and periods_of(time[::stride], place[::stride], rate) < 1
     found = Drift(time, place, path, part, doubt, turning, moving=ids, slow=slow)
@@ -166,20 +204,30 @@ def drift_of(seen: Flying, placement: Placement | None = None) -> Drift | None:
 def _ways(time: Samples, velocity: Samples, mass: Samples) -> tuple[Samples, Samples]:
     """Give the ways of parts (n, parts, 3) against their centre of mass, and the path of that (n,) [length]."""
     centre = np.average(velocity, axis=1, weights=mass)
-    ways = integral(time, (velocity - centre[:, np.newaxis]).reshape(time.size, -1)).reshape(velocity.shape)
+    ways = integral(
+        time, (velocity - centre[:, np.newaxis]).reshape(time.size, -1)
+    ).reshape(velocity.shape)
     return ways, integral(time, np.linalg.norm(centre, axis=1))
 
 
-def _offsets(time: Samples, ways: Samples, mass: Samples, moving: Sequence[int], rate: Samples) -> Samples:
+def _offsets(
+    time: Samples, ways: Samples, mass: Samples, moving: Sequence[int], rate: Samples
+) -> Samples:
     """How far each of the moving parts pushes the others off, if no more flies, shape (n, moving, 3) [length]."""
     others = np.setdiff1d(np.arange(mass.size), moving)
     shares = mass[list(moving), np.newaxis] / mass.sum()
-    against = ways[:, list(moving)] - np.average(ways[:, others], axis=1, weights=mass[others])[:, np.newaxis]
+    against = (
+        ways[:, list(moving)]
+        - np.average(ways[:, others], axis=1, weights=mass[others])[:, np.newaxis]
+    )
     return np.asarray(-shares * off_the_circle(time, against, rate))
 
 
 def drift_in_flight(
-    history: History, flight: Flight, parts: Sequence[Part] | None = None, placement: Placement | None = None
+    history: History,
+    flight: Flight,
+    parts: Sequence[Part] | None = None,
+    placement: Placement | None = None,
 ) -> Drift | None:
     """Find the drift of the body that ``parts``, or those to be switched, become in a flight.
 
@@ -189,7 +237,9 @@ def drift_in_flight(
     return drift_of(seen, placement) if seen else None
 
 
-def apart_in_flight(history: History, flight: Flight, parts: Sequence[Part] | None = None) -> tuple[Part, ...]:
+def apart_in_flight(
+    history: History, flight: Flight, parts: Sequence[Part] | None = None
+) -> tuple[Part, ...]:
     """Give those of ``parts``, or of those to be switched, that fly away from the others: nothing joins them to these.
 
     The velocity of such a part against the others is constant, where that of a part of a body vibrates and turns.
@@ -203,22 +253,51 @@ def apart_in_flight(history: History, flight: Flight, parts: Sequence[Part] | No
     if time.size < FEWEST or len(members) < 2:
         return ()
     whole = momentum.sum(axis=1, keepdims=True)
-    against = momentum / mass[:, np.newaxis] - (whole - momentum) / (mass.sum() - mass)[:, np.newaxis]
-    speed, path = np.linalg.norm(against.mean(axis=0), axis=1), np.linalg.norm(whole[:, 0] / mass.sum(), axis=1)
+    against = (
+        momentum / mass[:, np.newaxis]
+        - (whole - momentum) / (mass.sum() - mass)[:, np.newaxis]
+    )
+    speed, path = (
+        np.linalg.norm(against.mean(axis=0), axis=1),
+        np.linalg.norm(whole[:, 0] / mass.sum(), axis=1),
+    )
     steady = np.linalg.norm(np.ptp(against, axis=0), axis=1) <= _STEADY * speed
-    far = speed * (time[-1] - time[0]) > MOST_OF_PATH * float(integral(time, path[:, np.newaxis])[-1, 0])
+    far = speed * (time[-1] - time[0]) > MOST_OF_PATH * float(
+        integral(time, path[:, np.newaxis])[-1, 0]
+    )
     alone = steady & far & (2 * mass <= mass.sum())
-    return tuple(seen.momenta.parts[i] for i, one in zip(members, alone.tolist(), strict=True) if one)
+    return tuple(
+        seen.momenta.parts[i]
+        for i, one in zip(members, alone.tolist(), strict=True)
+        if one
+    )
 
 
-def _seen(history: History, flight: Flight, parts: Sequence[Part] | None) -> Flying | None:
+def _seen(
+    history: History, flight: Flight, parts: Sequence[Part] | None
+) -> Flying | None:
     """Collect what a drift rests on; None where the momentum of single parts does not show the flight."""
-    momenta, masses = next((one for one in history.momenta if one.parts is not None), None), history.masses
-    if momenta is None or momenta.parts is None or masses is None or flight.parts is None or flight.refusal:
+    momenta, masses = (
+        next((one for one in history.momenta if one.parts is not None), None),
+        history.masses,
+    )
+    if (
+        momenta is None
+        or momenta.parts is None
+        or masses is None
+        or flight.parts is None
+        or flight.refusal
+    ):
         return None
     ids = {part.id for part in flight.parts}
-    wanted = {momenta.parts[i].id for i in momenta.chosen} if parts is None else {part.id for part in parts}
-    flying = [i for i in momenta.moving if momenta.parts[i].id in ids]  # the ground does not fly
+    wanted = (
+        {momenta.parts[i].id for i in momenta.chosen}
+        if parts is None
+        else {part.id for part in parts}
+    )
+    flying = [
+        i for i in momenta.moving if momenta.parts[i].id in ids
+    ]  # the ground does not fly
     members = [i for i in flying if momenta.parts[i].id in wanted]
     return Flying(momenta, masses, members, *flight.within(momenta.time), flying)
 
@@ -264,30 +343,51 @@ class Bodies:
     """
 
     def __init__(
-        self, drifts: Sequence[Drift | None], told: Sequence[RigidBody] | None, apart: Sequence[Part] = ()
+        self,
+        drifts: Sequence[Drift | None],
+        told: Sequence[RigidBody] | None,
+        apart: Sequence[Part] = (),
     ) -> None:
         self.told, self.apart = tuple(told or ()), tuple(apart)
         self._known = tuple(one for one in drifts if one)
         self._complete = len(self._known) == len(drifts) > 0
-        self.unknown = tuple(body for body, one in zip(self.told, drifts, strict=False) if one is None)
+        self.unknown = tuple(
+            body for body, one in zip(self.told, drifts, strict=False) if one is None
+        )
 
     def errors(self, tr: Samples, td: float) -> Samples:
         """How far the body that is off most will be at td, for times tr (k,) [length]; NaN outside the flight."""
-        return np.asarray(self._each(tr, td).max(axis=0)) if self._complete else np.full(tr.shape, np.nan)
+        return (
+            np.asarray(self._each(tr, td).max(axis=0))
+            if self._complete
+            else np.full(tr.shape, np.nan)
+        )
 
     @property
     def limit(self) -> float:
         """From which error on a body is out of place, the least of those whose parts move [length]."""
-        return min((one.limit for one in self._known if one.place.any()), default=np.inf)
+        return min(
+            (one.limit for one in self._known if one.place.any()), default=np.inf
+        )
 
     def worst(self, tr: float, td: float) -> Off | None:
         """Give the body that is off most; None outside the flight, and where one is not known."""
-        found = self._each(np.array([tr]), td)[:, 0] if self._complete else np.full(1, np.nan)
+        found = (
+            self._each(np.array([tr]), td)[:, 0]
+            if self._complete
+            else np.full(1, np.nan)
+        )
         if np.isnan(found).any():
             return None
         at = int(np.argmax(found))
         body = self.told[at] if len(self.told) > 1 else None
-        return Off(float(found[at]), self._known[at], body, not self.told, any(one.at_least for one in self._known))
+        return Off(
+            float(found[at]),
+            self._known[at],
+            body,
+            not self.told,
+            any(one.at_least for one in self._known),
+        )
 
     def _each(self, tr: Samples, td: float) -> Samples:
         """Errors by body, shape (bodies, k) [length]."""
@@ -295,7 +395,10 @@ class Bodies:
 
 
 def bodies_in_flight(
-    history: History, flight: Flight, told: Sequence[RigidBody] | None, placement: Placement | None = None
+    history: History,
+    flight: Flight,
+    told: Sequence[RigidBody] | None,
+    placement: Placement | None = None,
 ) -> Bodies:
     """Find how the bodies that the parts to be switched become drift in a flight.
 
@@ -311,8 +414,14 @@ def bodies_in_flight(
     """
     if not told:
         away = apart_in_flight(history, flight)
-        return Bodies([None if away else drift_in_flight(history, flight, placement=placement)], None, away)
-    parts = [[part for part in history.parts or () if part.id in body.parts] for body in told]
+        return Bodies(
+            [None if away else drift_in_flight(history, flight, placement=placement)],
+            None,
+            away,
+        )
+    parts = [
+        [part for part in history.parts or () if part.id in body.parts] for body in told
+    ]
     leaving = [apart_in_flight(history, flight, own) for own in parts]
     drifts = [
         None if some else _drift(history, flight, body, own, placement)
@@ -322,7 +431,11 @@ def bodies_in_flight(
 
 
 def _drift(
-    history: History, flight: Flight, body: RigidBody, parts: Sequence[Part], placement: Placement | None
+    history: History,
+    flight: Flight,
+    body: RigidBody,
+    parts: Sequence[Part],
+    placement: Placement | None,
 ) -> Drift | None:
     """Drift of one body of those parts that have energy; of a single part none at all while it flies."""
     if not body.whole or len(parts) < len(body.parts):
@@ -332,4 +445,6 @@ def _drift(
     (part,) = parts
     if flight.refusal or part.id not in {one.id for one in flight.parts or ()}:
         return None
-    return Drift(np.array(flight.within(history.time)), np.zeros((2, 3)), np.zeros(2), part, 0.0)
+    return Drift(
+        np.array(flight.within(history.time)), np.zeros((2, 3)), np.zeros(2), part, 0.0
+    )

@@ -35,7 +35,9 @@ _ALONG_AXIS: Final = 1e-6
 _PERIODS: Final = (*(n / 20 for n in range(4, 41)), *(2 * 1.1**n for n in range(1, 25)))
 
 
-def _steady_rotation(time: Samples, ways: Samples, masses: Samples, least: float) -> tuple[Samples, float]:
+def _steady_rotation(
+    time: Samples, ways: Samples, masses: Samples, least: float
+) -> tuple[Samples, float]:
     """Find the constant rate of rotation that explains the ways of the parts of a body about its centre best.
 
     Parameters
@@ -65,13 +67,22 @@ def _steady_rotation(time: Samples, ways: Samples, masses: Samples, least: float
     rest = _rest(time, ways, rate, weights)
     small, damping = _SMALL * 2 * np.pi / float(time[-1] - time[0]), 1e-3
     for _ in range(_MOST_STEPS):
-        changes = [(_rest(time, ways, rate + small * axis, weights) - rest).ravel() / small for axis in np.eye(3)]
+        changes = [
+            (_rest(time, ways, rate + small * axis, weights) - rest).ravel() / small
+            for axis in np.eye(3)
+        ]
         slope = np.stack(changes, axis=1)
         normal = slope.T @ slope
-        damped = normal + damping * np.trace(normal) * np.eye(3) / 3 + np.finfo(float).tiny * np.eye(3)
+        damped = (
+            normal
+            + damping * np.trace(normal) * np.eye(3) / 3
+            + np.finfo(float).tiny * np.eye(3)
+        )
         step = -np.linalg.solve(damped, slope.T @ rest.ravel())
         trial = _rest(time, ways, rate + step, weights)
-        gain = 1 - float(np.sum(trial**2)) / max(float(np.sum(rest**2)), np.finfo(float).tiny)
+        gain = 1 - float(np.sum(trial**2)) / max(
+            float(np.sum(rest**2)), np.finfo(float).tiny
+        )
         if gain >= 0:
             rate, rest, damping = rate + step, trial, damping / 10
         else:
@@ -106,10 +117,30 @@ def periods_of(time: Samples, left: Samples, rate: Samples) -> float:
     wanted = (left - left.mean(axis=0)).ravel()
     least, found = 0.5 * float(wanted @ wanted), np.inf
     for periods in _PERIODS:
-        phase = 2 * np.pi * periods * (time - time[0])[:, np.newaxis, np.newaxis] / (time[-1] - time[0])
-        motions = np.concatenate([np.cos(phase) * np.eye(3), np.sin(phase) * np.eye(3)], axis=1)
-        columns = off_the_circle(time, motions, rate).transpose(0, 2, 1).reshape(wanted.size, -1)
-        rest = float(np.sum((wanted - columns @ np.linalg.lstsq(columns, wanted, rcond=_ALONG_AXIS)[0]) ** 2))
+        phase = (
+            2
+            * np.pi
+            * periods
+            * (time - time[0])[:, np.newaxis, np.newaxis]
+            / (time[-1] - time[0])
+        )
+        motions = np.concatenate(
+            [np.cos(phase) * np.eye(3), np.sin(phase) * np.eye(3)], axis=1
+        )
+        columns = (
+            off_the_circle(time, motions, rate)
+            .transpose(0, 2, 1)
+            .reshape(wanted.size, -1)
+        )
+        rest = float(
+            np.sum(
+                (
+                    wanted
+                    - columns @ np.linalg.lstsq(columns, wanted, rcond=_ALONG_AXIS)[0]
+                )
+                ** 2
+            )
+        )
         if rest < least:
             least, found = rest, float(periods)
     return found
@@ -117,7 +148,11 @@ def periods_of(time: Samples, left: Samples, rate: Samples) -> float:
 
 def _least_ways(ways: Samples, masses: Samples) -> Samples:
     """Give for each part the m r^2 of the others about their own centre, in a frame at rest (parts,)."""
-    return np.asarray(_without_each(masses * np.sum((ways - ways.mean(axis=0)) ** 2, axis=(0, 2)), masses))
+    return np.asarray(
+        _without_each(
+            masses * np.sum((ways - ways.mean(axis=0)) ** 2, axis=(0, 2)), masses
+        )
+    )
 
 
 def _least_rests(time: Samples, ways: Samples, masses: Samples) -> Samples:
@@ -126,8 +161,12 @@ def _least_rests(time: Samples, ways: Samples, masses: Samples) -> Samples:
     In a rotation the velocity changes by rate x way, so that ways less their straight lines are rate x their integrals:
     linear in the rate, with normal equations that lose one part easily.
     """
-    square, right, normal = (_without_each(one, masses) for one in _linear(time, ways, masses))
-    solved = np.einsum("pij,pj->pi", np.linalg.pinv(normal, rcond=_ALONG_AXIS, hermitian=True), right)
+    square, right, normal = (
+        _without_each(one, masses) for one in _linear(time, ways, masses)
+    )
+    solved = np.einsum(
+        "pij,pj->pi", np.linalg.pinv(normal, rcond=_ALONG_AXIS, hermitian=True), right
+    )
     return np.asarray(square - np.einsum("pi,pi->p", right, solved))
 
 
@@ -136,14 +175,21 @@ def _without_each(terms: Samples, masses: Samples) -> Samples:
     return np.asarray(terms.sum(axis=0) - (terms.T / (1 - masses / masses.sum())).T)
 
 
-def _linear(time: Samples, ways: Samples, masses: Samples) -> tuple[Samples, Samples, Samples]:
+def _linear(
+    time: Samples, ways: Samples, masses: Samples
+) -> tuple[Samples, Samples, Samples]:
     """Terms of the linear equations of each part: squares (parts,), right sides (parts, 3), normal (parts, 3, 3)."""
     flat = ways.reshape(time.size, -1)
-    left, arm = (bent(time, values).reshape(ways.shape) for values in (flat, integral(time, flat)))
+    left, arm = (
+        bent(time, values).reshape(ways.shape)
+        for values in (flat, integral(time, flat))
+    )
     square = masses * np.einsum("npi,npi->p", left, left)
     right = masses[:, np.newaxis] * np.cross(arm, left).sum(axis=0)
     outer = np.einsum("npi,npj->pij", arm, arm)
-    normal = np.trace(outer, axis1=1, axis2=2)[:, np.newaxis, np.newaxis] * np.eye(3) - outer
+    normal = (
+        np.trace(outer, axis1=1, axis2=2)[:, np.newaxis, np.newaxis] * np.eye(3) - outer
+    )
     return square, right, masses[:, np.newaxis, np.newaxis] * normal
 
 
@@ -156,8 +202,12 @@ def _frame(time: Samples, rate: Samples) -> Samples:
     size = float(np.linalg.norm(rate))
     x, y, z = rate / size if size > 0 else np.zeros(3)
     angle = size * (time - time[0])[:, np.newaxis, np.newaxis]
-    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])  # across @ v is the cross product axis x v
-    return np.asarray(np.eye(3) + np.sin(angle) * across + (1 - np.cos(angle)) * (across @ across))
+    across = np.array(
+        [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
+    )  # across @ v is the cross product axis x v
+    return np.asarray(
+        np.eye(3) + np.sin(angle) * across + (1 - np.cos(angle)) * (across @ across)
+    )
 
 
 # Parts that are tried as the one that moves against the others, by what a rotation and by what rest leaves over.
@@ -174,12 +224,16 @@ _MOST_OF_BODY: Final = 0.95
 _HEAVY: Final = 0.05
 
 
-def moving_apart(time: Samples, ways: Samples, mass: Samples) -> tuple[list[int], Samples, float]:
+def moving_apart(
+    time: Samples, ways: Samples, mass: Samples
+) -> tuple[list[int], Samples, float]:
     """Find the parts that move against the others, the rate at which these turn, and their rest; none if unknown."""
     moving: list[int] = []
     rate, rest = np.zeros(3), np.inf
     while True:
-        found = _next_apart(time, ways, mass, np.setdiff1d(np.arange(mass.size), moving))
+        found = _next_apart(
+            time, ways, mass, np.setdiff1d(np.arange(mass.size), moving)
+        )
         if found is None or found.rest > _MORE_RIGID * rest:
             return moving, rate, rest
         part, rate, rest, _ = found
@@ -195,28 +249,56 @@ class _Apart(NamedTuple):
     effect: float
 
 
-def _next_apart(time: Samples, ways: Samples, mass: Samples, left: Places) -> _Apart | None:
+def _next_apart(
+    time: Samples, ways: Samples, mass: Samples, left: Places
+) -> _Apart | None:
     """Of the parts that are left, find that without which the others are most nearly rigid.
 
     A slide of one part may look like a rotation of all: of those alike in this, the one with most effect counts.
     """
     about, masses = _about_centre(ways[:, left], mass[left]), mass[left]
-    orders = (np.argsort(_least_rests(time, about, masses)), np.argsort(_least_ways(about, masses)))
-    may = [[one for one in left[order].tolist() if _may_leave(mass, left, one)][:_TRIED] for order in orders]
-    found = [_without(time, ways, mass, left, part) for part in dict.fromkeys(chain(*may))]
-    nothing = _NOTHING * float(np.sum(masses[:, np.newaxis] * (about - about.mean(axis=0)) ** 2))
+    orders = (
+        np.argsort(_least_rests(time, about, masses)),
+        np.argsort(_least_ways(about, masses)),
+    )
+    may = [
+        [one for one in left[order].tolist() if _may_leave(mass, left, one)][:_TRIED]
+        for order in orders
+    ]
+    found = [
+        _without(time, ways, mass, left, part) for part in dict.fromkeys(chain(*may))
+    ]
+    nothing = _NOTHING * float(
+        np.sum(masses[:, np.newaxis] * (about - about.mean(axis=0)) ** 2)
+    )
     least = min((one.rest for one in found), default=0.0) + nothing
     alike = [one for one in found if _MORE_RIGID * one.rest <= least]
     return max(alike, key=lambda one: one.effect, default=None)
 
 
-def _without(time: Samples, ways: Samples, mass: Samples, left: Places, part: int) -> _Apart:
+def _without(
+    time: Samples, ways: Samples, mass: Samples, left: Places, part: int
+) -> _Apart:
     """Leave one part out and see how the others turn."""
     others = left[left != part]
-    way = ways[:, [part]] - np.average(ways[:, others], axis=1, weights=mass[others])[:, np.newaxis]
-    least = _NOTABLE_WAY**2 * mass[others].sum() * float(np.sum((way - way.mean(axis=0)) ** 2))
-    rate, rest = _steady_rotation(time, _about_centre(ways[:, others], mass[others]), mass[others], least)
-    return _Apart(part, rate, rest, float(mass[part] * np.linalg.norm(off_the_circle(time, way, rate))))
+    way = (
+        ways[:, [part]]
+        - np.average(ways[:, others], axis=1, weights=mass[others])[:, np.newaxis]
+    )
+    least = (
+        _NOTABLE_WAY**2
+        * mass[others].sum()
+        * float(np.sum((way - way.mean(axis=0)) ** 2))
+    )
+    rate, rest = _steady_rotation(
+        time, _about_centre(ways[:, others], mass[others]), mass[others], least
+    )
+    return _Apart(
+        part,
+        rate,
+        rest,
+        float(mass[part] * np.linalg.norm(off_the_circle(time, way, rate))),
+    )
 
 
 def _about_centre(ways: Samples, mass: Samples) -> Samples:
@@ -226,7 +308,9 @@ def _about_centre(ways: Samples, mass: Samples) -> Samples:
 def _may_leave(mass: Samples, left: Places, part: int) -> bool:
     """Whether the others have half of the mass, not nearly all of it in one part."""
     others = mass[left[left != part]]
-    return bool(2 * others.sum() >= mass.sum() and others.max() <= _MOST_OF_BODY * others.sum())
+    return bool(
+        2 * others.sum() >= mass.sum() and others.max() <= _MOST_OF_BODY * others.sum()
+    )
 
 
 def shows_rotation(mass: Samples) -> bool:

@@ -60,16 +60,21 @@ class Turning(NamedTuple):
     def angles(self, tr: Samples, td: float) -> Samples:
         """By what a body that is rigid from each of ``tr`` (k,) is turned at td: psi, (k, 3) [rad]."""
         pushed, kept = (
-            _at(self.time, one, np.array([td])) - _at(self.time, one, tr) for one in (self.pushed, self.kept)
+            _at(self.time, one, np.array([td])) - _at(self.time, one, tr)
+            for one in (self.pushed, self.kept)
         )
-        turned = pushed - np.einsum("kaij,kij->ka", kept, _at(self.time, self.inertia, tr))
+        turned = pushed - np.einsum(
+            "kaij,kij->ka", kept, _at(self.time, self.inertia, tr)
+        )
         return np.asarray(turned @ _at(self.time, self.carried, np.array([td]))[0].T)
 
     def offsets(self, tr: Samples, td: float) -> Samples:
         """By how much it is out of place then, (k, 3) in its own frame [length]."""
         there = np.array([td])
         slid = _at(self.time, self.place, there) - _at(self.time, self.place, tr)
-        return np.asarray(slid + np.cross(self.angles(tr, td), _at(self.time, self.arm, there)))
+        return np.asarray(
+            slid + np.cross(self.angles(tr, td), _at(self.time, self.arm, there))
+        )
 
 
 class Flying(NamedTuple):
@@ -87,7 +92,9 @@ class Flying(NamedTuple):
     others: Collection[int] = ()
 
 
-def turning_in_flight(seen: Flying, moving: Sequence[int], placement: Placement) -> Turning | None:
+def turning_in_flight(
+    seen: Flying, moving: Sequence[int], placement: Placement
+) -> Turning | None:
     """Follow the orientation of the body that parts become, from where the deck puts all parts that fly.
 
     ``moving`` are the places of those that move against the others.  None where a mass or a place is not known, the
@@ -99,7 +106,11 @@ def turning_in_flight(seen: Flying, moving: Sequence[int], placement: Placement)
     placed = {i: placement.parts.get(momenta.parts[i].id) for i in every}
     known = [one for one in placed.values() if one]
     time, mass = momenta.time, masses[every]
-    if len(known) < len(every) or not np.isfinite(mass).all() or time[0] > time[1] - time[0]:
+    if (
+        len(known) < len(every)
+        or not np.isfinite(mass).all()
+        or time[0] > time[1] - time[0]
+    ):
         return None
     velocity = momenta.values[:, every] / mass[:, np.newaxis]
     centre = np.stack([one.centre for one in known])
@@ -117,25 +128,43 @@ def turning_in_flight(seen: Flying, moving: Sequence[int], placement: Placement)
     places, middle = where @ frames, np.einsum("ni,nij->nj", middle, frames)
     if _bent(shape, places[:, part] - middle[:, np.newaxis], mass[part]) > _MOST_BENT:
         return None
-    own = _inertia(np.einsum("p,pij->ij", mass, np.stack([one.spread for one in known])))
+    own = _inertia(
+        np.einsum("p,pij->ij", mass, np.stack([one.spread for one in known]))
+    )
     inertia, spin = _inertia(_second(places, mass)) + own, _spin(places, mass)
     moving_inertia = _inertia(_second(places[:, rigid], mass[rigid]))
     time = time[inside][::stride]
-    solved = _solved(time, frames, (inertia, spin), (moving_inertia, _spin(places[:, rigid], mass[rigid])))
-    place = np.einsum("p,npi->ni", mass[rigid], places[:, rigid] - middle[:, np.newaxis]) / mass.sum()
+    solved = _solved(
+        time,
+        frames,
+        (inertia, spin),
+        (moving_inertia, _spin(places[:, rigid], mass[rigid])),
+    )
+    place = (
+        np.einsum("p,npi->ni", mass[rigid], places[:, rigid] - middle[:, np.newaxis])
+        / mass.sum()
+    )
     doubt = _doubt(shape, places[:, part] - middle[:, np.newaxis] - shape, mass[part])
-    looked_at = placement.watched_centre(momenta.parts[i].id for i in body)  # by the deck
+    looked_at = placement.watched_centre(
+        momenta.parts[i].id for i in body
+    )  # by the deck
     arm = middle + (0.0 if looked_at is None else looked_at - home)
     return Turning(time, place, arm, moving_inertia, *solved, doubt)
 
 
-def _frame_of(seen: Flying, moving: Sequence[int], placement: Placement) -> Sequence[int]:
+def _frame_of(
+    seen: Flying, moving: Sequence[int], placement: Placement
+) -> Sequence[int]:
     """Parts that make the frame of the body: those that hang together and do not move against each other."""
     parts = seen.momenta.parts or ()
     still = [i for i in seen.members if i not in moving]
     together = placement.hanging_together([parts[i].id for i in still])
     main = [i for i in still if parts[i].id in together]
-    return main if seen.masses[main].sum() >= _MOST * seen.masses[list(seen.members)].sum() else still
+    return (
+        main
+        if seen.masses[main].sum() >= _MOST * seen.masses[list(seen.members)].sum()
+        else still
+    )
 
 
 def _doubt(shape: Samples, bent: Samples, mass: Samples) -> float:
@@ -146,14 +175,21 @@ def _doubt(shape: Samples, bent: Samples, mass: Samples) -> float:
     """
     count = mass.size
     alone = mass * mass.sum() / (mass.sum() - mass)
-    others = _second(shape[np.newaxis], mass) - np.einsum("p,pi,pj->pij", alone, shape, shape)
+    others = _second(shape[np.newaxis], mass) - np.einsum(
+        "p,pi,pj->pij", alone, shape, shape
+    )
     light = np.linalg.pinv(_inertia(others), rcond=_ALONG_LINE, hermitian=True)
-    turned = np.einsum("pij,npj->npi", light, alone[:, np.newaxis] * np.cross(shape, bent))
+    turned = np.einsum(
+        "pij,npj->npi", light, alone[:, np.newaxis] * np.cross(shape, bent)
+    )
     return float(np.sqrt(2 * (count - 1) / count * turned.var(axis=0).sum()))
 
 
 def _solved(
-    time: Samples, frames: Samples, whole: tuple[Samples, Samples], moving: tuple[Samples, Samples]
+    time: Samples,
+    frames: Samples,
+    whole: tuple[Samples, Samples],
+    moving: tuple[Samples, Samples],
 ) -> tuple[Samples, Samples, Samples]:
     """Solve the equation of psi: a matrix that carries it, what pushes it, and what the inertia at tr takes off."""
     (inertia, spin), steps = whole, np.diff(time)
@@ -164,9 +200,16 @@ def _solved(
     rate = momentum @ light
     carried = _carried(time, light @ _across(momentum) - _across(rate))
     back = _halves(np.asarray(np.linalg.inv(carried), dtype=np.float64)) @ light
-    dragged = np.einsum("nij,nj->ni", _halves(moving[0]), _halves(rate)) * steps[:, np.newaxis] + moving[1]
+    dragged = (
+        np.einsum("nij,nj->ni", _halves(moving[0]), _halves(rate))
+        * steps[:, np.newaxis]
+        + moving[1]
+    )
     pushed = np.einsum("nij,nj->ni", back, dragged)
-    per_inertia = back[..., np.newaxis] * (_halves(rate) * steps[:, np.newaxis])[:, np.newaxis, np.newaxis]
+    per_inertia = (
+        back[..., np.newaxis]
+        * (_halves(rate) * steps[:, np.newaxis])[:, np.newaxis, np.newaxis]
+    )
     return carried, _running(pushed), _running(per_inertia)
 
 
@@ -188,9 +231,13 @@ def _orientations(shape: Samples, where: Samples, mass: Samples) -> Samples:
 
 def _bent(shape: Samples, places: Samples, mass: Samples) -> float:
     """How far parts are from their shape, over its size across its longest axis; infinite for parts on a line."""
-    least = np.linalg.eigvalsh(_second(shape[np.newaxis], mass)[0])[:2].sum() / mass.sum()
+    least = (
+        np.linalg.eigvalsh(_second(shape[np.newaxis], mass)[0])[:2].sum() / mass.sum()
+    )
     across = np.sqrt(max(0.0, float(least)))
-    off = np.sqrt(np.einsum("p,npi->", mass, (places - shape) ** 2) / (len(places) * mass.sum()))
+    off = np.sqrt(
+        np.einsum("p,npi->", mass, (places - shape) ** 2) / (len(places) * mass.sum())
+    )
     return float(off / across) if across > 0 else np.inf
 
 
@@ -200,7 +247,14 @@ def _turns(frames: Samples) -> Samples:
     odd = (between - between.transpose(0, 2, 1)) / 2
     sine = np.stack([odd[:, 2, 1], odd[:, 0, 2], odd[:, 1, 0]], axis=1)
     size = np.linalg.norm(sine, axis=1, keepdims=True)
-    return np.asarray(sine * np.where(size > 0, np.arcsin(np.minimum(size, 1.0)) / np.where(size > 0, size, 1.0), 1.0))
+    return np.asarray(
+        sine
+        * np.where(
+            size > 0,
+            np.arcsin(np.minimum(size, 1.0)) / np.where(size > 0, size, 1.0),
+            1.0,
+        )
+    )
 
 
 def _mean(values: Samples, mass: Samples) -> Samples:
@@ -213,7 +267,10 @@ def _second(places: Samples, mass: Samples) -> Samples:
 
 def _inertia(second: Samples) -> Samples:
     """Tensor of inertia by the second moments (..., 3, 3)."""
-    return np.asarray(np.trace(second, axis1=-2, axis2=-1)[..., np.newaxis, np.newaxis] * np.eye(3) - second)
+    return np.asarray(
+        np.trace(second, axis1=-2, axis2=-1)[..., np.newaxis, np.newaxis] * np.eye(3)
+        - second
+    )
 
 
 def _spin(places: Samples, mass: Samples) -> Samples:

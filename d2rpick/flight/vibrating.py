@@ -52,7 +52,9 @@ def vibrating_beside(history: History, flight: Flight) -> Beside:
     return Beside(tuple(compress(others, notable)), float(ranges[notable].sum()))
 
 
-def kinetic_energy_of(history: History, flight: Flight) -> tuple[Samples, Samples] | None:
+def kinetic_energy_of(
+    history: History, flight: Flight
+) -> tuple[Samples, Samples] | None:
     """Give the kinetic energy of all that vibrates together in the flight, without that of its fall.
 
     Parameters

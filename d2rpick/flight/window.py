@@ -61,7 +61,14 @@ class FreeFlight(NamedTuple):
     ) -> FreeFlight:  # fmt: skip
         """Give the flight from the first to the last of some states of a record."""
         first, last = states
-        return cls(float(time[first]), float(time[last]), parts, last < time.size - 1, damping, gravity)
+        return cls(
+            float(time[first]),
+            float(time[last]),
+            parts,
+            last < time.size - 1,
+            damping,
+            gravity,
+        )
 
 
 class Law:
@@ -98,7 +105,14 @@ class Constant(Law):
 
 
 def lasting_window(
-    law: Law, td: float, extent: float, noise: float, *, fades: bool = False, enough: float = 0.0, rings: bool = False
+    law: Law,
+    td: float,
+    extent: float,
+    noise: float,
+    *,
+    fades: bool = False,
+    enough: float = 0.0,
+    rings: bool = False,
 ) -> tuple[int, int] | None:
     """Find the states around ``td`` that obey the law and go on doing so when it is taken strictly.
 
@@ -124,18 +138,31 @@ def lasting_window(
     time = law.time
     at = min(int(np.searchsorted(time, td)), time.size - 1)
     limit, own = max(TOLERANCE, enough) * extent, max(noise, ROUND_OFF * extent)
-    found = _converged(law, at, limit, own if fades else limit, noise, enough * extent, rings=rings)
+    found = _converged(
+        law, at, limit, own if fades else limit, noise, enough * extent, rings=rings
+    )
     if found is None:
         return None
     window, room, from_start = found
     first, last = _tightened(law, window, own, room)
     if first == 1 and from_start:
         first = 0  # a solver may write the first state before its first step, with what belongs half a step earlier
-    return (first, last) if time[first] <= td <= time[last] and _long_enough(time, (first, last)) else None
+    return (
+        (first, last)
+        if time[first] <= td <= time[last] and _long_enough(time, (first, last))
+        else None
+    )
 
 
 def _converged(
-    law: Law, at: int, limit: float, finest: float, noise: float, enough: float, *, rings: bool
+    law: Law,
+    at: int,
+    limit: float,
+    finest: float,
+    noise: float,
+    enough: float,
+    *,
+    rings: bool,
 ) -> tuple[tuple[int, int], float, bool] | None:
     """Find the window around the state ``at`` that hardly shrinks at a tenth of the limit; None where it does.
 
@@ -154,7 +181,9 @@ def _converged(
         share = _length(time, finer) / _length(time, window)
         if found and share < _STAYS:
             break
-        lasts = share >= (1 + np.cbrt(strict / room)) / 2 or (rings and _rings(law, window))
+        lasts = share >= (1 + np.cbrt(strict / room)) / 2 or (
+            rings and _rings(law, window)
+        )
         if not _TIGHTER * limit >= finest:
             return (window, room, from_start) if lasts else found or kept
         if (
@@ -163,7 +192,12 @@ def _converged(
             and (kept is None or 2 * _length(time, window) >= _length(time, kept[0]))
         ):
             kept = window, room, from_start
-        window, limit, room, at = finer, _TIGHTER * limit, strict, (finer[0] + finer[1]) // 2
+        window, limit, room, at = (
+            finer,
+            _TIGHTER * limit,
+            strict,
+            (finer[0] + finer[1]) // 2,
+        )
         found = (window, room, from_start) if lasts else None
     return found or kept
 
@@ -171,7 +205,9 @@ def _converged(
 def _rings(law: Law, window: tuple[int, int]) -> bool:
     """Whether a law is missed in the middle half of a window as in the whole; by what is smooth it is by an eighth."""
     quarter = (window[1] - window[0]) // 4
-    return law.misfit(window[0] + quarter, window[1] - quarter) >= _RINGS * law.misfit(*window)
+    return law.misfit(window[0] + quarter, window[1] - quarter) >= _RINGS * law.misfit(
+        *window
+    )
 
 
 def _fading(window: tuple[int, int], finer: tuple[int, int]) -> bool:
@@ -210,18 +246,26 @@ def marks(time: Samples, td: float) -> Iterator[float]:
     yield from sorted(times, key=lambda moment: abs(moment - td))[:2]
 
 
-def all_windows(time: Samples, around: Callable[[float], FreeFlight | None]) -> tuple[FreeFlight, ...]:
+def all_windows(
+    time: Samples, around: Callable[[float], FreeFlight | None]
+) -> tuple[FreeFlight, ...]:
     """Find all flights of a record, ascending in time, where ``around`` gives the one around a time."""
     found: list[FreeFlight] = []
     for moment in moments(time):
         if not found or moment > found[-1].end:
             flight = around(moment)
             if flight:  # the tolerance may let it begin some samples before the last one has ended
-                found.append(flight._replace(start=max(flight.start, found[-1].end)) if found else flight)
+                found.append(
+                    flight._replace(start=max(flight.start, found[-1].end))
+                    if found
+                    else flight
+                )
     return tuple(found)
 
 
-def _tightened(law: Law, window: tuple[int, int], noise: float, loose: float) -> tuple[int, int]:
+def _tightened(
+    law: Law, window: tuple[int, int], noise: float, loose: float
+) -> tuple[int, int]:
     """Shrink a window until its ends deviate no more than its middle: what is left of a load there is cut off.
 
     The tolerance hides the last, weak pushes of a load.  The middle of the flight knows how exactly the run obeys
@@ -236,14 +280,18 @@ def _tightened(law: Law, window: tuple[int, int], noise: float, loose: float) ->
         own = law.misfit(first + inset, last - inset)
         room = _REACH_OF_DIGITS * noise + _REACH * max(0.0, own - noise)
         tight = longest_window(law, (first + last) // 2, room)
-        tighter = tight if room <= loose else (max(first, tight[0]), min(last, tight[1]))
+        tighter = (
+            tight if room <= loose else (max(first, tight[0]), min(last, tight[1]))
+        )
         if tighter == window:
             break
         window = tighter
     return _without_what_is_hidden(law, window, room)
 
 
-def _without_what_is_hidden(law: Law, window: tuple[int, int], room: float) -> tuple[int, int]:
+def _without_what_is_hidden(
+    law: Law, window: tuple[int, int], room: float
+) -> tuple[int, int]:
     """Cut off what of a push the ``room`` still hides at the ends of a window.
 
     A push that fades smoothly leaves a deviation that falls with the square of the time that is left of it: from four
@@ -254,7 +302,9 @@ def _without_what_is_hidden(law: Law, window: tuple[int, int], room: float) -> t
     most = round(_ENDS * (last - first))
     return (
         first + min(most, max(0, first - wide[0] - 1)) if wide[0] > 0 else first,
-        last - min(most, max(0, wide[1] - last - 1)) if wide[1] < law.time.size - 1 else last,
+        last - min(most, max(0, wide[1] - last - 1))
+        if wide[1] < law.time.size - 1
+        else last,
     )
 
 
@@ -284,11 +334,16 @@ def farthest(start: int, limit: int, fits: Callable[[int], bool]) -> int:
 
 
 def unheld(
-    surroundings: Surroundings, flight: FreeFlight | None, parts: Sequence[Part] | None, td: float
+    surroundings: Surroundings,
+    flight: FreeFlight | None,
+    parts: Sequence[Part] | None,
+    td: float,
 ) -> FreeFlight | None:
     """Give what of a flight around ``td`` [time] lies between the times in which parts, or the model, are held."""
     between = surroundings.free(parts, td)
     if between is None or flight is None:
         return None
     start, end = max(flight.start, between[0]), min(flight.end, between[1])
-    return flight._replace(start=start, end=end, end_seen=flight.end_seen or end < flight.end)
+    return flight._replace(
+        start=start, end=end, end_seen=flight.end_seen or end < flight.end
+    )

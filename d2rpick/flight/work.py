@@ -77,14 +77,24 @@ def _most_gravity(velocity: Samples, kinetic: Samples) -> float:
     """Largest factor of the integral of F v: the motion as a whole has no more than all of the kinetic energy."""
     squares = np.sum(velocity**2, axis=1)
     fast = squares > _SLOW * squares.max(initial=0.0)
-    return _MASS_ERROR * float((2 * kinetic[fast] / squares[fast]).min()) if fast.any() else np.inf
+    return (
+        _MASS_ERROR * float((2 * kinetic[fast] / squares[fast]).min())
+        if fast.any()
+        else np.inf
+    )
 
 
-def _rest(values: Samples, free: Sequence[Samples], one_sided: Sequence[Samples], most: float) -> Samples:
+def _rest(
+    values: Samples, free: Sequence[Samples], one_sided: Sequence[Samples], most: float
+) -> Samples:
     """What least squares leave of ``values``; columns of ``one_sided`` are only added, the first ``most`` times."""
     first, *others = one_sided
     for gravity in ([first], []):
-        used = [column / np.abs(column).max() for column in (*gravity, *others) if column.any()]
+        used = [
+            column / np.abs(column).max()
+            for column in (*gravity, *others)
+            if column.any()
+        ]
         rest, factors = _least_squares(values, free, used)
         if not (gravity and first.any() and factors[0] > most * np.abs(first).max()):
             return rest
@@ -92,7 +102,9 @@ def _rest(values: Samples, free: Sequence[Samples], one_sided: Sequence[Samples]
     return rest
 
 
-def _least_squares(values: Samples, free: Sequence[Samples], used: Sequence[Samples]) -> tuple[Samples, Samples]:
+def _least_squares(
+    values: Samples, free: Sequence[Samples], used: Sequence[Samples]
+) -> tuple[Samples, Samples]:
     """What is left of ``values``, and the factors of the columns ``used``, none of them negative."""
     kept = list(range(len(used)))
     while True:
@@ -122,7 +134,12 @@ def change_of_balance(balance: Balance, start: float, end: float) -> float | Non
     kinetic = None if balance.kinetic is None else balance.kinetic[inside]
     law = _Parabola(balance.time[inside], whole[inside][:, np.newaxis], kinetic)
     rest = law.misfit(0, law.time.size - 1)
-    return max(0.0, rest - 2 * balance.precision.noise(whole) - _OWN_ERROR * float(np.ptp(whole[inside])))
+    return max(
+        0.0,
+        rest
+        - 2 * balance.precision.noise(whole)
+        - _OWN_ERROR * float(np.ptp(whole[inside])),
+    )
 
 
 def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
@@ -133,10 +150,17 @@ def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
     so smoothly that its energy looks like it.
     """
     time, terms = balance.time, _terms(balance)
-    if balance.velocity is not None or not terms or time.size < FEWEST or not time[0] <= td <= time[-1]:
+    if (
+        balance.velocity is not None
+        or not terms
+        or time.size < FEWEST
+        or not time[0] <= td <= time[-1]
+    ):
         return None
     extent = min(float(np.ptp(term)) for term in terms)
-    if balance.internal is not None:  # a crash into a fixed wall leaves the sum as it was
+    if (
+        balance.internal is not None
+    ):  # a crash into a fixed wall leaves the sum as it was
         extent = max(extent, _OF_INTERNAL * float(np.ptp(balance.internal)))
     noise = balance.precision.noise(np.stack(terms))
     if noise > _OWN_ERROR * extent:
@@ -144,17 +168,28 @@ def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
     # without and with a rate, which takes up what tells a load from free flight, too
     exact, ringing = balance.known.once(
         "work",
-        lambda: [_Parabola(time, np.stack(terms, axis=1), balance.kinetic, of) for of in (None, balance.internal)],
+        lambda: [
+            _Parabola(time, np.stack(terms, axis=1), balance.kinetic, of)
+            for of in (None, balance.internal)
+        ],
     )
     window = lasting_window(exact, td, extent, noise)
-    rings = lasting_window(ringing, td, extent, noise, rings=True) if window is None else None
+    rings = (
+        lasting_window(ringing, td, extent, noise, rings=True)
+        if window is None
+        else None
+    )
     found = window or rings
     if found is None:
         return None
-    return FreeFlight.of(time, found, gravity=_unexplained(balance, *found) or (np.nan if rings else 0.0))
+    return FreeFlight.of(
+        time, found, gravity=_unexplained(balance, *found) or (np.nan if rings else 0.0)
+    )
 
 
-def lowered_by_damping(balance: Balance, flight: FreeFlight, momenta: Momenta | None) -> tuple[list[Samples], float]:
+def lowered_by_damping(
+    balance: Balance, flight: FreeFlight, momenta: Momenta | None
+) -> tuple[list[Samples], float]:
     """Give energies (n,) of a balance that damping lowers in a flight, and what their digits leave open [energy].
 
     The first is the sum of kinetic and internal energy; none is given where a load of unknown size works on it, too.
@@ -173,7 +208,9 @@ def lowered_by_damping(balance: Balance, flight: FreeFlight, momenta: Momenta | 
     sums = [whole]
     sums += [] if balance.damping is None else [-balance.damping]
     sums += [] if work is None or not flight.gravity else [whole - work]
-    largest = float(np.abs(whole[window(balance.time, flight.start, flight.end)]).max(initial=0.0))
+    largest = float(
+        np.abs(whole[window(balance.time, flight.start, flight.end)]).max(initial=0.0)
+    )
     return sums, _OF_DIGITS * balance.precision.noise(np.ones(1)) * largest
 
 
@@ -189,12 +226,19 @@ def _work_of_gravity(balance: Balance, flight: FreeFlight, momenta: Momenta) -> 
     force = FreeFall(time[inside], momentum[inside]).gravity()
     along = momentum @ force / np.linalg.norm(force)
     if momenta.velocity and balance.kinetic is not None:
-        along *= _most_gravity(momentum, np.interp(time, balance.time, balance.kinetic)) / _MASS_ERROR
+        along *= (
+            _most_gravity(momentum, np.interp(time, balance.time, balance.kinetic))
+            / _MASS_ERROR
+        )
     return np.interp(balance.time, time, flight.gravity * integral(time, along))
 
 
 def taken_by_damping(
-    balance: Balance, start: float, end: float, vibration: Callable[[Samples], Samples], alpha: float | None
+    balance: Balance,
+    start: float,
+    end: float,
+    vibration: Callable[[Samples], Samples],
+    alpha: float | None,
 ) -> bool | None:
     r"""Whether kinetic and internal energy together change between two times [time] as a vibration is damped.
 
@@ -204,13 +248,19 @@ def taken_by_damping(
     no load is taken for either (docs/choosing.md, "Energies that look like flight").  None where an energy is missing.
     """
     inside = window(balance.time, start, end)
-    whole, kinetic, time = balance.kinetic_and_internal, balance.kinetic, balance.time[inside]
+    whole, kinetic, time = (
+        balance.kinetic_and_internal,
+        balance.kinetic,
+        balance.time[inside],
+    )
     if whole is None or kinetic is None or not time.size:
         return None
     of_vibration = vibration(time)
     changes = [float(np.ptp(whole[inside] - of_vibration))]
     if alpha is not None:
-        changes.append(float(np.ptp(whole[inside] + 2 * alpha * integral(time, kinetic[inside]))))
+        changes.append(
+            float(np.ptp(whole[inside] + 2 * alpha * integral(time, kinetic[inside])))
+        )
     return min(changes) <= _LITTLE * float((kinetic[inside] - of_vibration).max())
 
 
@@ -230,23 +280,37 @@ def _unexplained(balance: Balance, first: int, last: int) -> float:
     if grown > _LITTLE * largest:
         return np.inf
     spent = -integral(balance.time[states], kinetic[states])
-    rest, _ = _least_squares(whole[states], [np.ones(last - first + 1)], [spent] if spent.any() else [])
+    rest, _ = _least_squares(
+        whole[states], [np.ones(last - first + 1)], [spent] if spent.any() else []
+    )
     lost = float(whole[first] - whole[last])
     bent = float(np.ptp(rest)) / largest if largest > 0 else 0.0
-    if (bent <= _OWN_ERROR and lost >= _MUCH * largest) or (bent <= _LITTLE and lost <= _LITTLE * largest):
+    if (bent <= _OWN_ERROR and lost >= _MUCH * largest) or (
+        bent <= _LITTLE and lost <= _LITTLE * largest
+    ):
         return 0.0
     if balance.internal is None or lost <= np.ptp(balance.internal[states]):
         return np.nan
     elapsed = balance.time[states] - balance.time[first]
-    pulled, _ = _least_squares(whole[states], [np.ones_like(elapsed), elapsed, elapsed**2], [])
+    pulled, _ = _least_squares(
+        whole[states], [np.ones_like(elapsed), elapsed, elapsed**2], []
+    )
     return np.nan if bent <= _OWN_ERROR and np.ptp(rest) < np.ptp(pulled) else np.inf
 
 
 def _terms(balance: Balance) -> list[Samples]:
     """Energies that change by gravity and damping only, as far as they are written and change at all."""
     whole, internal = balance.kinetic_and_internal, balance.internal
-    changes = whole is not None and internal is not None and (np.ptp(whole) > 0 or np.ptp(internal) > 0)
-    return [term for term in (balance.worked, whole if changes else None) if term is not None]
+    changes = (
+        whole is not None
+        and internal is not None
+        and (np.ptp(whole) > 0 or np.ptp(internal) > 0)
+    )
+    return [
+        term
+        for term in (balance.worked, whole if changes else None)
+        if term is not None
+    ]
 
 
 class _Parabola(Law):
@@ -256,7 +320,11 @@ class _Parabola(Law):
     """
 
     def __init__(
-        self, time: Samples, energies: Samples, kinetic: Samples | None, internal: Samples | None = None
+        self,
+        time: Samples,
+        energies: Samples,
+        kinetic: Samples | None,
+        internal: Samples | None = None,
     ) -> None:
         super().__init__(time)
         self.energies = energies
@@ -270,9 +338,15 @@ class _Parabola(Law):
         if time.size < FEWEST_STATES:
             return 0.0
         elapsed = (time - time[0]) / (time[-1] - time[0])
-        others = [(one[states] - one[states.start]) / extent for one in self.others if (extent := np.ptp(one[states]))]
+        others = [
+            (one[states] - one[states.start]) / extent
+            for one in self.others
+            if (extent := np.ptp(one[states]))
+        ]
         table = np.stack([np.ones_like(elapsed), elapsed, elapsed**2, *others], axis=1)
-        scale = 2.0 ** (np.frexp(np.abs(self.energies[states]).max())[1] - 1)  # exact; squares of 1e200 would overflow
+        scale = 2.0 ** (
+            np.frexp(np.abs(self.energies[states]).max())[1] - 1
+        )  # exact; squares of 1e200 would overflow
         energies = self.energies[states] / scale
         factors, *_ = np.linalg.lstsq(table, energies, rcond=None)
         return float(np.abs(energies - table @ factors).max()) * float(scale)
@@ -300,7 +374,9 @@ def plateau_around(balance: Balance, td: float) -> FreeFlight | None:
     if energy is None or not time[0] <= td <= time[-1]:
         return None
     law = balance.known.once("sliding", lambda: Constant(time, energy[:, np.newaxis]))
-    states = lasting_window(law, td, float(np.ptp(energy)), balance.precision.noise(energy))
+    states = lasting_window(
+        law, td, float(np.ptp(energy)), balance.precision.noise(energy)
+    )
     if states is None or (states[0] == 0 and balance.external_work is None):
         return None
     return FreeFlight.of(time, states, gravity=_unexplained(balance, *states))

@@ -10,7 +10,11 @@ import numpy as np
 from d2rpick.base.errors import FormatError, if_written
 from d2rpick.histories.formats import READERS
 from d2rpick.histories.history import Balance, Momenta, Samples
-from d2rpick.histories.meaning import ROTATION_ENERGY, is_internal_energy, is_total_internal_energy
+from d2rpick.histories.meaning import (
+    ROTATION_ENERGY,
+    is_internal_energy,
+    is_total_internal_energy,
+)
 from d2rpick.histories.names import Part, normalised
 from d2rpick.histories.samples import median
 
@@ -35,7 +39,11 @@ _QUANTITIES: Final[Mapping[str, str]] = {
 # Abaqus' total energy is what is left of all energies without the external work: it stays as it is at the start.
 _LESS_WORK: Final = frozenset({"etotal", "allwk"})
 # Without one of these nothing can be said of the health.
-_JUDGED: Final = frozenset(_QUANTITIES.values()) - {"kinetic_energy", "frictional_contact_energy", "damping_energy"}
+_JUDGED: Final = frozenset(_QUANTITIES.values()) - {
+    "kinetic_energy",
+    "frictional_contact_energy",
+    "damping_energy",
+}
 # Normalised names.
 _WALLS: Final = ("stonewallenergy", "rigidwallenergy")
 _GLOBAL_VELOCITIES: Final = ("globalxvelocity", "globalyvelocity", "globalzvelocity")
@@ -44,7 +52,10 @@ _VELOCITIES: Final = ("x_velocity", "y_velocity", "z_velocity")
 
 
 def balance_of(
-    databases: Sequence[Legs], parts: Sequence[Part] | None, until: float = np.inf, known: Balance | None = None
+    databases: Sequence[Legs],
+    parts: Sequence[Part] | None,
+    until: float = np.inf,
+    known: Balance | None = None,
 ) -> Balance | None:
     """Read the balance of the whole model, and the hourglass energy of ``parts``, up to a time [time].
 
@@ -75,7 +86,9 @@ def terms_of(databases: Sequence[Legs]) -> Balance | None:
 
 def momentum_of(database: Legs) -> Momenta | None:
     """Read the momentum of the whole model, or its velocity, which is the same but for the mass; None without."""
-    if {*_MOMENTA, *_VELOCITIES}.isdisjoint(database.quantities) and not _global_velocities(database):
+    if {*_MOMENTA, *_VELOCITIES}.isdisjoint(
+        database.quantities
+    ) and not _global_velocities(database):
         return None
     columns = if_written(lambda: _Columns(database, database.time.size))
     values = columns.velocity() if columns else None
@@ -83,14 +96,26 @@ def momentum_of(database: Legs) -> Momenta | None:
         return None
     values = values[:, np.newaxis]
     precision = database.precisions(columns.used)[1]
-    mass = (columns.mass(values) if columns.momentum else 0.0) or float("nan")  # nothing moves, or it is not known
-    return Momenta(database.time, values, None, precision, (0,), masses=np.array([mass]), velocity=not columns.momentum)
+    mass = (columns.mass(values) if columns.momentum else 0.0) or float(
+        "nan"
+    )  # nothing moves, or it is not known
+    return Momenta(
+        database.time,
+        values,
+        None,
+        precision,
+        (0,),
+        masses=np.array([mass]),
+        velocity=not columns.momentum,
+    )
 
 
 def least_masses(momenta: Samples, kinetic: Samples) -> Samples:
     """Least masses (k,) that have such momenta (n, k, 3) at such kinetic energies (n, k); 0 where there is none."""
     squares = np.sum(momenta**2, axis=2)
-    found = np.divide(squares, 2 * kinetic, out=np.zeros(squares.shape), where=kinetic > 0)
+    found = np.divide(
+        squares, 2 * kinetic, out=np.zeros(squares.shape), where=kinetic > 0
+    )
     return np.asarray(found.max(axis=0))
 
 
@@ -99,7 +124,9 @@ def _whole(databases: Sequence[Legs]) -> Legs | None:
 
 
 def _terms(whole: Legs, until: float) -> Balance | None:
-    columns = if_written(lambda: _Columns(whole, int(np.searchsorted(whole.time, until, side="right"))))
+    columns = if_written(
+        lambda: _Columns(whole, int(np.searchsorted(whole.time, until, side="right")))
+    )
     if columns is None:
         return None
     found = {term: columns.quantity(quantity) for term, quantity in _QUANTITIES.items()}
@@ -109,7 +136,11 @@ def _terms(whole: Legs, until: float) -> Balance | None:
     walls = (columns.called(name) for name in _WALLS)
     found["wall"] = next((energy for energy in walls if energy is not None), None)
     total, work = found["total"], found["external_work"]
-    if total is not None and work is not None and _LESS_WORK.issubset(map(normalised, columns.used)):
+    if (
+        total is not None
+        and work is not None
+        and _LESS_WORK.issubset(map(normalised, columns.used))
+    ):
         found["total"] = total + work
     return Balance(
         time=whole.time[: columns.states],
@@ -155,7 +186,10 @@ class _Columns:
 
     def called(self, wanted: str) -> Samples | None:
         """Return the column with this normalised name."""
-        name = next((name for name in self._database.channels if normalised(name) == wanted), None)
+        name = next(
+            (name for name in self._database.channels if normalised(name) == wanted),
+            None,
+        )
         return None if name is None else self._values(name)
 
     def velocity(self) -> Samples | None:
@@ -195,7 +229,9 @@ def _stack_components(components: Sequence[Samples | None]) -> Samples | None:
     if len(known) < 2:
         return None
     still = np.zeros_like(known[0])
-    return np.stack([still if component is None else component for component in components], axis=1)
+    return np.stack(
+        [still if component is None else component for component in components], axis=1
+    )
 
 
 def _hourglass_of(
@@ -205,11 +241,17 @@ def _hourglass_of(
     ids = [part.id for part in parts]
     for database in databases:
         try:
-            hourglass, internal = (database.part_channel(name, ids) for name in ("hourglass_energy", "internal_energy"))
+            hourglass, internal = (
+                database.part_channel(name, ids)
+                for name in ("hourglass_energy", "internal_energy")
+            )
         except FormatError:
             continue
         before = database.part_time <= until
-        highest = (energy[before].max(axis=0, initial=0.0).tolist() for energy in (hourglass, internal))
+        highest = (
+            energy[before].max(axis=0, initial=0.0).tolist()
+            for energy in (hourglass, internal)
+        )
         return tuple(zip(parts, *highest, strict=True))
     return ()
 
@@ -231,7 +273,9 @@ def spring_energy(database: Legs) -> tuple[str, Samples] | None:
     total = database.energy_channel
     if not READERS[database.format].solver or total is None:
         return None
-    name = next((name for name in database.channels if normalised(name) in _SPRINGS), None)
+    name = next(
+        (name for name in database.channels if normalised(name) in _SPRINGS), None
+    )
     if name is None:
         return None
     energies = if_written(lambda: (database.channel(name), database.channel(total)))
@@ -240,7 +284,9 @@ def spring_energy(database: Legs) -> tuple[str, Samples] | None:
     found, whole = energies
     least = max(_NONE * float(np.abs(whole).max()), _FLOOR)
     rest = whole - found
-    told_apart = found.max() > least and rest.max() > least and rest.min() >= -least  # it is part of the whole
+    told_apart = (
+        found.max() > least and rest.max() > least and rest.min() >= -least
+    )  # it is part of the whole
     return (name, found) if told_apart else None
 
 
@@ -251,7 +297,10 @@ def springs_among(
 
     ``energies`` are those of all parts, shape (n, parts), at ``time`` (n,).
     """
-    named = next(((one.time, found[1]) for one in databases if (found := spring_energy(one))), None)
+    named = next(
+        ((one.time, found[1]) for one in databases if (found := spring_energy(one))),
+        None,
+    )
     if named is None or not time.size > len(parts) > 0:
         return ()
     inside = (time >= named[0][0]) & (time <= named[0][-1])
@@ -259,6 +308,9 @@ def springs_among(
     if not wanted.any() or not np.isfinite(table).all():
         return ()
     chosen = np.linalg.lstsq(table, wanted, rcond=None)[0] > _HALF
-    if np.abs(table[:, chosen].sum(axis=1) - wanted).max() > _ADDS_UP * np.abs(wanted).max():
+    if (
+        np.abs(table[:, chosen].sum(axis=1) - wanted).max()
+        > _ADDS_UP * np.abs(wanted).max()
+    ):
         return ()
     return tuple(part for part, one in zip(parts, chosen.tolist(), strict=True) if one)

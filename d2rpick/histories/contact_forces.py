@@ -69,7 +69,8 @@ class ContactForce(NamedTuple):
     def times(self) -> tuple[tuple[float, float], ...]:
         """Times (start, end) in which it acts, ascending: from the last state without a force to the next one."""
         return tuple(
-            (float(self.time[max(one.start - 1, 0)]), float(self.time[one.stop - 1])) for one in stretches(self.acts)
+            (float(self.time[max(one.start - 1, 0)]), float(self.time[one.stop - 1]))
+            for one in stretches(self.acts)
         )
 
     @property
@@ -85,7 +86,9 @@ def joined(pieces: Sequence[ContactForce], keep: NDArray[np.bool_]) -> ContactFo
     """
     if len(pieces) == 1 and keep.all():
         return pieces[0]
-    columns = zip(*((piece.time, piece.impulses, piece.acts) for piece in pieces), strict=True)
+    columns = zip(
+        *((piece.time, piece.impulses, piece.acts) for piece in pieces), strict=True
+    )
     time, impulses, acts = (np.concatenate(column) for column in columns)
     begins = np.zeros(time.size, np.bool_)
     begins[np.cumsum([0, *(piece.time.size for piece in pieces[:-1])])] = True

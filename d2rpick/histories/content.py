@@ -29,7 +29,9 @@ if TYPE_CHECKING:
 
 _HELD: Final = 1 << 24  # a file up to this size is held in memory
 _LINES: Final = 1 << 16  # bytes in which line ends are counted at a time
-_END: Final = 1 << 12  # bytes at both ends of what counts, by which a file that has grown is known again
+_END: Final = (
+    1 << 12
+)  # bytes at both ends of what counts, by which a file that has grown is known again
 
 
 class Content:
@@ -70,7 +72,9 @@ class Content:
         """
         end = begin + len(room) * stride
         if len(room):
-            room[:] = self.fields(np.arange(begin, end, stride, dtype=np.int64), room.shape[1])
+            room[:] = self.fields(
+                np.arange(begin, end, stride, dtype=np.int64), room.shape[1]
+            )
         return self[end : end + rest]
 
     def check(self) -> None:
@@ -96,8 +100,12 @@ class OnDisk(Content):
     """
 
     # How many bytes are read at a time.
-    block = 1 << 19  # where many are wanted, a power of 2: they stay in the cache meanwhile
-    gap = 1 << 13  # between two that are read together: a call of the system costs more than these
+    block = (
+        1 << 19
+    )  # where many are wanted, a power of 2: they stay in the cache meanwhile
+    gap = (
+        1 << 13
+    )  # between two that are read together: a call of the system costs more than these
     window = 1 << 16  # where few are wanted: more will be, mostly behind them
 
     def __init__(self, name: str, file: int, state: FileState) -> None:
@@ -105,7 +113,10 @@ class OnDisk(Content):
 
         self._name, self._number = name, file
         self._file = FileIO(file, closefd=False)
-        self._lock, self._own = Lock(), local()  # of each thread: its buffer and its window
+        self._lock, self._own = (
+            Lock(),
+            local(),
+        )  # of each thread: its buffer and its window
         self._state, self._size = state, state.size
         self._digest, self._ends = "", self._read_ends()
 
@@ -184,15 +195,23 @@ class OnDisk(Content):
         """Read what lies close together in one piece, and what lies alone by itself."""
         found = np.empty((addresses.size, width), np.uint8)
         apart = (np.diff(addresses) > self.gap) | (np.diff(addresses & -self.block) > 0)
-        firsts = np.flatnonzero(np.append(True, apart)) if addresses.size else np.empty(0, np.int64)
+        firsts = (
+            np.flatnonzero(np.append(True, apart))
+            if addresses.size
+            else np.empty(0, np.int64)
+        )
         ends = np.append(firsts[1:], addresses.size)
         several = ends - firsts > 1
-        for first, end in zip(firsts[several].tolist(), ends[several].tolist(), strict=True):
+        for first, end in zip(
+            firsts[several].tolist(), ends[several].tolist(), strict=True
+        ):
             low = int(addresses[first])
             near = self.view(low, int(addresses[end - 1]) + width)
             found[first:end] = _gathered(near, addresses[first:end] - low, width)
         alone, room = firsts[~several], found.reshape(-1).data
-        for place, address in zip((alone * width).tolist(), addresses[alone].tolist(), strict=True):
+        for place, address in zip(
+            (alone * width).tolist(), addresses[alone].tolist(), strict=True
+        ):
             self._fill(room[place : place + width], address)
         return found
 
@@ -203,7 +222,9 @@ class OnDisk(Content):
 
             digest = hashlib.sha256()
             for begin in range(0, self._size, self.block):
-                digest.update(self.view(begin, min(begin + self.block, self._size)).data)
+                digest.update(
+                    self.view(begin, min(begin + self.block, self._size)).data
+                )
             self.check()
             self._digest = digest.hexdigest()
         return self._digest
@@ -224,7 +245,9 @@ class OnDisk(Content):
 
     def _shortened(self) -> ChangedError:
         found = f"{self._name}: the file was {self._size} bytes long and became shorter while it was read"
-        return ChangedError(f"{found}; is a solver writing it anew? Read it again when it has")
+        return ChangedError(
+            f"{found}; is a solver writing it anew? Read it again when it has"
+        )
 
     def check(self) -> None:
         """Make sure that what was read so far is all of one state of the file; ChangedError where it is not."""
@@ -237,7 +260,9 @@ class OnDisk(Content):
             now = FileState.of(self._file)
         if now.size < self._size:
             raise self._shortened()
-        untouched = now.size > self._size or now.modified == self._state.modified  # it has grown, or got another name
+        untouched = (
+            now.size > self._size or now.modified == self._state.modified
+        )  # it has grown, or got another name
         if not untouched or self._read_ends() != self._ends:
             found = f"{self._name}: the file was rewritten while it was read"
             raise ChangedError(f"{found}; read it again when it is complete")
@@ -250,7 +275,9 @@ class OnDisk(Content):
     def _read_ends(self) -> tuple[bytes, bytes]:
         """First and last bytes of what counts."""
         length = min(_END, self._size)
-        return self.view(0, length).tobytes(), self.view(self._size - length, self._size).tobytes()
+        return self.view(0, length).tobytes(), self.view(
+            self._size - length, self._size
+        ).tobytes()
 
 
 class Scattered(OnDisk):
@@ -286,7 +313,9 @@ class Scattered(OnDisk):
         except OSError:
             raise self._shortened() from None
         if not now.continues(self._state):
-            raise ChangedError(f"{self._name}: the file was rewritten while it was read; read it again")
+            raise ChangedError(
+                f"{self._name}: the file was rewritten while it was read; read it again"
+            )
 
     def _fill(self, room: memoryview, begin: int) -> None:
         with FileIO(self._name) as file:
@@ -345,7 +374,9 @@ def _reopen(name: str, state: FileState, ends: tuple[bytes, bytes]) -> OnDisk:
             on_disk = OnDisk(name, os.dup(file.fileno()), state)
     except OSError as error:
         reason = error.strerror or error
-        raise FormatError(f"{name}: the run cannot be copied: its file cannot be read ({reason})") from None
+        raise FormatError(
+            f"{name}: the run cannot be copied: its file cannot be read ({reason})"
+        ) from None
     on_disk.check_ends(ends)
     return on_disk
 
@@ -358,5 +389,7 @@ def line_at(data: Content, address: int) -> int:
 
 def _gathered(data: Bytes, addresses: Addresses, width: int) -> Bytes:
     # every address seen as the start of a field: fetching is then plain indexing
-    fields = np.ndarray((max(0, data.size - width + 1),), f"V{width}", data, strides=(1,))
+    fields = np.ndarray(
+        (max(0, data.size - width + 1),), f"V{width}", data, strides=(1,)
+    )
     return fields[addresses].view(np.uint8).reshape(-1, width)

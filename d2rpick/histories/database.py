@@ -90,7 +90,9 @@ class Database:
 
     def branch(self, name: str) -> Database:
         """Give what holds the whole model, ``glstat``, or the parts, ``matsum``; FormatError where there is none."""
-        raise FormatError(f"{self.source}: {self.no_channels if name == 'glstat' else self.no_parts}")
+        raise FormatError(
+            f"{self.source}: {self.no_channels if name == 'glstat' else self.no_parts}"
+        )
 
     @cached_property
     def time(self) -> Samples:
@@ -113,7 +115,14 @@ class Database:
     @property
     def energy_channel(self) -> str | None:
         """Name of the internal energy of the whole model; None where there is none."""
-        return next((name for name in ("internal energy", "internal_energy") if name in self.channels), None)
+        return next(
+            (
+                name
+                for name in ("internal energy", "internal_energy")
+                if name in self.channels
+            ),
+            None,
+        )
 
     def find(self, wanted: str) -> str:
         """Name of the column that the user means, by name or, in tables, by number; FormatError with what there is."""
@@ -147,13 +156,23 @@ class Legs:
         self._cut = cut  # files whose packed data ends early
         self._own_notes = notes  # on other files
         self._named = named  # quantities whose channels have unusual names
-        several = len(legs) > 1  # of one leg the times are not looked at: they may not be known yet
+        several = (
+            len(legs) > 1
+        )  # of one leg the times are not looked at: they may not be known yet
         self._files = sorted(legs, key=_leg_order) if several else [*legs]
-        self._legs = [leg for leg in self._files if not several or _start(leg) > -np.inf] or self._files
-        self._energies: tuple[tuple[int, ...], Samples] | None = None  # of the parts that were asked for last
+        self._legs = [
+            leg for leg in self._files if not several or _start(leg) > -np.inf
+        ] or self._files
+        self._energies: tuple[tuple[int, ...], Samples] | None = (
+            None  # of the parts that were asked for last
+        )
         self.source = ", ".join(leg.source for leg in self._files)
         first = self._legs[0]
-        self.format, self.version, self.named_by_people = first.format, first.version, first.named_by_people
+        self.format, self.version, self.named_by_people = (
+            first.format,
+            first.version,
+            first.named_by_people,
+        )
         self.title, self.time_unit = first.title, first.time_unit
         self.complete = all(leg.complete for leg in self._files) and not cut
 
@@ -166,7 +185,11 @@ class Legs:
     def channels(self) -> tuple[str, ...]:
         """Columns that all legs have."""
         others = [{*leg.channels} for leg in self._legs[1:]]
-        return tuple(name for name in self._legs[0].channels if all(name in names for names in others))
+        return tuple(
+            name
+            for name in self._legs[0].channels
+            if all(name in names for names in others)
+        )
 
     @cached_property
     def quantities(self) -> Mapping[str, str]:
@@ -175,28 +198,43 @@ class Legs:
         Where several have names of one quantity none of them is taken, unless one is named like the quantity itself.
         """
         found = find_quantities(self.channels)
-        sure = {quantity: names[0] for quantity, names in found.items() if len(names) == 1}
-        own = {quantity: quantity for quantity, names in found.items() if quantity in names}
+        sure = {
+            quantity: names[0] for quantity, names in found.items() if len(names) == 1
+        }
+        own = {
+            quantity: quantity for quantity, names in found.items() if quantity in names
+        }
         told = {}
         for quantity, name in self._named:
-            with suppress(FormatError):  # another database of the run has it, or `open_run` objects
+            with suppress(
+                FormatError
+            ):  # another database of the run has it, or `open_run` objects
                 told[quantity] = self.find(name)
         return sure | own | told
 
     @cached_property
     def parts(self) -> tuple[Part, ...]:
         """Parts that all legs have."""
-        return with_namesakes(part for part in self._legs[0].parts if part.id not in self._passing)
+        return with_namesakes(
+            part for part in self._legs[0].parts if part.id not in self._passing
+        )
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """Notes of the legs, and what was left out between them."""
-        kept = self._kept[1] if self.channels else ()  # first: reading the columns may add notes to the legs
+        kept = (
+            self._kept[1] if self.channels else ()
+        )  # first: reading the columns may add notes to the legs
         notes = [*self._own_notes]
-        notes += [f"{name}: the packed data ends early; it was read up to there" for name in self._cut]
+        notes += [
+            f"{name}: the packed data ends early; it was read up to there"
+            for name in self._cut
+        ]
         notes += [note for leg in self._files for note in leg.notes]
         if self._passing:
-            notes.append(f"{self.source}: only some legs have part {listing(self._passing)}, which was left out")
+            notes.append(
+                f"{self.source}: only some legs have part {listing(self._passing)}, which was left out"
+            )
         notes += kept
         if self.parts:
             notes += self._parts_kept[1]
@@ -228,9 +266,15 @@ class Legs:
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
         """One quantity of some parts; their energies are read-only, since several ask for those of the same parts."""
-        if quantity == "internal_energy" and self._energies and self._energies[0] == tuple(ids):
+        if (
+            quantity == "internal_energy"
+            and self._energies
+            and self._energies[0] == tuple(ids)
+        ):
             return self._energies[1]
-        values = self._joined([leg.part_channel(quantity, ids) for leg in self._legs], self._parts_kept[0])
+        values = self._joined(
+            [leg.part_channel(quantity, ids) for leg in self._legs], self._parts_kept[0]
+        )
         if quantity == "internal_energy":
             values = values.view()
             values.flags.writeable = False
@@ -240,15 +284,22 @@ class Legs:
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
         """Those of the coarsest leg."""
         found = [leg.precisions(names) for leg in self._legs]
-        return min((t for t, _ in found), key=_digits), min((e for _, e in found), key=_digits)
+        return min((t for t, _ in found), key=_digits), min(
+            (e for _, e in found), key=_digits
+        )
 
     @cached_property
     def contact_forces(self) -> tuple[ContactForce, ...]:
         """Forces of the contacts and rigid walls that all legs have."""
-        legs = [{force.name: force for force in leg.contact_forces} for leg in self._legs]
+        legs = [
+            {force.name: force for force in leg.contact_forces} for leg in self._legs
+        ]
         common = [name for name in legs[0] if all(name in leg for leg in legs)]
         pieces = [[leg[name] for leg in legs] for name in common]
-        return tuple(joined(of_one, self._order([leg.time for leg in of_one])[0]) for of_one in pieces)
+        return tuple(
+            joined(of_one, self._order([leg.time for leg in of_one])[0])
+            for of_one in pieces
+        )
 
     @cached_property
     def _passing(self) -> tuple[int, ...]:
@@ -264,13 +315,17 @@ class Legs:
     def _parts_kept(self) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
         return self._order([leg.part_time for leg in self._legs])
 
-    def _order(self, times: Sequence[Samples]) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
+    def _order(
+        self, times: Sequence[Samples]
+    ) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
         """Which states count, and what to say of the others."""
         for leg, time in zip(self._legs, times, strict=True):
             back, steps = int(np.count_nonzero(time[1:] < time[:-1])), time.size - 1
             if back > 1 and back > _MOST_BACK * steps:
                 found = f"{leg.source}: time steps back at {back} of {steps} states, increasing times were expected"
-                raise FormatError(f"{found}; check that this is the time (`time`) and the file is not damaged")
+                raise FormatError(
+                    f"{found}; check that this is the time (`time`) and the file is not damaged"
+                )
         every = _together(times)
         keep, notes = newest_states(every)
         behind = np.cumsum([time.size for time in times])
@@ -293,7 +348,10 @@ def _together(columns: Sequence[Samples]) -> Samples:
 
 def _times(database: Database | Legs) -> list[Samples]:
     """Times of the whole model and of the parts, as far as there are any."""
-    return [*([database.time] if database.channels else []), *([database.part_time] if database.parts else [])]
+    return [
+        *([database.time] if database.channels else []),
+        *([database.part_time] if database.parts else []),
+    ]
 
 
 def _start(leg: Database) -> float:
@@ -315,13 +373,21 @@ def _holes(time: Samples) -> tuple[str, ...]:
     """Say where output stops for long, as it does where a leg is missing."""
     if time.size < 4:
         return ()
-    pieces = (np.diff(time[first : first + _PIECE + 1]) for first in range(0, time.size - 1, _PIECE))
-    shortest, longest = zip(*((piece.min(), piece.max()) for piece in pieces), strict=True)
+    pieces = (
+        np.diff(time[first : first + _PIECE + 1])
+        for first in range(0, time.size - 1, _PIECE)
+    )
+    shortest, longest = zip(
+        *((piece.min(), piece.max()) for piece in pieces), strict=True
+    )
     if max(longest) <= _LONG * min(shortest):  # as nearly always
         return ()
     steps = np.diff(time)
     holes = np.flatnonzero(steps > _LONG * np.sort(steps)[steps.size // 2])
-    return tuple(f"no states between {time[i]:.6g} and {time[i + 1]:.6g}; is a leg missing?" for i in holes[:3])
+    return tuple(
+        f"no states between {time[i]:.6g} and {time[i + 1]:.6g}; is a leg missing?"
+        for i in holes[:3]
+    )
 
 
 # Output intervals may differ, but a solver writes at its own cycles: unless less than this share of the states of the
@@ -347,16 +413,27 @@ def check_sum(whole: Legs, holder: Legs, energies: Samples) -> None:
             return
     except FormatError:  # which column it is, is not asked here
         return
-    here, there = _coincident(holder.part_time, whole.time, _room((holder, whole), (holder.part_time, whole.time)))
+    here, there = _coincident(
+        holder.part_time,
+        whole.time,
+        _room((holder, whole), (holder.part_time, whole.time)),
+    )
     if not here.size:
         return
-    parts, model = energies[here].sum(axis=1), whole.channel(whole.energy_channel)[there]
+    parts, model = (
+        energies[here].sum(axis=1),
+        whole.channel(whole.energy_channel)[there],
+    )
     kinetic = whole.quantities.get("kinetic_energy")
     moving = float(np.abs(whole.channel(kinetic)[there]).max()) if kinetic else 0.0
-    room, most = _MORE * float(np.abs(model).max()) + _ROUND_OFF * moving, int(np.argmax(parts - model))
+    room, most = (
+        _MORE * float(np.abs(model).max()) + _ROUND_OFF * moving,
+        int(np.argmax(parts - model)),
+    )
     if parts[most] - model[most] > room > 0:
         found = (
-            f"at {holder.part_time[here][most]:.6g} the parts of {holder.source} have an energy of {parts[most]:.6g}"
+            f"at {holder.part_time[here][most]:.6g} the parts of {holder.source} have an "
+            f"energy of {parts[most]:.6g}"
         )
         what = f"{found}, the whole model of {whole.source} has {model[most]:.6g}: files of one run were expected"
         raise FormatError(f"{what}; give those of one run")
@@ -368,7 +445,9 @@ def doubts(databases: Sequence[Legs]) -> Iterator[str]:
         if not (one.span and other.span):
             continue
         times = [_times(database)[0] for database in (one, other)]
-        if abs(times[0][-1] - times[1][-1]) > _ENDS_APART * max(np.diff(t).max(initial=0.0) for t in times):
+        if abs(times[0][-1] - times[1][-1]) > _ENDS_APART * max(
+            np.diff(t).max(initial=0.0) for t in times
+        ):
             found = f"{one.source} ends at {times[0][-1]:.6g} and {other.source} at {times[1][-1]:.6g}"
             yield f"{found}; are they from the same run, or is one cut?"
         low, high = max(t[0] for t in times), min(t[-1] for t in times)
@@ -379,7 +458,9 @@ def doubts(databases: Sequence[Legs]) -> Iterator[str]:
             yield f"{found}; are they from the same run?"
 
 
-def _coincident(times: Samples, others: Samples, room: float) -> tuple[Indices, Indices]:
+def _coincident(
+    times: Samples, others: Samples, room: float
+) -> tuple[Indices, Indices]:
     """Indices of the times that lie within ``room`` [time] of one of the others, and of the nearest of these.
 
     Examples
@@ -391,7 +472,9 @@ def _coincident(times: Samples, others: Samples, room: float) -> tuple[Indices, 
         return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp)
     behind = np.searchsorted(others, times)
     before, after = (np.clip(behind - step, 0, others.size - 1) for step in (1, 0))
-    nearest = np.where(np.abs(others[before] - times) < np.abs(others[after] - times), before, after)
+    nearest = np.where(
+        np.abs(others[before] - times) < np.abs(others[after] - times), before, after
+    )
     here = np.flatnonzero(np.abs(others[nearest] - times) <= room)
     return here, nearest[here]
 
@@ -399,4 +482,11 @@ def _coincident(times: Samples, others: Samples, room: float) -> tuple[Indices, 
 def _room(databases: Sequence[Legs], times: Sequence[Samples]) -> float:
     """By how much a time may differ in two databases, as they print it [time]."""
     ends = zip(databases, times, strict=True)
-    return sum(database.precisions(())[0].quantum(float(time[-1])) for database, time in ends if time.size) / 2
+    return (
+        sum(
+            database.precisions(())[0].quantum(float(time[-1]))
+            for database, time in ends
+            if time.size
+        )
+        / 2
+    )

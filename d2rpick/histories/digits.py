@@ -84,7 +84,11 @@ def window_as_read(start: float, end: float) -> str:
     ('0.0880001 to 0.3108', '0.10005206 to 0.10005208')
     """
     low, high = not_before(start), not_after(end)
-    return f"{low:.{_DIGITS}g} to {high:.{_DIGITS}g}" if low <= high else f"{float(start)!r} to {float(end)!r}"
+    return (
+        f"{low:.{_DIGITS}g} to {high:.{_DIGITS}g}"
+        if low <= high
+        else f"{float(start)!r} to {float(end)!r}"
+    )
 
 
 def told_apart(numbers: Sequence[float]) -> list[str]:
@@ -95,8 +99,13 @@ def told_apart(numbers: Sequence[float]) -> list[str]:
     >>> told_apart([0.42, 0.0, 0.15]), told_apart([0.42, 0.4199999])
     (['0.42', '0', '0.15'], ['0.42', '0.4199999'])
     """
-    texts = ([f"{number:.{digits}g}" for number in numbers] for digits in range(_DIGITS, 17))
-    return next((found for found in texts if len({*found}) == len({*numbers})), [repr(float(n)) for n in numbers])
+    texts = (
+        [f"{number:.{digits}g}" for number in numbers] for digits in range(_DIGITS, 17)
+    )
+    return next(
+        (found for found in texts if len({*found}) == len({*numbers})),
+        [repr(float(n)) for n in numbers],
+    )
 
 
 def above(value: float, limit: float) -> str:
@@ -132,7 +141,10 @@ def in_smaller_unit(record: Samples, times: Sequence[float], argument: str) -> s
     One that misses the record by less than its length does so in the record's own unit.
     """
     first, last = float(record[0]), float(record[-1])
-    if any(first <= time <= last for time in times if time) or times[-1] < 2 * last - first:
+    if (
+        any(first <= time <= last for time in times if time)
+        or times[-1] < 2 * last - first
+    ):
         return ""
     least = max(first, 0.0) + _HARDLY_MEANT * (last - first)
     for unit, size in (("ms", 1e-3), ("us", 1e-6)):
@@ -142,13 +154,17 @@ def in_smaller_unit(record: Samples, times: Sequence[float], argument: str) -> s
     return ""
 
 
-def in_larger_unit(record: Samples, times: Sequence[float], argument: str, unit: str = "") -> str:
+def in_larger_unit(
+    record: Samples, times: Sequence[float], argument: str, unit: str = ""
+) -> str:
     """Ask whether an argument among the first states of a ``record`` (n,) was given in s, and that is in ms or us."""
     values = in_the_record(record, times, unit)
     return _question("s", argument, values) if values else ""
 
 
-def in_the_record(record: Samples, times: Sequence[float], unit: str = "") -> list[float]:
+def in_the_record(
+    record: Samples, times: Sequence[float], unit: str = ""
+) -> list[float]:
     """Turn times among the first ten states of a ``record`` (n,) from s into the ms or us of the record.
 
     Where neither the thousandfold nor the millionfold is a time of the record that somebody may mean, into nothing.
@@ -163,10 +179,17 @@ def in_the_record(record: Samples, times: Sequence[float], unit: str = "") -> li
     """
     first, last = float(record[0]), float(record[-1])
     early = float(record[min(_FIRST_STATES, record.size) - 1])
-    if unit == "s" or times[-1] <= first or not all(first <= time <= early for time in times):
+    if (
+        unit == "s"
+        or times[-1] <= first
+        or not all(first <= time <= early for time in times)
+    ):
         return []
     least = min(early, first + _NEVER_MEANT * (last - first))
-    for size in (1e6, 1e3):  # where both fit, the smaller one is no time of the record that anybody means
+    for size in (
+        1e6,
+        1e3,
+    ):  # where both fit, the smaller one is no time of the record that anybody means
         values = _scaled(times, size)
         if least <= values[-1] <= last:
             return values

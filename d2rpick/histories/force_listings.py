@@ -27,10 +27,14 @@ _NUMBER: Final = rb"([-+]?\d*\.?\d+(?:[Ee][-+]?\d+)?)"
 _SIDE: Final = rb"(?mi)^ *(?:slave|master|surf[ _]?[ab]) +\d+ +time"
 # Patterns are compiled where they are needed: start-up.
 _CONTACT_LINE: Final = (
-    rb"(?mi)^ *(?:slave|master|surf[ _]?[ab]) +(\d+) +time *" + rb" +[xyz] *".join([_NUMBER] * 4) + rb"(?=[ \r\n])"
+    rb"(?mi)^ *(?:slave|master|surf[ _]?[ab]) +(\d+) +time *"
+    + rb" +[xyz] *".join([_NUMBER] * 4)
+    + rb"(?=[ \r\n])"
 )
 _WALL_HEAD: Final = rb"(?i)wall# +normal-force"
-_WALL_LINE: Final = rb"(?m)^ +" + rb" +".join([_NUMBER, rb"(\d+)", *[_NUMBER] * 4]) + rb"(?=[ \r\n])"
+_WALL_LINE: Final = (
+    rb"(?m)^ +" + rb" +".join([_NUMBER, rb"(\d+)", *[_NUMBER] * 4]) + rb"(?=[ \r\n])"
+)
 _LEGEND: Final = rb"(?m)^\{BEGIN LEGEND\}[ \r]*\n(?:.*\n)*?\{END LEGEND\}"
 _ENTRY: Final = rb"(?m)^ *(\d+)(?: +(\S[^\r\n]*))?\r?$"
 _HEAD: Final = 1 << 16  # bytes in which the legend ends
@@ -61,12 +65,17 @@ def forces_of(sources: Sequence[Source]) -> tuple[ContactForce, ...]:
     for source in sources:
         for force in _of_file(source):
             found.setdefault(force.name, []).append(force)
-    ordered = (sorted(pieces, key=lambda piece: float(piece.time[0])) for pieces in found.values())
+    ordered = (
+        sorted(pieces, key=lambda piece: float(piece.time[0]))
+        for pieces in found.values()
+    )
     return tuple(_newest(pieces) for pieces in ordered)
 
 
 def _newest(pieces: Sequence[ContactForce]) -> ContactForce:
-    return joined(pieces, newest_states(np.concatenate([piece.time for piece in pieces]))[0])
+    return joined(
+        pieces, newest_states(np.concatenate([piece.time for piece in pieces]))[0]
+    )
 
 
 def _of_file(source: Source) -> Iterator[ContactForce]:
@@ -75,13 +84,17 @@ def _of_file(source: Source) -> Iterator[ContactForce]:
     rows = _wall_rows(data) if is_wall else _contact_rows(data)
     if not rows.time.size:
         found = f"{source.name}: no forces of {'rigid walls' if is_wall else 'contacts'} can be read in it"
-        raise FormatError(f"{found}; is it a whole {'rwforc' if is_wall else 'rcforc'} of LS-DYNA?")
+        raise FormatError(
+            f"{found}; is it a whole {'rwforc' if is_wall else 'rcforc'} of LS-DYNA?"
+        )
     kind, titles = "rigid wall" if is_wall else "contact", _titles(data[:_HEAD])
     for id_ in dict.fromkeys(rows.ids.astype(int).tolist()):
         mine = rows.ids == id_
         title = titles.get(id_, "")
         time, forces = _of_sides(rows.time[mine], rows.forces[mine])
-        yield ContactForce.of_forces(f"{kind} {id_}{f' {title!r}' if title else ''}", time, forces)
+        yield ContactForce.of_forces(
+            f"{kind} {id_}{f' {title!r}' if title else ''}", time, forces
+        )
 
 
 def _of_sides(time: Samples, forces: Samples) -> tuple[Samples, Samples]:
@@ -92,12 +105,20 @@ def _of_sides(time: Samples, forces: Samples) -> tuple[Samples, Samples]:
 
 
 def _contact_rows(data: bytes) -> _Rows:
-    found = np.array(re.findall(_CONTACT_LINE, data), dtype="S32").astype(np.float64).reshape(-1, 5)
+    found = (
+        np.array(re.findall(_CONTACT_LINE, data), dtype="S32")
+        .astype(np.float64)
+        .reshape(-1, 5)
+    )
     return _Rows(found[:, 0], found[:, 1], found[:, 2:])
 
 
 def _wall_rows(data: bytes) -> _Rows:
-    found = np.array(re.findall(_WALL_LINE, data), dtype="S32").astype(np.float64).reshape(-1, 6)
+    found = (
+        np.array(re.findall(_WALL_LINE, data), dtype="S32")
+        .astype(np.float64)
+        .reshape(-1, 6)
+    )
     forces = found[:, 3:]
     without = ~forces.any(axis=1)
     forces[without, 0] = found[without, 2]  # of a wall that has its normal force alone

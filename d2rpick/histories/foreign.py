@@ -25,28 +25,68 @@ class ForeignFormat(NamedTuple):
 _NAME_DATABASE: Final = "name the glstat, matsum or binout of the run"
 _NAME_TIME_HISTORY: Final = "name the T01 of the run"
 _SAVE_SHEET: Final = "save the sheet as csv, with a line of headings"
-_FROM_FRAME: Final = "load it in Python and give the columns to d2rpick.from_frame, or write them as csv"
+_FROM_FRAME: Final = (
+    "load it in Python and give the columns to d2rpick.from_frame, or write them as csv"
+)
 _EXPORT: Final = "export time and internal energy as csv, with a line of headings"
 
 # Known by their first bytes; the more special one of two comes first.  Expressions are compiled when they are needed.
 _BINARY_FORMATS: Final = (
-    ForeignFormat(rb"PK\x03\x04.{0,2000}(xl/|\[Content_Types\])", "an Excel workbook", _SAVE_SHEET),
-    ForeignFormat(rb"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an Excel workbook", _SAVE_SHEET),
-    ForeignFormat(rb"PK\x03\x04.{0,80}\.npy", "an archive of numpy arrays (npz)", _FROM_FRAME),
-    ForeignFormat(rb"PK\x03\x04", "a zip archive", "unpack it and name the history in it"),
-    ForeignFormat(rb"7z\xbc\xaf|BZh[1-9]1AY|\xfd7zXZ", "a packed file", "unpack it first: only gzip is read as it is"),
-    ForeignFormat(rb"\x28\xb5\x2f\xfd", "a packed file", "unpack it first: only gzip is read as it is"),
-    ForeignFormat(rb"PAR1", "a parquet file", "write it as csv: pandas.read_parquet(...).to_csv(...)"),
-    ForeignFormat(rb"ARROW1|FEA1|\xff\xff\xff\xff.{3}\0\x10\0\0\0", "an arrow file", _FROM_FRAME),
+    ForeignFormat(
+        rb"PK\x03\x04.{0,2000}(xl/|\[Content_Types\])", "an Excel workbook", _SAVE_SHEET
+    ),
+    ForeignFormat(
+        rb"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an Excel workbook", _SAVE_SHEET
+    ),
+    ForeignFormat(
+        rb"PK\x03\x04.{0,80}\.npy", "an archive of numpy arrays (npz)", _FROM_FRAME
+    ),
+    ForeignFormat(
+        rb"PK\x03\x04", "a zip archive", "unpack it and name the history in it"
+    ),
+    ForeignFormat(
+        rb"7z\xbc\xaf|BZh[1-9]1AY|\xfd7zXZ",
+        "a packed file",
+        "unpack it first: only gzip is read as it is",
+    ),
+    ForeignFormat(
+        rb"\x28\xb5\x2f\xfd",
+        "a packed file",
+        "unpack it first: only gzip is read as it is",
+    ),
+    ForeignFormat(
+        rb"PAR1",
+        "a parquet file",
+        "write it as csv: pandas.read_parquet(...).to_csv(...)",
+    ),
+    ForeignFormat(
+        rb"ARROW1|FEA1|\xff\xff\xff\xff.{3}\0\x10\0\0\0", "an arrow file", _FROM_FRAME
+    ),
     ForeignFormat(rb"\x93NUMPY", "a numpy array (npy)", _FROM_FRAME),
-    ForeignFormat(rb"HKSRD0", "an output database of Abaqus (odb)", "write an XY report of ALLIE, ALLKE and ALLWK"),
+    ForeignFormat(
+        rb"HKSRD0",
+        "an output database of Abaqus (odb)",
+        "write an XY report of ALLIE, ALLKE and ALLWK",
+    ),
     ForeignFormat(rb"SQLite format 3\0", "an SQLite database", _FROM_FRAME),
-    ForeignFormat(rb"MATLAB 5\.0 MAT-file", "a MAT-file of MATLAB before version 7.3", "save it with -v7.3, or as csv"),
-    ForeignFormat(rb"\x80[\x02-\x05][\x80-\xff(\x5d\x7d]", "a pickle of Python, which is never loaded", _FROM_FRAME),
+    ForeignFormat(
+        rb"MATLAB 5\.0 MAT-file",
+        "a MAT-file of MATLAB before version 7.3",
+        "save it with -v7.3, or as csv",
+    ),
+    ForeignFormat(
+        rb"\x80[\x02-\x05][\x80-\xff(\x5d\x7d]",
+        "a pickle of Python, which is never loaded",
+        _FROM_FRAME,
+    ),
     ForeignFormat(rb"TDSm|MDF    ", "a file of measured data", _EXPORT),
-    ForeignFormat(rb"CDF[\x01\x02\x05]", "a file of netCDF 3", "write it as netCDF 4, or as csv"),
+    ForeignFormat(
+        rb"CDF[\x01\x02\x05]", "a file of netCDF 3", "write it as netCDF 4, or as csv"
+    ),
     ForeignFormat(rb"%PDF|\x89PNG|\xff\xd8\xff", "a document or picture", _EXPORT),
-    ForeignFormat(rb"\0\0\x54[\x26-\x2f]", "an animation file of Radioss", _NAME_TIME_HISTORY),
+    ForeignFormat(
+        rb"\0\0\x54[\x26-\x2f]", "an animation file of Radioss", _NAME_TIME_HISTORY
+    ),
 )
 
 # Known by what stands in their first lines.
@@ -56,7 +96,9 @@ _TEXT_FORMATS: Final = (
         "a channel or header of ISO-MME",
         "write time and values as csv",
     ),
-    ForeignFormat(rb"\s*-1 *\r?\n\s*\d{1,5}\s*\r?\n", "a universal file (UNV)", _EXPORT),
+    ForeignFormat(
+        rb"\s*-1 *\r?\n\s*\d{1,5}\s*\r?\n", "a universal file (UNV)", _EXPORT
+    ),
     ForeignFormat(
         rb"\s*Abaqus/(?:Explicit|Standard).*?INCREMENT",
         "a status file of Abaqus (.sta), which holds no internal energy",
@@ -72,9 +114,19 @@ _TEXT_FORMATS: Final = (
         "a listing of Radioss (.out)",
         _NAME_TIME_HISTORY,
     ),
-    ForeignFormat(rb"\s*[{\[]\s*[\"{\[\]}]", "a JSON document", "write time and energy as csv"),
-    ForeignFormat(rb"\s*\[[\s\d.eE+,-]*(?:\]|\Z)", "a JSON document", "write time and energy as csv"),
-    ForeignFormat(rb"\s*<(?:\?xml|!DOCTYPE|html|VTKFile|SOLUTION)", "an XML or HTML document", _EXPORT),
+    ForeignFormat(
+        rb"\s*[{\[]\s*[\"{\[\]}]", "a JSON document", "write time and energy as csv"
+    ),
+    ForeignFormat(
+        rb"\s*\[[\s\d.eE+,-]*(?:\]|\Z)",
+        "a JSON document",
+        "write time and energy as csv",
+    ),
+    ForeignFormat(
+        rb"\s*<(?:\?xml|!DOCTYPE|html|VTKFile|SOLUTION)",
+        "an XML or HTML document",
+        _EXPORT,
+    ),
     ForeignFormat(rb"# vtk DataFile", "a VTK file", _EXPORT),
     ForeignFormat(rb"ISO-10303|solid \w+\s*\n\s*facet", "a geometry", _EXPORT),
 )
@@ -98,9 +150,31 @@ _DYNA_DATABASES: Final = (
     ("swforc", rb"spotweld|constraint #"),
     *(
         (name, b"")
-        for name in ("ncforc", "gceout", "sbtout", "ssstat", "sphout", "trhist", "disbout", "dbfsi", "curvout")
+        for name in (
+            "ncforc",
+            "gceout",
+            "sbtout",
+            "ssstat",
+            "sphout",
+            "trhist",
+            "disbout",
+            "dbfsi",
+            "curvout",
+        )
     ),
-    *((name, b"") for name in ("defgeo", "dcfail", "tprint", "atdb", "pllyout", "prtube", "cpmfor", "massout")),
+    *(
+        (name, b"")
+        for name in (
+            "defgeo",
+            "dcfail",
+            "tprint",
+            "atdb",
+            "pllyout",
+            "prtube",
+            "cpmfor",
+            "massout",
+        )
+    ),
 )
 _DYNA_HEAD: Final = rb"\n(?:\{BEGIN LEGEND\}| {10,}ls-dyna )"
 # A keyword of LS-DYNA at the start of a line, or of Radioss: of a starter or of an engine file.
@@ -134,7 +208,9 @@ def refuse_foreign(source: str, head: bytes) -> None:
 def _refuse(source: str, head: bytes, formats: tuple[ForeignFormat, ...]) -> None:
     for foreign in formats:
         if re.match(foreign.pattern, head, re.DOTALL):
-            raise FormatError(f"{source}: this is {foreign.name}, an energy history was expected; {foreign.cure}")
+            raise FormatError(
+                f"{source}: this is {foreign.name}, an energy history was expected; {foreign.cure}"
+            )
 
 
 def _name_dyna_database(source: str, head: bytes) -> str:
@@ -149,5 +225,8 @@ def _name_dyna_database(source: str, head: bytes) -> str:
 def _is_deck(head: bytes) -> bool:
     """Whether a deck begins, behind comments only."""
     lines = head.removeprefix(b"\xef\xbb\xbf").split(b"\n")
-    first = next((line for line in lines if line.strip() and not line.lstrip().startswith(b"$")), b"")
+    first = next(
+        (line for line in lines if line.strip() and not line.lstrip().startswith(b"$")),
+        b"",
+    )
     return first.startswith((b"*", b"#", b"/")) and re.match(_DECK, first) is not None

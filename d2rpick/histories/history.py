@@ -67,7 +67,11 @@ class Precision(NamedTuple):
         if self.decimals is not None:
             return np.full(values.shape, 10.0**-self.decimals)
         sizes = np.abs(values)
-        powers = np.floor(np.log10(sizes, out=np.zeros(sizes.shape), where=sizes > 0)) - self.digits + 1
+        powers = (
+            np.floor(np.log10(sizes, out=np.zeros(sizes.shape), where=sizes > 0))
+            - self.digits
+            + 1
+        )
         return np.where(sizes > 0, 10.0**powers, 0.0)
 
     def noise(self, values: Samples) -> float:
@@ -116,7 +120,9 @@ class Momenta:
     surroundings: Surroundings = UNKNOWN
     known: Memory = field(default_factory=Memory, init=False)
 
-    def choosing(self, chosen: tuple[int, ...], flying: tuple[int, ...] | None = None) -> Momenta:
+    def choosing(
+        self, chosen: tuple[int, ...], flying: tuple[int, ...] | None = None
+    ) -> Momenta:
         """Give the same momenta with other parts to switch; what was found of them stays ``known``."""
         made = replace(self, chosen=chosen, flying=flying)
         object.__setattr__(made, "known", self.known)
@@ -124,11 +130,15 @@ class Momenta:
 
     def of(self, members: Sequence[int]) -> Samples:
         """Sum over the parts with these indices, shape (n, 3), read-only."""
-        return self.known.once(("sum", *members), lambda: frozen(self.values[:, list(members)].sum(axis=1)))
+        return self.known.once(
+            ("sum", *members), lambda: frozen(self.values[:, list(members)].sum(axis=1))
+        )
 
     def noise(self, members: Sequence[int]) -> float:
         """What the printed digits of these parts leave open in their sum [momentum]."""
-        largest = np.abs(np.stack(self._bounds))[:, list(members)].max(axis=(0, 2), initial=0.0)
+        largest = np.abs(np.stack(self._bounds))[:, list(members)].max(
+            axis=(0, 2), initial=0.0
+        )
         return sum(self.precision.quantum(value) for value in largest.tolist()) / 2
 
     def mass(self, members: Sequence[int]) -> float:
@@ -137,7 +147,9 @@ class Momenta:
             return float("nan")
         largest = np.abs(np.stack(self._bounds)).max(axis=(0, 2))[list(members)]
         masses = self.masses[list(members)]
-        speeds = np.divide(largest, masses, out=np.zeros(masses.shape), where=masses > 0)
+        speeds = np.divide(
+            largest, masses, out=np.zeros(masses.shape), where=masses > 0
+        )
         return float(masses[~(speeds <= _STILL * speeds.max(initial=0.0))].sum())
 
     def change(self, members: Sequence[int]) -> float:
@@ -203,7 +215,11 @@ class Balance:
         """Kinetic and internal energy together, with that of hourglassing, of shape (n,); None where one is unknown."""
         if self.kinetic is None or self.internal is None:
             return None
-        return self.kinetic + self.internal + (0.0 if self.hourglass is None else self.hourglass)
+        return (
+            self.kinetic
+            + self.internal
+            + (0.0 if self.hourglass is None else self.hourglass)
+        )
 
     @property
     def against_hourglassing(self) -> Samples | None:
@@ -213,7 +229,11 @@ class Balance:
     @cached_property
     def worked(self) -> Samples | None:
         """External work (n,); None where it is not written, or none is ever done."""
-        return None if self.external_work is None or not np.ptp(self.external_work) else self.external_work
+        return (
+            None
+            if self.external_work is None or not np.ptp(self.external_work)
+            else self.external_work
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -293,7 +313,9 @@ class History:
                 raise HistoryError(f"{found}, a finite number was expected")
         if np.any(time[1:] <= time[:-1]):
             state = int(np.argmax(np.diff(time) <= 0)) + 1
-            raise HistoryError(f"{where}: time falls from {time[state - 1]:g} to {time[state]:g} at state {state + 1}")
+            raise HistoryError(
+                f"{where}: time falls from {time[state - 1]:g} to {time[state]:g} at state {state + 1}"
+            )
         if self.part_energies is not None:
             terms = frozen(self.part_energies)
             if terms.shape != (time.size, len(self.part_names)):
@@ -341,10 +363,16 @@ class History:
     @property
     def left_beside(self) -> str:
         """Words on later legs of the run that lie beside its files and were not named; none where none do."""
-        from d2rpick.histories.source import later_legs  # not above: pathlib costs start-up
+        from d2rpick.histories.source import (
+            later_legs,
+        )  # not above: pathlib costs start-up
 
         legs = later_legs(self.source)
-        return f"; beside it lies {', '.join(legs)}, a later leg of the run? Name it too" if legs else ""
+        return (
+            f"; beside it lies {', '.join(legs)}, a later leg of the run? Name it too"
+            if legs
+            else ""
+        )
 
     def check(self, *times: float, argument: str = "") -> None:
         """Raise RangeError unless all times of an ``argument`` lie in the record."""
@@ -358,8 +386,12 @@ class History:
         *asked, first, last = told_apart((*times, low, high))
         what = f"{f'`{argument}`' if argument else 'time'} {' '.join(asked)}"
         found = "reaches" if any(low <= time <= high for time in times) else "lies"
-        more = (", where the file is cut" if max(times) > high and not self.complete else "") + more
-        raise RangeError(f"{', '.join(self.source)}: {what} {found} outside the record, {first} to {last}{more}")
+        more = (
+            ", where the file is cut" if max(times) > high and not self.complete else ""
+        ) + more
+        raise RangeError(
+            f"{', '.join(self.source)}: {what} {found} outside the record, {first} to {last}{more}"
+        )
 
     def check_unit(self, *times: float, argument: str) -> None:
         """Raise RangeError where times of an ``argument`` that lie in the record look to be in another unit than it."""
@@ -371,13 +403,17 @@ class History:
         if meant:
             *asked, first, last = told_apart((*times, self.time[0], self.time[-1]))
             where = f"`{argument}` {' '.join(asked)} lies within the first ten states of the record"
-            raise RangeError(f"{', '.join(self.source)}: {where}, {first} to {last}{meant}")
+            raise RangeError(
+                f"{', '.join(self.source)}: {where}, {first} to {last}{meant}"
+            )
 
     def energy_at(self, time: float, argument: str = "") -> float:
         """Energy at ``time``, linear between the states; RangeError outside the record, naming the ``argument``."""
         self.check(time, argument=argument)
         before = max(int(np.searchsorted(self.time, time, side="right")) - 1, 0)
-        cell = slice(before, before + 2)  # of whole arrays that are read-only, numpy would make copies
+        cell = slice(
+            before, before + 2
+        )  # of whole arrays that are read-only, numpy would make copies
         return float(np.interp(time, self.time[cell], self.energy[cell]))
 
     def energies_at(self, times: Samples) -> Samples:
@@ -385,10 +421,18 @@ class History:
         if times.ndim == 1 and times.size > _TOGETHER:
             pieces = np.array_split(times, times.size // _TOGETHER + 1)
             return np.concatenate([self.energies_at(piece) for piece in pieces])
-        before = np.clip(np.searchsorted(self.time, times, side="right") - 1, 0, max(self.time.size - 2, 0))
+        before = np.clip(
+            np.searchsorted(self.time, times, side="right") - 1,
+            0,
+            max(self.time.size - 2, 0),
+        )
         after = np.minimum(before + 1, self.time.size - 1)
-        (t0, e0), (t1, e1) = ((self.time[at], self.energy[at]) for at in (before, after))
-        slope = np.divide(e1 - e0, t1 - t0, out=np.zeros(np.shape(times)), where=t1 > t0)
+        (t0, e0), (t1, e1) = (
+            (self.time[at], self.energy[at]) for at in (before, after)
+        )
+        slope = np.divide(
+            e1 - e0, t1 - t0, out=np.zeros(np.shape(times)), where=t1 > t0
+        )
         return np.where(times >= t1, e1, slope * (times - t0) + e0)
 
     def mean_energy(self, start: float, end: float) -> float | None:
@@ -404,17 +448,32 @@ class History:
 
 def rows_of(record: Record, states: slice | NDArray[np.bool_]) -> Record:
     """Give some states of a record alone: of all its arrays of as many rows as it has times, but masses of parts."""
-    names, size = {one.name for one in fields(record) if one.init} - {"masses"}, record.time.size
+    names, size = (
+        {one.name for one in fields(record) if one.init} - {"masses"},
+        record.time.size,
+    )
     values = {name: getattr(record, name) for name in names}
-    rows = {name: one[states] for name, one in values.items() if isinstance(one, np.ndarray) and len(one) == size}
+    rows = {
+        name: one[states]
+        for name, one in values.items()
+        if isinstance(one, np.ndarray) and len(one) == size
+    }
     return replace(record, **rows)  # type: ignore[arg-type]
 
 
 def frozen(values: ArrayLike) -> Samples:
     """Copy what could change, or holds more in memory than itself."""
-    if isinstance(values, np.ndarray) and values.dtype == np.float64 and not values.flags.writeable:
+    if (
+        isinstance(values, np.ndarray)
+        and values.dtype == np.float64
+        and not values.flags.writeable
+    ):
         whole = values if values.base is None else values.base
-        if isinstance(whole, np.ndarray) and whole.size == values.size and not whole.flags.writeable:
+        if (
+            isinstance(whole, np.ndarray)
+            and whole.size == values.size
+            and not whole.flags.writeable
+        ):
             return values
     copy = np.array(values, dtype=np.float64)
     copy.flags.writeable = False

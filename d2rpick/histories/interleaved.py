@@ -49,7 +49,9 @@ def find_part_column(columns: Mapping[str, Sequence[object]], rows: int) -> str 
     return None
 
 
-def refuse_rows_of_parts(source: str, time: Samples, energy: Samples, columns: Mapping[str, Sequence[object]]) -> None:
+def refuse_rows_of_parts(
+    source: str, time: Samples, energy: Samples, columns: Mapping[str, Sequence[object]]
+) -> None:
     """Raise FormatError if a table has a row for each time and part.
 
     Parameters
@@ -70,5 +72,9 @@ def refuse_rows_of_parts(source: str, time: Samples, energy: Samples, columns: M
     found = f"{source}: each time stands {rows} times with different energies, one row for each time was expected"
     if parts is None:
         raise FormatError(f"{found}; give the rows of one part")
-    values = listing([str(value) for value in dict.fromkeys(columns[parts][:rows])], most=6)
-    raise FormatError(f"{found}; column {parts!r} tells the parts apart ({values}): give the rows of one part")
+    values = listing(
+        [str(value) for value in dict.fromkeys(columns[parts][:rows])], most=6
+    )
+    raise FormatError(
+        f"{found}; column {parts!r} tells the parts apart ({values}): give the rows of one part"
+    )

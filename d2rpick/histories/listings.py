@@ -25,7 +25,10 @@ if TYPE_CHECKING:
 
 # Patterns are compiled where they are needed, by the functions of `re`: start-up.
 _HISTORY: Final = r"(?s)(?P<root>.+)T(?P<leg>\d\d)(\.csv)?(\.gz)?"
-_HEAD, _TAIL = 1 << 20, 1 << 16  # bytes: the engine echoes its input, and tells when it ran at the end
+_HEAD, _TAIL = (
+    1 << 20,
+    1 << 16,
+)  # bytes: the engine echoes its input, and tells when it ran at the end
 _SWITCHED: Final = rb"RIGID BODY: *\d+ +SET O(?:N|FF)"
 _COMMIT: Final = rb"CommitID: *([0-9a-f]{7,40})\b"
 _BUILT: Final = rb"COPYRIGHT \(C\) (?:\d{4}-)?(\d{4})"  # the year is that of the build
@@ -76,12 +79,19 @@ def ending(history: str) -> str | None:
 
     found = re.fullmatch(_HISTORY, history)
     if found is None:
-        tails = [_ends(str(Path(history).parent / name))[1] for name in ("messag", "d3hsp")]
+        tails = [
+            _ends(str(Path(history).parent / name))[1] for name in ("messag", "d3hsp")
+        ]
     elif Path(f"{found['root']}_{int(found['leg']) + 1:04d}.rad").exists():
         return None
     else:
         tails = [_ends(f"{found['root']}_{int(found['leg']):04d}.out")[1]]
-    said = (how for words, how in _ENDINGS.items() for tail in tails if words in tail and _STOPPED not in tail)
+    said = (
+        how
+        for words, how in _ENDINGS.items()
+        for tail in tails
+        if words in tail and _STOPPED not in tail
+    )
     return next(said, None)
 
 
@@ -100,7 +110,11 @@ def _before_the_fix(head: bytes, tail: bytes) -> str:
     """Say what shows that an engine that switches bodies is from before the fix; nothing where nothing does."""
     if b"OpenRadioss" not in head or not re.search(_SWITCHED, head):
         return ""
-    commit, built, ran = re.search(_COMMIT, head), re.search(_BUILT, head), re.search(_RAN, tail)
+    commit, built, ran = (
+        re.search(_COMMIT, head),
+        re.search(_BUILT, head),
+        re.search(_RAN, tail),
+    )
     if commit and commit[1][:_SHORT].decode() in _BEFORE:
         return f"commit {commit[1].decode()[:9]}"
     if built and int(built[1]) < _FIXED[0]:
@@ -119,7 +133,9 @@ _TIMING: Final = b"T i m i n g   i n f o r m a t i o n"
 _D3HSP_ROW: Final = rb" *\.* +" + _NUMBER + rb" +" + _NUMBER + rb" +" + _NUMBER
 _D3HSP_ELEMENTS: Final = rb"(?m)^ *Element processing" + _D3HSP_ROW
 _D3HSP_TOTAL: Final = rb"(?m)^ *T o t a l s" + _D3HSP_ROW
-_D3HSP_SETUP: Final = rb"(?m)^ *(?:Keyword Processing|Initialization|MPP Decomposition)" + _D3HSP_ROW
+_D3HSP_SETUP: Final = (
+    rb"(?m)^ *(?:Keyword Processing|Initialization|MPP Decomposition)" + _D3HSP_ROW
+)
 _D3HSP_CYCLES: Final = rb"Problem cycle *= *(\d+)"
 _ZONE: Final = rb"(?m)^ time(?:\.{5,}| per zone cycle\.\(nanosec\)\.\.) +" + _NUMBER
 _PER_ZONE: Final = b" time per zone"
@@ -151,7 +167,13 @@ def read_timing(path: str) -> Timing:
         If the file cannot be read, or its summary of times is not there or says nothing.
     """
     data = _read(path)
-    found = _of_radioss(path, data) if _SUMMARY in data else _of_d3hsp(path, data) if _TIMING in data else None
+    found = (
+        _of_radioss(path, data)
+        if _SUMMARY in data
+        else _of_d3hsp(path, data)
+        if _TIMING in data
+        else None
+    )
     if found is None or not found.cycles or not 0 < found.elements <= found.total:
         raise FormatError(
             f"{path}: no times of elements and of all work with their cycles were found, a Radioss listing "
@@ -172,7 +194,9 @@ def read_zone_times(path: str) -> ZoneTimes:
     times = np.array(pairs, np.float64).reshape(-1, 2)
     times = times[times[:, 1] > 0]
     if not len(times):
-        raise FormatError(f"{path}: no time per zone cycle above 0 was found, a glstat of LS-DYNA was expected")
+        raise FormatError(
+            f"{path}: no time per zone cycle above 0 was found, a glstat of LS-DYNA was expected"
+        )
     return ZoneTimes(path, times[:, 0], times[:, 1] * 1e-9)
 
 
@@ -186,12 +210,17 @@ def _read(path: str) -> bytes:
         with open(path, "rb") as stream:  # noqa: PTH123
             return stream.read()
     except OSError as error:
-        raise FormatError(f"{path}: cannot be read ({error.strerror}); check the name and the permissions") from None
+        raise FormatError(
+            f"{path}: cannot be read ({error.strerror}); check the name and the permissions"
+        ) from None
 
 
 def _of_radioss(name: str, data: bytes) -> Timing | None:
     summary = data[data.rindex(_SUMMARY) :]
-    found = [re.search(one, summary) for one in (_RADIOSS_ELEMENTS, _RADIOSS_TOTAL, _RADIOSS_CYCLES)]
+    found = [
+        re.search(one, summary)
+        for one in (_RADIOSS_ELEMENTS, _RADIOSS_TOTAL, _RADIOSS_CYCLES)
+    ]
     elements, total, cycles = (float(one[1]) if one else 0.0 for one in found)
     return Timing(name, int(cycles), total, elements)
 
@@ -199,19 +228,27 @@ def _of_radioss(name: str, data: bytes) -> Timing | None:
 def _of_d3hsp(name: str, data: bytes) -> Timing | None:
     """Take processor times, or times of the clock where those are rounded to nothing; less what came before the run."""
     table = data[data.rindex(_TIMING) :]
-    cycles, total, elements = (re.search(one, table) for one in (_D3HSP_CYCLES, _D3HSP_TOTAL, _D3HSP_ELEMENTS))
+    cycles, total, elements = (
+        re.search(one, table) for one in (_D3HSP_CYCLES, _D3HSP_TOTAL, _D3HSP_ELEMENTS)
+    )
     if not (cycles and total and elements):
         return None
     column = 1 if float(elements[1]) > 0 else 3
     before = sum(float(row[column - 1]) for row in re.findall(_D3HSP_SETUP, table))
-    return Timing(name, int(cycles[1]), float(total[column]) - before, float(elements[column]))
+    return Timing(
+        name, int(cycles[1]), float(total[column]) - before, float(elements[column])
+    )
 
 
 _STEP_NUMBER: Final = rb"([-+.\dEe]+)"
-_STEP: Final = rb"(?m)is controlled by +[\w ]*?\d+ +of part +(\d+)|^ time step\.+ +" + _STEP_NUMBER
+_STEP: Final = (
+    rb"(?m)is controlled by +[\w ]*?\d+ +of part +(\d+)|^ time step\.+ +" + _STEP_NUMBER
+)
 _TABLE: Final = rb"smallest timesteps *\r?\n[^\n]*\n[^\n]*part +timestep *\r?\n((?:[^\n]*\n)*?) *(?:\n|\Z)"
 _ROW: Final = rb"(?m)^ *[a-z][a-z ]* +\d+ +(\d+) +" + _STEP_NUMBER + rb"\s*$"
-_SEARCHED: Final = 64 << 20  # bytes of a file that are searched: it begins with what matters
+_SEARCHED: Final = (
+    64 << 20
+)  # bytes of a file that are searched: it begins with what matters
 _D3HSP: Final = "d3hsp"
 
 
@@ -231,7 +268,10 @@ def printed_steps(run: Run, *beside: str) -> dict[int, tuple[float, str]]:
         (step, source) by part, of the parts that controlled the step or stand in the table of the smallest ones [time].
     """
     found: dict[int, tuple[float, str]] = {}
-    for name, part, step in (*_of_glstat(run), *_smallest_of_d3hsp((*run.sources, *beside))):
+    for name, part, step in (
+        *_of_glstat(run),
+        *_smallest_of_d3hsp((*run.sources, *beside)),
+    ):
         if step > 0 and (part not in found or step < found[part][0]):
             found[part] = step, name
     return found
@@ -259,7 +299,9 @@ def _smallest_of_d3hsp(names: Sequence[str]) -> Iterator[tuple[str, int, float]]
         with path.open("rb") as stream:
             table = re.search(_TABLE, stream.read(_SEARCHED))
         if table:
-            yield from ((_D3HSP, *_pair(*row.groups())) for row in re.finditer(_ROW, table[1]))
+            yield from (
+                (_D3HSP, *_pair(*row.groups())) for row in re.finditer(_ROW, table[1])
+            )
 
 
 def _pair(part: bytes, step: bytes) -> tuple[int, float]:

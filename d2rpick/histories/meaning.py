@@ -13,7 +13,13 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import FormatError, listing
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.names import INTERNAL_ENERGY, QUANTITIES, TIME_NAMES, normalised, without_unit
+from d2rpick.histories.names import (
+    INTERNAL_ENERGY,
+    QUANTITIES,
+    TIME_NAMES,
+    normalised,
+    without_unit,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -46,7 +52,9 @@ _NUMBERING: Final = re.compile(
 _SOURCE: Final = re.compile(r"t\d\d")  # a time history of Radioss, as T01
 # The dataset of a quantity whose name is that of the group around it: H5MD and others.
 _UNNAMED_STEPS: Final = frozenset({"value", "values", "data", "res", "y"})
-_STEPS_BESIDE: Final = frozenset({"step", "steps", "count", "error", "index", "cycle"})  # datasets beside the values
+_STEPS_BESIDE: Final = frozenset(
+    {"step", "steps", "count", "error", "index", "cycle"}
+)  # datasets beside the values
 
 _WORD: Final = re.compile(r"[^\W_]+")
 _CAMEL_CASE: Final = re.compile(r"(?<=[a-zà-ÿ])(?=[A-Z])")
@@ -63,9 +71,13 @@ _OTHER_QUANTITY: Final = (
     r"|accel|veloc|displac|moment|force|pressure|stress|strain(?!.?en)|temperature|ratio|mass|time.?step)"
     r"|(?<![A-Z])KE(?![A-Z])"
 )
-ROTATION_ENERGY: Final = "rotationenergy"  # normalised: Radioss writes it beside the kinetic energy
+ROTATION_ENERGY: Final = (
+    "rotationenergy"  # normalised: Radioss writes it beside the kinetic energy
+)
 # What else names an energy: identifiers of Abaqus, and "energy" in other languages without spaces.
-_LIKE_AN_ENERGY: Final = r"all[a-z]{2,3}|ke|ie|hge?|e?kin[a-z]*|.*(?:energ|エネルギー|能量|에너지).*"
+_LIKE_AN_ENERGY: Final = (
+    r"all[a-z]{2,3}|ke|ie|hge?|e?kin[a-z]*|.*(?:energ|エネルギー|能量|에너지).*"
+)
 
 
 class Meaning(NamedTuple):
@@ -105,7 +117,9 @@ def find_meaning(name: str) -> Meaning | None:
     while len(steps) > 1 and steps[-1].casefold() in _UNNAMED_STEPS:
         steps.pop()
     whole = _match_words(_words_of("/".join(steps)))
-    if len(steps) == 1 or (whole and whole.quantity == "energy_ratio"):  # "total energy / initial energy"
+    if len(steps) == 1 or (
+        whole and whole.quantity == "energy_ratio"
+    ):  # "total energy / initial energy"
         return whole
     if steps[-1].casefold() in _STEPS_BESIDE or is_time(steps[-1]):
         return None
@@ -115,7 +129,11 @@ def find_meaning(name: str) -> Meaning | None:
 
 def _words_of(name: str) -> list[str]:
     """Cut a name into words: small letters without accents, no unit, "totalKineticEnergy" as three words."""
-    text = _CAMEL_CASE.sub(" ", without_unit(_NUMBERING.sub("", name))).casefold().translate(_PLAIN_LETTERS)
+    text = (
+        _CAMEL_CASE.sub(" ", without_unit(_NUMBERING.sub("", name)))
+        .casefold()
+        .translate(_PLAIN_LETTERS)
+    )
     return [word for word in _WORD.findall(text) if not _SOURCE.fullmatch(word)]
 
 
@@ -133,7 +151,9 @@ def _match_words(words: Sequence[str]) -> Meaning | None:
             others.append(words[place])
             rank = OF_SOMETHING_ELSE
         place += length or 1
-    return Meaning(quantities.pop(), rank, tuple(others)) if len(quantities) == 1 else None
+    return (
+        Meaning(quantities.pop(), rank, tuple(others)) if len(quantities) == 1 else None
+    )
 
 
 def _phrase_length(words: Sequence[str], place: int) -> int:
@@ -190,7 +210,9 @@ def find_internal_energies(names: Sequence[str]) -> list[int]:
             continue
         if meaning.rank == EXACT:
             exact.append(place)
-        elif meaning.rank == WHOLE_MODEL or not re.search(_OTHER_QUANTITY, name):  # not "dissipated internal energy"
+        elif meaning.rank == WHOLE_MODEL or not re.search(
+            _OTHER_QUANTITY, name
+        ):  # not "dissipated internal energy"
             others.append(place)
     return exact or others
 
@@ -204,7 +226,11 @@ def quantity_of(name: str) -> str | None:
     ['kinetic_energy', 'x_velocity', 'z_momentum', None]
     """
     meaning = find_meaning(name)
-    if meaning is None or meaning.rank == OF_SOMETHING_ELSE or meaning.quantity not in QUANTITIES:
+    if (
+        meaning is None
+        or meaning.rank == OF_SOMETHING_ELSE
+        or meaning.quantity not in QUANTITIES
+    ):
         return None
     return meaning.quantity
 
@@ -229,8 +255,13 @@ def find_quantities(names: Sequence[str]) -> dict[str, list[str]]:
         if meaning is None or meaning.quantity not in QUANTITIES:
             continue
         if meaning.rank < OF_SOMETHING_ELSE or meaning.others == subject:
-            ranked.setdefault(meaning.quantity, {}).setdefault(meaning.rank, []).append(name)
-    found = {quantity: names_by_rank[min(names_by_rank)] for quantity, names_by_rank in ranked.items()}
+            ranked.setdefault(meaning.quantity, {}).setdefault(meaning.rank, []).append(
+                name
+            )
+    found = {
+        quantity: names_by_rank[min(names_by_rank)]
+        for quantity, names_by_rank in ranked.items()
+    }
     if "kinetic_energy" in found and "total_energy" not in found:
         totals = [name for name in names if _is_bare_total(name)]
         if totals:
@@ -246,11 +277,15 @@ def _find_subject(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def _is_bare_total(name: str) -> bool:
-    words = [word for word in _words_of(name.rpartition("/")[2]) if word not in _ENERGY_WORDS]
+    words = [
+        word for word in _words_of(name.rpartition("/")[2]) if word not in _ENERGY_WORDS
+    ]
     return words == ["total"]
 
 
-def note_unused_energies(channels: Sequence[str], used: Collection[str]) -> tuple[str, ...]:
+def note_unused_energies(
+    channels: Sequence[str], used: Collection[str]
+) -> tuple[str, ...]:
     """Return a note on the channels that look like energies and are not ``used``, none if there are none.
 
     Examples
@@ -259,7 +294,9 @@ def note_unused_energies(channels: Sequence[str], used: Collection[str]) -> tupl
     ("'kinetic energy of the door' (kinetic_energy?) looks like an energy but is not used; if it is one of the \
 whole model, name it with `channel`, as in kinetic_energy=NAME",)
     """
-    unused = [name for name in channels if name not in used and _looks_like_an_energy(name)]
+    unused = [
+        name for name in channels if name not in used and _looks_like_an_energy(name)
+    ]
     if not unused:
         return ()
     texts = []
@@ -271,7 +308,9 @@ whole model, name it with `channel`, as in kinetic_energy=NAME",)
         found = f"{named} looks like an energy but is not used; if it is one"
     else:
         found = f"{named} look like energies but are not used; if one is"
-    return (f"{found} of the whole model, name it with `channel`, as in kinetic_energy=NAME",)
+    return (
+        f"{found} of the whole model, name it with `channel`, as in kinetic_energy=NAME",
+    )
 
 
 def _looks_like_an_energy(name: str) -> bool:
@@ -296,7 +335,9 @@ def note_other_quantity(channel: str) -> tuple[str, ...]:
     word = _word_of_other_quantity(channel)
     if not word:
         return ()
-    return (f"{channel!r} is not an internal energy by its name ({word}); it was used as it is",)
+    return (
+        f"{channel!r} is not an internal energy by its name ({word}); it was used as it is",
+    )
 
 
 def refuse_other_quantity(channel: str, where: str) -> None:
@@ -310,9 +351,17 @@ def refuse_other_quantity(channel: str, where: str) -> None:
 def _word_of_other_quantity(channel: str) -> str:
     """Return what makes a name that of something else than an internal energy, or nothing."""
     meaning = find_meaning(channel)
-    if meaning and meaning.quantity == "internal_energy" and meaning.rank < OF_SOMETHING_ELSE:
+    if (
+        meaning
+        and meaning.quantity == "internal_energy"
+        and meaning.rank < OF_SOMETHING_ELSE
+    ):
         return ""
     word = re.search(_OTHER_QUANTITY, channel)
     if word:
         return word[0]
-    return meaning.quantity.replace("_", " ") if meaning and meaning.quantity in QUANTITIES else ""
+    return (
+        meaning.quantity.replace("_", " ")
+        if meaning and meaning.quantity in QUANTITIES
+        else ""
+    )

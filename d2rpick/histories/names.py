@@ -13,7 +13,9 @@ from d2rpick.base.tuples import NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-TIME_UNITS = frozenset({"s", "sec", "second", "seconds", "ms", "msec", "us", "µs", "μs", "ns", "min", "h"})
+TIME_UNITS = frozenset(
+    {"s", "sec", "second", "seconds", "ms", "msec", "us", "µs", "μs", "ns", "min", "h"}
+)
 _ENERGY_UNITS = frozenset(
     {"j", "kj", "mj", "gj", "µj", "μj", "uj", "nj", "joule", "joules", "nm", "nmm", "n*m", "n*mm", "n.m", "n.mm", "n·m",
      "n·mm", "n-mm", "n-m", "knm", "knmm", "kn*mm", "kn.mm", "kn·mm", "kn*m", "kn-mm", "kn-m", "erg", "lbf*in",
@@ -133,19 +135,30 @@ def normalised(name: str) -> str:
     >>> [normalised(name) for name in ("Internal_Energy (J)", "t/ms", "IE_J", "E int")]
     ['internalenergy', 't', 'ie', 'eint']
     """
-    return "".join(letter for letter in without_unit(name).casefold() if letter.isalnum())
+    return "".join(
+        letter for letter in without_unit(name).casefold() if letter.isalnum()
+    )
 
 
 def is_unit(cell: str) -> bool:
     """Return True if a cell of a row of units may read like this: ``ms``, ``in mJ``, ``[J]``, ``(-)``, nothing."""
     cell = cell.removeprefix("in ")
-    return cell.casefold() in _UNITS | {"", "-", "1"} or (bool(cell) and cell[0] + cell[-1] in ("()", "[]"))
+    return cell.casefold() in _UNITS | {"", "-", "1"} or (
+        bool(cell) and cell[0] + cell[-1] in ("()", "[]")
+    )
 
 
 def meant(wanted: str, known: Sequence[str]) -> list[int]:
     """Places of the names that are meant: as it stands, in other case, or but for blanks, underscores and units."""
-    spellings: tuple[Callable[[str], str], ...] = (str.strip, lambda text: text.strip().casefold(), normalised)
-    alike = ([place for place, own in enumerate(known) if key(own) == key(wanted)] for key in spellings)
+    spellings: tuple[Callable[[str], str], ...] = (
+        str.strip,
+        lambda text: text.strip().casefold(),
+        normalised,
+    )
+    alike = (
+        [place for place, own in enumerate(known) if key(own) == key(wanted)]
+        for key in spellings
+    )
     return next(filter(None, alike), [])
 
 
@@ -159,9 +172,13 @@ def resolve(wanted: str, known: Sequence[str], where: str) -> str:
     """
     same = [known[place] for place in meant(wanted, known)]
     if not same:
-        raise FormatError(f"{where}: no {wanted!r}{near_miss(wanted, known)}; there are: {listing(known)}")
+        raise FormatError(
+            f"{where}: no {wanted!r}{near_miss(wanted, known)}; there are: {listing(known)}"
+        )
     if len(same) > 1:
-        raise FormatError(f"{where}: {wanted!r} may be any of these: {listing(same)}; choose one as it is written")
+        raise FormatError(
+            f"{where}: {wanted!r} may be any of these: {listing(same)}; choose one as it is written"
+        )
     return same[0]
 
 
@@ -211,7 +228,11 @@ def number_in_family(name: str, first: str) -> int | None:
     (7, None)
     """
     number = name[len(first) :] if name.startswith(first) else ""
-    return int(number) if 2 <= len(number) <= 9 and number.isascii() and number.isdigit() else None
+    return (
+        int(number)
+        if 2 <= len(number) <= 9 and number.isascii() and number.isdigit()
+        else None
+    )
 
 
 class Part(NamedTuple):
@@ -272,7 +293,9 @@ class Selection(NamedTuple):
     springs: tuple[str, ...] | None = None
 
 
-def select_parts(wanted: Sequence[str], known: Sequence[Part], where: str) -> tuple[Part, ...]:
+def select_parts(
+    wanted: Sequence[str], known: Sequence[Part], where: str
+) -> tuple[Part, ...]:
     """Find the parts that are meant by numbers (``3``, ``3,7``), ranges (``10-19``) and titles.
 
     Raises
@@ -286,36 +309,50 @@ def select_parts(wanted: Sequence[str], known: Sequence[Part], where: str) -> tu
     (Part(id=1, title='roof'), Part(id=2, title='door'), Part(id=7, title='seat, left'))
     """
     if not known:
-        raise FormatError(f"{where}: no parts with histories of their own; add the matsum, binout or T01 of the run")
+        raise FormatError(
+            f"{where}: no parts with histories of their own; add the matsum, binout or T01 of the run"
+        )
     titled: dict[str, list[Part]] = {}
     for part in known:
         titled.setdefault(part.title.strip().casefold(), []).append(part)
     titled[""] = []  # is none
-    found = dict.fromkeys(part for text in wanted for part in _meant(text, known, titled, where))
+    found = dict.fromkeys(
+        part for text in wanted for part in _meant(text, known, titled, where)
+    )
     return tuple(part for part in known if part in found)
 
 
-def _meant(text: str, known: Sequence[Part], titled: Mapping[str, Sequence[Part]], where: str) -> Iterator[Part]:
+def _meant(
+    text: str, known: Sequence[Part], titled: Mapping[str, Sequence[Part]], where: str
+) -> Iterator[Part]:
     whole = titled.get(text.strip().casefold())
     if whole and "," in text:  # a title may hold a comma
         yield _only(whole, text, where)
         return
     for piece in text.split(","):
-        yield from _piece(piece.strip(), known, titled.get(piece.strip().casefold()), where)
+        yield from _piece(
+            piece.strip(), known, titled.get(piece.strip().casefold()), where
+        )
 
 
-def _piece(piece: str, known: Sequence[Part], titled: Sequence[Part] | None, where: str) -> Sequence[Part]:
+def _piece(
+    piece: str, known: Sequence[Part], titled: Sequence[Part] | None, where: str
+) -> Sequence[Part]:
     numbers = re.fullmatch(_RANGE, piece)
     if not numbers:
         if not titled:
             near = near_miss(piece, [part.title for part in known])
-            raise FormatError(f"{where}: no part {piece!r}{near}; there are: {menu(known)}")
+            raise FormatError(
+                f"{where}: no part {piece!r}{near}; there are: {menu(known)}"
+            )
         return [_only(titled, piece, where)]
     low, high = int(numbers[1]), int(numbers[2] or numbers[1])
     inside = [part for part in known if low <= part.id <= high]
     if titled and titled != inside:
         found = f"{where}: {piece!r} is the title of part {titled[0].id}, as a number it means {menu(inside) or 'none'}"
-        raise FormatError(f"{found}; choose by a number or title that is one part's only")
+        raise FormatError(
+            f"{found}; choose by a number or title that is one part's only"
+        )
     if not inside:
         raise FormatError(f"{where}: no part {piece}; there are: {menu(known)}")
     return inside
@@ -323,13 +360,17 @@ def _piece(piece: str, known: Sequence[Part], titled: Sequence[Part] | None, whe
 
 def _only(titled: Sequence[Part], text: str, where: str) -> Part:
     if len(titled) > 1:
-        raise FormatError(f"{where}: {text!r} is the title of several parts, choose by number: {menu(titled)}")
+        raise FormatError(
+            f"{where}: {text!r} is the title of several parts, choose by number: {menu(titled)}"
+        )
     return titled[0]
 
 
 def menu(parts: Sequence[Part]) -> str:
     """Parts for a message: number and title."""
-    return listing([f"{part.id} {part.title!r}" if part.title else str(part.id) for part in parts])
+    return listing(
+        [f"{part.id} {part.title!r}" if part.title else str(part.id) for part in parts]
+    )
 
 
 def asks_for_recommended(texts: Sequence[str], parts: Iterable[Part]) -> bool:

@@ -35,7 +35,9 @@ _HEAD = 8192
 _DEFAULT = Selection()
 # No legend of an ASCII database has more bytes.
 _LONGEST_LEGEND: Final = 1 << 24
-_DIGITS: Final = "0123456789"  # of the number of a file behind the first one of its family
+_DIGITS: Final = (
+    "0123456789"  # of the number of a file behind the first one of its family
+)
 
 
 class Reader(Protocol):
@@ -44,16 +46,22 @@ class Reader(Protocol):
     def recognises(self, head: bytes) -> bool:
         """Whether a file that begins like this is of the reader's format; never raises."""
 
-    def open_legs(self, sources: Sequence[Source], selection: Selection) -> Sequence[Database]:
+    def open_legs(
+        self, sources: Sequence[Source], selection: Selection
+    ) -> Sequence[Database]:
         """Open files of this format as the legs of one run; FormatError when one is none."""
 
 
 def reader(kind: str) -> Reader:
     """Import the reader of a format, one of `READERS`."""
-    return cast("Reader", import_module(f"d2rpick.histories.formats.{READERS[kind].module}"))
+    return cast(
+        "Reader", import_module(f"d2rpick.histories.formats.{READERS[kind].module}")
+    )
 
 
-def open_run(names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto") -> Run:
+def open_run(
+    names: Sequence[str], selection: Selection = _DEFAULT, input_format: str = "auto"
+) -> Run:
     """Open the files of one run: of one format as its legs, of different formats as companions.
 
     Parameters
@@ -74,20 +82,31 @@ def open_run(names: Sequence[str], selection: Selection = _DEFAULT, input_format
     return open_sources(open_files(names), selection, input_format)
 
 
-def open_sources(sources: Sequence[Source], selection: Selection = _DEFAULT, input_format: str = "auto") -> Run:
+def open_sources(
+    sources: Sequence[Source],
+    selection: Selection = _DEFAULT,
+    input_format: str = "auto",
+) -> Run:
     """Open the files of one run whose bytes are at hand; arguments and errors as of `open_run`."""
-    with_forces = [one for one in sources if input_format == "auto" and _holds_forces(one)]
+    with_forces = [
+        one for one in sources if input_format == "auto" and _holds_forces(one)
+    ]
     sources = [one for one in sources if one not in with_forces]
     if not sources and with_forces:
         found = f"{with_forces[0].name}: an rcforc or rwforc of LS-DYNA, which holds forces and no internal energy"
-        raise FormatError(f"{found}; name the glstat, matsum or binout of the run with it")
+        raise FormatError(
+            f"{found}; name the glstat, matsum or binout of the run with it"
+        )
     kinds, left_out = _sort_by_format(sources, input_format)
     ordered = [kind for kind in READERS if kind in kinds]
     _refuse_time_of_solver(ordered, selection.time)
     opened, notes = _opened(kinds, ordered, selection)
     ordered = [kind for kind in ordered if kind in opened]
     forces, unread = _forces_of(with_forces)
-    read = [*(source for kind in ordered for source in kinds[kind]), *([] if unread else with_forces)]
+    read = [
+        *(source for kind in ordered for source in kinds[kind]),
+        *([] if unread else with_forces),
+    ]
     used = {source.name for source in read}
     for legs in opened.values():
         check_legs(legs)
@@ -105,17 +124,30 @@ def open_sources(sources: Sequence[Source], selection: Selection = _DEFAULT, inp
     check_companions(databases)
     behind = {name for kind in FAMILIES for name in _behind_firsts(kinds.get(kind, ()))}
     every = (*sources, *with_forces)
-    named = tuple(source.name for source in every if source.name not in behind and source.name in used)
+    named = tuple(
+        source.name
+        for source in every
+        if source.name not in behind and source.name in used
+    )
     files = tuple(source for source in every if source.name in used)
     reopen = partial(_reopen, files, selection, input_format)
-    return Run(named, databases, files, notes=(*notes, *unread), forces=forces, reopen=reopen)
+    return Run(
+        named, databases, files, notes=(*notes, *unread), forces=forces, reopen=reopen
+    )
 
 
-def _reopen(sources: Sequence[Source], selection: Selection, input_format: str, surroundings: Surroundings) -> Run:
+def _reopen(
+    sources: Sequence[Source],
+    selection: Selection,
+    input_format: str,
+    surroundings: Surroundings,
+) -> Run:
     return open_sources(sources, selection, input_format).within(surroundings)
 
 
-def _sort_by_format(sources: Sequence[Source], input_format: str) -> tuple[dict[str, list[Source]], list[str]]:
+def _sort_by_format(
+    sources: Sequence[Source], input_format: str
+) -> tuple[dict[str, list[Source]], list[str]]:
     """Sort the files of a run by their formats, and say which of those that a pattern matched are left out.
 
     Of a pattern the histories are used, as of a folder: a table only if there is no database of a solver.  Files
@@ -132,7 +164,9 @@ def _sort_by_format(sources: Sequence[Source], input_format: str) -> tuple[dict[
         first = formats.get(source.name.rstrip(_DIGITS))
         try:
             known = first if first in FAMILIES else None
-            formats[source.name] = known or (input_format if input_format != "auto" else _format(source))
+            formats[source.name] = known or (
+                input_format if input_format != "auto" else _format(source)
+            )
         except FormatError as error:
             if not source.by_pattern:
                 raise
@@ -156,11 +190,17 @@ def _sort_by_format(sources: Sequence[Source], input_format: str) -> tuple[dict[
 
 
 def _left_out(source: Source, refusal: str) -> str:
-    reason = refusal.removeprefix(f"{source.name}: ").partition(";")[0].removesuffix(", an energy history was expected")
+    reason = (
+        refusal.removeprefix(f"{source.name}: ")
+        .partition(";")[0]
+        .removesuffix(", an energy history was expected")
+    )
     return f"{source.name} was left out: {reason}"
 
 
-def _with_forces_last(opened: Mapping[str, Sequence[Database]], ordered: Sequence[str]) -> list[str]:
+def _with_forces_last(
+    opened: Mapping[str, Sequence[Database]], ordered: Sequence[str]
+) -> list[str]:
     """Give the formats with those last that hold forces alone; FormatError where all do."""
     alone = {kind: all(leg.only_forces for leg in opened[kind]) for kind in ordered}
     if all(alone.values()):
@@ -170,10 +210,14 @@ def _with_forces_last(opened: Mapping[str, Sequence[Database]], ordered: Sequenc
 
 def _holds_forces(source: Source) -> bool:
     """Whether a file is a listing of forces, as none of a family is of which little is read."""
-    return not isinstance(source.data, Scattered) and force_listings.recognises(source.data[:_HEAD])
+    return not isinstance(source.data, Scattered) and force_listings.recognises(
+        source.data[:_HEAD]
+    )
 
 
-def _forces_of(sources: Sequence[Source]) -> tuple[tuple[ContactForce, ...], tuple[str, ...]]:
+def _forces_of(
+    sources: Sequence[Source],
+) -> tuple[tuple[ContactForce, ...], tuple[str, ...]]:
     """Read the forces of files that hold nothing else, or say why they cannot be: the run is read without them."""
     try:
         return force_listings.forces_of(sources), ()
@@ -184,7 +228,9 @@ def _forces_of(sources: Sequence[Source]) -> tuple[tuple[ContactForce, ...], tup
 def _behind_firsts(sources: Sequence[Source]) -> set[str]:
     """Names of the files that are behind the first one of a family: this one stands for all."""
     names = {source.name for source in sources}
-    return {name for name in names if name[-1:].isdigit() and name.rstrip(_DIGITS) in names}
+    return {
+        name for name in names if name[-1:].isdigit() and name.rstrip(_DIGITS) in names
+    }
 
 
 def _opened(
@@ -198,7 +244,9 @@ def _opened(
     opened: dict[str, Sequence[Database]] = {}
     notes = []
     for kind in ordered:
-        if kind in FAMILIES and _hold_all([leg for legs in opened.values() for leg in legs]):
+        if kind in FAMILIES and _hold_all(
+            [leg for legs in opened.values() for leg in legs]
+        ):
             continue
         try:
             opened[kind] = reader(kind).open_legs(kinds[kind], selection)
@@ -225,8 +273,14 @@ def _refuse_unknown_channels(databases: Sequence[Legs], selection: Selection) ->
 
 def _refuse_time_of_solver(kinds: Sequence[str], time: str | None) -> None:
     """Refuse ``--time`` where it would be passed over: solvers have one time and call it so."""
-    if time is not None and time.strip().casefold() != "time" and all(READERS[kind].solver for kind in kinds):
-        raise FormatError(f"no time {time!r} in {' and '.join(kinds)}, the time is 'time'; leave `time` out")
+    if (
+        time is not None
+        and time.strip().casefold() != "time"
+        and all(READERS[kind].solver for kind in kinds)
+    ):
+        raise FormatError(
+            f"no time {time!r} in {' and '.join(kinds)}, the time is 'time'; leave `time` out"
+        )
 
 
 def _format(source: Source) -> str:
@@ -243,16 +297,22 @@ def _format(source: Source) -> str:
     if re.search(r"(^|[/\\.])d3(plot|part|thdt)\d+$", source.name):
         first = source.name.rstrip(_DIGITS)
         found = f"{source.name}: the first file of its family says what it holds"
-        raise FormatError(f"{found}; name {first}, with which all files behind it are read")
+        raise FormatError(
+            f"{found}; name {first}, with which all files behind it are read"
+        )
     if re.search(r"(^|[/\\.])d3(plot|part|dump|thdt)[^/\\]*$", source.name):
         what = "this is a file of LS-DYNA's d3 family, which holds no energies that are read"
-        raise FormatError(f"{source.name}: {what}; name the glstat, matsum, d3plot or binout of the run")
+        raise FormatError(
+            f"{source.name}: {what}; name the glstat, matsum, d3plot or binout of the run"
+        )
     found = f"{source.name}: binary data of no known format, one of {', '.join(READERS)} was expected"
     raise FormatError(f"{found}; export the energy history as text")
 
 
 def _refuse_foreign(name: str, head: bytes) -> None:
-    from d2rpick.histories.foreign import refuse_foreign  # not above: the databases of solvers do without
+    from d2rpick.histories.foreign import (
+        refuse_foreign,
+    )  # not above: the databases of solvers do without
 
     refuse_foreign(name, head)
 
@@ -276,8 +336,14 @@ _COMPARED = 50
 def check_companions(databases: Sequence[Legs]) -> None:
     """Refuse databases that have no time in common."""
     for one, other in combinations(databases, 2):
-        if one.span and other.span and (one.span[0] > other.span[1] or other.span[0] > one.span[1]):
-            raise FormatError(f"{one.source} and {other.source} have no time in common, files of one run were expected")
+        if (
+            one.span
+            and other.span
+            and (one.span[0] > other.span[1] or other.span[0] > one.span[1])
+        ):
+            raise FormatError(
+                f"{one.source} and {other.source} have no time in common, files of one run were expected"
+            )
 
 
 def check_legs(legs: Sequence[Database]) -> None:
@@ -290,16 +356,27 @@ def check_legs(legs: Sequence[Database]) -> None:
         here, there = _held(one), _held(other)
         if here and there and not here & there:
             found = f"{one.source} and {other.source} have neither a column nor a part in common"
-            raise FormatError(f"{found}, legs of one run were expected; give the files of one run")
+            raise FormatError(
+                f"{found}, legs of one run were expected; give the files of one run"
+            )
         for times, columns in ((_own_times, _energies), (_part_times, _part_energies)):
             try:
                 shared = _shared(times(one), times(other))
-                values = [columns(leg, at) for leg, at in zip((one, other), shared, strict=True)] if shared else []
+                values = (
+                    [
+                        columns(leg, at)
+                        for leg, at in zip((one, other), shared, strict=True)
+                    ]
+                    if shared
+                    else []
+                )
             except FormatError:  # said when it is read
                 continue
             if values and not _alike(*values):
                 found = f"{one.source} and {other.source} have different energies at the same times"
-                raise FormatError(f"{found}, legs of one run were expected; give the files of one run")
+                raise FormatError(
+                    f"{found}, legs of one run were expected; give the files of one run"
+                )
 
 
 def _held(leg: Database) -> set[str | int]:

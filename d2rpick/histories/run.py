@@ -14,7 +14,11 @@ from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, if_written, listing
 from d2rpick.histories.database import check_sum, doubts
 from d2rpick.histories.history import Balance, Given, History, Momenta, Samples, Track
-from d2rpick.histories.meaning import is_any_internal_energy, note_other_quantity, note_unused_energies
+from d2rpick.histories.meaning import (
+    is_any_internal_energy,
+    note_other_quantity,
+    note_unused_energies,
+)
 from d2rpick.histories.names import QUANTITIES, Part, Selection, menu, select_parts
 from d2rpick.histories.samples import median
 from d2rpick.histories.surroundings import UNKNOWN, Surroundings
@@ -52,17 +56,32 @@ class Run:
         forces: tuple[ContactForce, ...] = (),
         reopen: Callable[[Surroundings], Run] | None = None,
     ) -> None:
-        self.sources, self.databases, self.files, self.surroundings = sources, databases, files, surroundings
+        self.sources, self.databases, self.files, self.surroundings = (
+            sources,
+            databases,
+            files,
+            surroundings,
+        )
         self._notes, self._forces, self._reopen = notes, forces, reopen
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self._reopen is None:
-            raise TypeError(f"{self.name}: only a run that was opened from files can be copied")
+            raise TypeError(
+                f"{self.name}: only a run that was opened from files can be copied"
+            )
         return self._reopen, (self.surroundings,)
 
     def within(self, surroundings: Surroundings) -> Run:
         """Give the same run with what is known of its surroundings."""
-        return Run(self.sources, self.databases, self.files, surroundings, self._notes, self._forces, self._reopen)
+        return Run(
+            self.sources,
+            self.databases,
+            self.files,
+            surroundings,
+            self._notes,
+            self._forces,
+            self._reopen,
+        )
 
     @property
     def name(self) -> str:
@@ -93,9 +112,15 @@ class Run:
         """
         history = self._energy(selection)
         notes = (*history.notes, *self.unused_energies(selection))
-        flying = select_parts(selection.flying, self.parts, self.name) if selection.flying else None
+        flying = (
+            select_parts(selection.flying, self.parts, self.name)
+            if selection.flying
+            else None
+        )
         evidence = _Written(self, history.parts, flying)
-        return replace(history, evidence=evidence, surroundings=self.surroundings, notes=notes)
+        return replace(
+            history, evidence=evidence, surroundings=self.surroundings, notes=notes
+        )
 
     def unused_energies(self, selection: Selection) -> tuple[str, ...]:
         """Return notes on the channels of tables that look like energies but are neither selected nor understood."""
@@ -105,10 +130,14 @@ class Run:
                 continue
             chosen = if_written(partial(_selected_channels, database, selection))
             if chosen is not None:
-                notes += note_unused_energies(database.channels, {*chosen, *database.quantities.values()})
+                notes += note_unused_energies(
+                    database.channels, {*chosen, *database.quantities.values()}
+                )
         return tuple(notes)
 
-    def momenta(self, chosen: Sequence[Part] | None, flying: Sequence[Part] | None) -> tuple[Momenta, ...]:
+    def momenta(
+        self, chosen: Sequence[Part] | None, flying: Sequence[Part] | None
+    ) -> tuple[Momenta, ...]:
         """Give the momentum of the parts and that of the whole model, as far as they are written.
 
         ``chosen`` are the parts to switch (None: all), ``flying`` those known to fly together, if they are.
@@ -116,14 +145,18 @@ class Run:
         of_parts, of_whole = self._part_momenta, self._whole_momentum
         if of_parts and of_parts.parts:
             ids = [part.id for part in of_parts.parts]
-            members = tuple(ids.index(part.id) for part in chosen or self._free(of_parts.parts))
+            members = tuple(
+                ids.index(part.id) for part in chosen or self._free(of_parts.parts)
+            )
             known = tuple(ids.index(part.id) for part in flying) if flying else None
             of_parts = of_parts.choosing(members, known)
         return tuple(one for one in (of_parts, of_whole) if one)
 
     def _free(self, parts: Sequence[Part]) -> Sequence[Part]:
         """Give those of all parts that nothing holds, or all where each is held."""
-        return [part for part in parts if not self.surroundings.supports_of([part])] or parts
+        return [
+            part for part in parts if not self.surroundings.supports_of([part])
+        ] or parts
 
     @cached_property
     def _part_momenta(self) -> Momenta | None:
@@ -131,13 +164,23 @@ class Run:
         holder = self._with_parts()
         if holder is None:
             return None
-        values = if_written(lambda: np.stack([self._of_holder(axis, holder.parts) for axis in _AXES], axis=2))
+        values = if_written(
+            lambda: np.stack(
+                [self._of_holder(axis, holder.parts) for axis in _AXES], axis=2
+            )
+        )
         if values is None or not values.size:
             return None  # it cannot say what flies together
         precision = holder.precisions(())[1]
         masses = self._least_masses(values, holder)
         return Momenta(
-            holder.part_time, values, holder.parts, precision, (), masses=masses, surroundings=self.surroundings
+            holder.part_time,
+            values,
+            holder.parts,
+            precision,
+            (),
+            masses=masses,
+            surroundings=self.surroundings,
         )
 
     @cached_property
@@ -153,12 +196,21 @@ class Run:
         with suppress(FormatError):
             return _median_of_some(self._of_holder("mass", holder.parts))
         axis = int(np.abs(momenta).sum(axis=(0, 1)).argmax())
-        velocity, momentum = if_written(lambda: self._of_holder(_VELOCITIES[axis], holder.parts)), momenta[:, :, axis]
+        velocity, momentum = (
+            if_written(lambda: self._of_holder(_VELOCITIES[axis], holder.parts)),
+            momenta[:, :, axis],
+        )
         if velocity is None:
             return None
         square, product = (velocity**2).sum(axis=0), (velocity * momentum).sum(axis=0)
         massless = ~momentum.any(axis=0) & ~velocity.any(axis=0)
-        return np.where(massless, 0.0, np.divide(product, square, out=np.full(square.shape, np.nan), where=square > 0))
+        return np.where(
+            massless,
+            0.0,
+            np.divide(
+                product, square, out=np.full(square.shape, np.nan), where=square > 0
+            ),
+        )
 
     def _least_masses(self, momenta: Samples, holder: Legs) -> Samples | None:
         """Masses of the parts; of a part that writes none, the least that has its momentum at its kinetic energy."""
@@ -168,14 +220,24 @@ class Run:
         if masses is None or not np.isnan(masses).any():
             return masses
         kinetic = if_written(lambda: self.part_kinetic_energies(holder.parts))
-        return masses if kinetic is None else np.where(np.isnan(masses), least_masses(momenta, kinetic), masses)
+        return (
+            masses
+            if kinetic is None
+            else np.where(np.isnan(masses), least_masses(momenta, kinetic), masses)
+        )
 
     @cached_property
     def contact_forces(self) -> tuple[ContactForce, ...]:
         """Forces of contacts and rigid walls, of each the first that a file tells."""
-        written = (if_written(partial(forces_of, database)) or () for database in self.databases)
+        written = (
+            if_written(partial(forces_of, database)) or ()
+            for database in self.databases
+        )
         named: dict[str, ContactForce] = {}
-        for force in (*(force for forces in written for force in forces), *self._forces):
+        for force in (
+            *(force for forces in written for force in forces),
+            *self._forces,
+        ):
             named.setdefault(force.name, force)
         return tuple(named.values())
 
@@ -184,14 +246,23 @@ class Run:
         """Momentum of the whole model, or its velocity; None if not written."""
         from d2rpick.histories.balance import momentum_of
 
-        found = (momentum_of(database) for database in self.databases if database.channels)
+        found = (
+            momentum_of(database) for database in self.databases if database.channels
+        )
         written = next(filter(None, found), None)
         return written and replace(written, surroundings=self.surroundings)
 
     def momentum(self, parts: Sequence[Part] | None) -> Track | None:
         """Give the momentum of some parts together, or of the whole model; None where it is not written."""
         of_parts = parts is not None
-        found = next((one for one in self.momenta(parts, None) if (one.parts is not None) == of_parts), None)
+        found = next(
+            (
+                one
+                for one in self.momenta(parts, None)
+                if (one.parts is not None) == of_parts
+            ),
+            None,
+        )
         return Track(found.time, found.of(found.chosen)) if found else None
 
     @property
@@ -205,8 +276,14 @@ class Run:
         from d2rpick.histories.balance import springs_among
 
         parts = self.parts
-        energies = if_written(lambda: self.part_energies(parts)) if parts else None  # not in every state
-        return () if energies is None else springs_among(self.databases, parts, energies, self.part_time)
+        energies = (
+            if_written(lambda: self.part_energies(parts)) if parts else None
+        )  # not in every state
+        return (
+            ()
+            if energies is None
+            else springs_among(self.databases, parts, energies, self.part_time)
+        )
 
     def part_energies(self, parts: Sequence[Part]) -> Samples:
         """Internal energies of some parts, shape (n, parts), at the times of their history [energy]."""
@@ -225,13 +302,19 @@ class Run:
             for quantity in QUANTITIES:
                 if quantity in database.quantities and quantity not in found:
                     with suppress(FormatError):  # not in every state
-                        found[quantity] = database.channel(database.quantities[quantity])
+                        found[quantity] = database.channel(
+                            database.quantities[quantity]
+                        )
         return found
 
     def centre(self, parts: Sequence[Part]) -> Track | None:
         """Give the mean of the centres of some parts [length]; None where they are not written."""
-        places = if_written(lambda: [self._of_holder(axis, parts).mean(axis=1) for axis in _CENTRES])
-        return None if places is None else Track(self.part_time, np.stack(places, axis=1))
+        places = if_written(
+            lambda: [self._of_holder(axis, parts).mean(axis=1) for axis in _CENTRES]
+        )
+        return (
+            None if places is None else Track(self.part_time, np.stack(places, axis=1))
+        )
 
     def _of_holder(self, quantity: str, parts: Sequence[Part]) -> Samples:
         return self._holder().part_channel(quantity, [part.id for part in parts])
@@ -242,7 +325,11 @@ class Run:
         if selection.parts:
             chosen = select_parts(selection.parts, self._holder().parts, self.name)
             named = selection.springs
-            springs = self.springs if named is None else tuple(part for part in self.parts if str(part.id) in named)
+            springs = (
+                self.springs
+                if named is None
+                else tuple(part for part in self.parts if str(part.id) in named)
+            )
             return self._of_parts(chosen, springs)
         if selection.energy:
             return self._of_channels(selection.energy)
@@ -255,14 +342,20 @@ class Run:
         """The database that knows parts; FormatError with what there is instead of them."""
         holder = self._with_parts()
         if holder is None:
-            self.databases[0].part_channel("internal_energy", ())  # knows best why there are none
-            raise FormatError(f"{self.name}: no parts with histories of their own; let the run write them")
+            self.databases[0].part_channel(
+                "internal_energy", ()
+            )  # knows best why there are none
+            raise FormatError(
+                f"{self.name}: no parts with histories of their own; let the run write them"
+            )
         return holder
 
     def _with_parts(self) -> Legs | None:
         return next((database for database in self.databases if database.parts), None)
 
-    def _of_parts(self, chosen: tuple[Part, ...], springs: tuple[Part, ...] = ()) -> History:
+    def _of_parts(
+        self, chosen: tuple[Part, ...], springs: tuple[Part, ...] = ()
+    ) -> History:
         holder = self._holder()
         energies = self.part_energies(chosen)
         for database in self.databases:
@@ -270,16 +363,30 @@ class Run:
         left_out = np.array([part in springs for part in chosen])
         if not energies[:, ~left_out].any():  # springs are all that has energy
             left_out[:] = False
-        idle = [part for part, energy in zip(chosen, energies.T, strict=True) if not energy.any()]
-        notes = (f"without any internal energy: part {menu(idle)}; rigid, or without elements?",) if idle else ()
+        idle = [
+            part
+            for part, energy in zip(chosen, energies.T, strict=True)
+            if not energy.any()
+        ]
+        notes = (
+            (
+                f"without any internal energy: part {menu(idle)}; rigid, or without elements?",
+            )
+            if idle
+            else ()
+        )
         every = [part.name for part in chosen]
         names, apart = list(compress(every, ~left_out)), list(compress(every, left_out))
         channel = "internal energy of " + ", ".join(names)
         if apart:
             notes = (*notes, _left_out(", ".join(apart)))
         energies = energies[:, ~left_out]
-        history = self._history_of(holder, holder.part_time, energies.sum(axis=1), channel, (), notes, chosen)
-        return _with_terms(replace(history, springs=tuple(compress(chosen, left_out))), names, energies)
+        history = self._history_of(
+            holder, holder.part_time, energies.sum(axis=1), channel, (), notes, chosen
+        )
+        return _with_terms(
+            replace(history, springs=tuple(compress(chosen, left_out))), names, energies
+        )
 
     def _without_springs(self, database: Legs, channel: str) -> History:
         """Take the energy of the whole model, less that of springs and dampers where it has other energy too."""
@@ -290,16 +397,30 @@ class Run:
             return whole
         rest = whole.energy - springs[1]
         note = _left_out(f"all springs and dampers, {springs[0]},")
-        return replace(whole, energy=rest, channel=f"{channel} - {springs[0]}", notes=(*whole.notes, note))
+        return replace(
+            whole,
+            energy=rest,
+            channel=f"{channel} - {springs[0]}",
+            notes=(*whole.notes, note),
+        )
 
     def _of_all_parts(self) -> History:
         if not self.parts:
-            there = listing([name for database in self.databases for name in database.channels])
+            there = listing(
+                [name for database in self.databases for name in database.channels]
+            )
             found = f"{self.name}: no internal energy"
-            raise FormatError(f"{found}; choose with `energy`: {there or 'there are no channels'}")
+            raise FormatError(
+                f"{found}; choose with `energy`: {there or 'there are no channels'}"
+            )
         every = self._of_parts(self.parts)
         note = "the energies of all parts were added, those that stay deformable among them; choose with `parts`"
-        return replace(every, channel="internal energy of all parts", parts=None, notes=(*every.notes, note))
+        return replace(
+            every,
+            channel="internal energy of all parts",
+            parts=None,
+            notes=(*every.notes, note),
+        )
 
     def _of_channels(self, wanted: Sequence[str]) -> History:
         database, names = self._holding(wanted)
@@ -309,8 +430,14 @@ class Run:
         channel = " + ".join(names)
         notes = note_other_quantity(channel)
         energy = columns[0] if len(columns) == 1 else np.sum(columns, axis=0)
-        history = self._history_of(database, database.time, energy, channel, names, notes, None)
-        return history if len(columns) == 1 else _with_terms(history, names, np.stack(columns, axis=1))
+        history = self._history_of(
+            database, database.time, energy, channel, names, notes, None
+        )
+        return (
+            history
+            if len(columns) == 1
+            else _with_terms(history, names, np.stack(columns, axis=1))
+        )
 
     def _holding(self, wanted: Sequence[str]) -> tuple[Legs, tuple[str, ...]]:
         """Find the database that has all these channels, under the names it gives them."""
@@ -349,7 +476,9 @@ class Run:
 class _Written(Given):
     """What the files of a run hold for some parts, read when it is asked for."""
 
-    def __init__(self, run: Run, chosen: Sequence[Part] | None, flying: Sequence[Part] | None) -> None:
+    def __init__(
+        self, run: Run, chosen: Sequence[Part] | None, flying: Sequence[Part] | None
+    ) -> None:
         self._run, self._chosen, self._flying = run, chosen, flying
 
     @cached_property
@@ -384,7 +513,9 @@ class _Written(Given):
         if parts is None:
             return super().kinetic_energy(parts)
         values = if_written(lambda: self._run.part_kinetic_energies(parts))
-        return None if values is None else Track(self._run.part_time, values.sum(axis=1))
+        return (
+            None if values is None else Track(self._run.part_time, values.sum(axis=1))
+        )
 
 
 def _selected_channels(database: Legs, selection: Selection) -> list[str]:
@@ -400,7 +531,12 @@ def _median_of_some(values: Samples) -> Samples:
     some = values != 0
     if some.all():
         return median(values)
-    return np.array([median(one[there]) if there.any() else 0.0 for one, there in zip(values.T, some.T, strict=True)])
+    return np.array(
+        [
+            median(one[there]) if there.any() else 0.0
+            for one, there in zip(values.T, some.T, strict=True)
+        ]
+    )
 
 
 def _left_out(springs: str) -> str:
@@ -412,4 +548,8 @@ def _with_terms(history: History, names: Sequence[str], energies: Samples) -> Hi
     active = np.flatnonzero(energies.any(axis=0))
     if active.size < 2:
         return history
-    return replace(history, part_names=tuple(names[i] for i in active.tolist()), part_energies=energies[:, active])
+    return replace(
+        history,
+        part_names=tuple(names[i] for i in active.tolist()),
+        part_energies=energies[:, active],
+    )

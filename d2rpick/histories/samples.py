@@ -40,7 +40,9 @@ def integral(time: Samples, values: Samples) -> Samples:
     areas = (values[1:] + values[:-1]).T
     areas *= np.diff(time)
     areas /= 2
-    return np.concatenate([np.zeros_like(values[:1]), np.cumsum(areas.T, axis=0, out=areas.T)])
+    return np.concatenate(
+        [np.zeros_like(values[:1]), np.cumsum(areas.T, axis=0, out=areas.T)]
+    )
 
 
 def median(values: Samples) -> Samples:
@@ -103,12 +105,16 @@ def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
     notes = []
     if equal:
         same = "1 state has" if equal == 1 else f"{equal} states have"
-        notes.append(f"{same} the same printed time as the next one; the last of equal times counts")
+        notes.append(
+            f"{same} the same printed time as the next one; the last of equal times counts"
+        )
     if back:
         steps = "once" if back == 1 else f"{back} times"
         lost = int(np.count_nonzero(~keep)) - equal
         dropped = "1 older state was" if lost == 1 else f"{lost} older states were"
-        notes.append(f"time steps back {steps} (restart); where legs overlap the newer one counts, {dropped} dropped")
+        notes.append(
+            f"time steps back {steps} (restart); where legs overlap the newer one counts, {dropped} dropped"
+        )
     return keep, tuple(notes)
 
 
@@ -125,7 +131,10 @@ def count_rows_per_time(time: Samples) -> int:
     >>> count_rows_per_time(np.array([0.0, 0.0, 0.1, 0.1, 0.2, 0.2])), count_rows_per_time(np.array([0.0, 0.1, 0.1]))
     (2, 1)
     """
-    if time.size < 2 * FEWEST_TIMES or np.count_nonzero(time[1:] == time[:-1]) < _REPEATED * time.size:
+    if (
+        time.size < 2 * FEWEST_TIMES
+        or np.count_nonzero(time[1:] == time[:-1]) < _REPEATED * time.size
+    ):
         return 1
     first_rows = np.flatnonzero(np.append(True, time[1:] != time[:-1]))
     rows = np.diff(np.append(first_rows, time.size))
@@ -141,7 +150,9 @@ def of_one_run(time: Samples, place: Callable[[int], str]) -> Samples:
     state = _not_a_restart(time)
     if state is None:
         return time
-    found = f"{place(state)}: time steps back from {time[state - 1]:g} to {time[state]:g}"
+    found = (
+        f"{place(state)}: time steps back from {time[state - 1]:g} to {time[state]:g}"
+    )
     if time[state] <= time[0]:
         cure = "another curve or part begins here: put each into its own file"
     else:
@@ -168,15 +179,21 @@ def _not_a_restart(time: Samples) -> int | None:
         return first
     before, behind = (np.diff(one) for one in np.split(time, [first]))
     ratios = [_median(steps) / _median(before) for steps in (behind, behind[:1])]
-    return first if any(ratio < 1 / _ALIKE or ratio > _ALIKE for ratio in ratios) else None
+    return (
+        first if any(ratio < 1 / _ALIKE or ratio > _ALIKE for ratio in ratios) else None
+    )
 
 
 def _median(steps: Samples) -> float:
     steps = steps[steps > 0]  # equal printed times are no interval
-    return float(median(steps)) if steps.size else np.nan  # which is neither too small nor too large
+    return (
+        float(median(steps)) if steps.size else np.nan
+    )  # which is neither too small nor too large
 
 
-def find_crossings(time: Samples, energy: Samples, level: float) -> tuple[Samples, NDArray[np.bool_]]:
+def find_crossings(
+    time: Samples, energy: Samples, level: float
+) -> tuple[Samples, NDArray[np.bool_]]:
     """Times of all passages of ``energy`` through ``level``, ascending, and which of them rise, both of shape (k,).
 
     Between samples the energy is taken as linear: on piecewise linear data the answer is exact to rounding.
@@ -207,13 +224,20 @@ def find_crossings(time: Samples, energy: Samples, level: float) -> tuple[Sample
     turn = np.flatnonzero(np.diff(side[off]))
     before, after = off[turn], off[turn + 1]
     # with samples on the level in between, the first of them: a share of 1
-    share = np.where(after == before + 1, (level - energy[before]) / (energy[before + 1] - energy[before]), 1.0)
+    share = np.where(
+        after == before + 1,
+        (level - energy[before]) / (energy[before + 1] - energy[before]),
+        1.0,
+    )
     at = time[before] + share * (time[before + 1] - time[before])
     rising = side[after] > 0
     if off[0] > 0:
         at, rising = np.append(time[0], at), np.append(side[off[0]] > 0, rising)
     if off[-1] < side.size - 1:
-        at, rising = np.append(at, time[off[-1] + 1]), np.append(rising, side[off[-1]] < 0)
+        at, rising = (
+            np.append(at, time[off[-1] + 1]),
+            np.append(rising, side[off[-1]] < 0),
+        )
     return at, rising
 
 
@@ -250,11 +274,17 @@ def stretches(states: NDArray[np.bool_], fewest: int = 1) -> tuple[slice, ...]:
     >>> stretches(np.array([True, False, True, True]), 2)
     (slice(2, 4, None),)
     """
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], states.astype(np.int8), [0]]))).reshape(-1, 2)
-    return tuple(slice(first, last) for first, last in edges.tolist() if last - first >= fewest)
+    edges = np.flatnonzero(
+        np.diff(np.concatenate([[0], states.astype(np.int8), [0]]))
+    ).reshape(-1, 2)
+    return tuple(
+        slice(first, last) for first, last in edges.tolist() if last - first >= fewest
+    )
 
 
-def first_above(values: Samples, start: NDArray[np.intp], limit: Samples) -> NDArray[np.intp]:
+def first_above(
+    values: Samples, start: NDArray[np.intp], limit: Samples
+) -> NDArray[np.intp]:
     """Place of the first of values (n,) from each ``start`` on that is above its ``limit``, of their shape (m,).
 
     n where none is.  It takes O((n + m) log n).
@@ -264,15 +294,23 @@ def first_above(values: Samples, start: NDArray[np.intp], limit: Samples) -> NDA
     >>> first_above(np.array([5.0, 1.0, 2.0, 3.0]), np.array([1, 1, 3]), np.array([1.5, 9.0, 0.0])).tolist()
     [2, 4, 3]
     """
-    tops, width, places = [np.append(values, np.inf)], 1, np.arange(values.size + 1)  # largest of so many from each on
+    tops, width, places = (
+        [np.append(values, np.inf)],
+        1,
+        np.arange(values.size + 1),
+    )  # largest of so many from each on
     while width < values.size:
-        later = (np.minimum(places + width * step, values.size) for step in range(_TOGETHER))
+        later = (
+            np.minimum(places + width * step, values.size) for step in range(_TOGETHER)
+        )
         tops.append(np.fmax.reduce([tops[-1][one] for one in later]))
         width *= _TOGETHER
     found = start
     for top in reversed(tops):
         for _ in range(_TOGETHER):
-            found = np.where(top[found] > limit, found, np.minimum(found + width, values.size))
+            found = np.where(
+                top[found] > limit, found, np.minimum(found + width, values.size)
+            )
         width //= _TOGETHER
     return found
 
@@ -307,7 +345,11 @@ def outline(time: Samples, values: Samples, stretches: int) -> Samples:
     if time.size <= 2 * stretches:
         return np.stack([time, values])
     pieces = np.array_split(np.arange(time.size), stretches)
-    kept = [piece[0] + place for piece in pieces for place in (values[piece].argmin(), values[piece].argmax())]
+    kept = [
+        piece[0] + place
+        for piece in pieces
+        for place in (values[piece].argmin(), values[piece].argmax())
+    ]
     at = np.unique([0, *kept, time.size - 1])
     return np.stack([time[at], values[at]])
 
@@ -362,7 +404,9 @@ def narrow(
         if slope is not None:
             rise = slope(at)
             newton = at - value / np.where(rise == 0, np.inf, rise)
-            inner = (newton >= np.minimum(within, beyond)) & (newton <= np.maximum(within, beyond))
+            inner = (newton >= np.minimum(within, beyond)) & (
+                newton <= np.maximum(within, beyond)
+            )
             following = np.where(inner, newton, following)
             following = np.where(still, at, following)
             still |= np.abs(following - at) <= _STILL * np.abs(at)

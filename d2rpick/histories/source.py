@@ -81,12 +81,19 @@ def open_files(names: Sequence[str]) -> list[Source]:
     files = expand(names)
     apart = _of_families(files)  # what is read of them is checked when it is
     before = {name: _state(name) for name in files if name not in apart}
-    given = {*names, *(file for name in names if not _is_pattern(name) for file in _files(name))}
+    given = {
+        *names,
+        *(file for name in names if not _is_pattern(name) for file in _files(name)),
+    }
     opened = (apart[name] if name in apart else open_source(name) for name in files)
-    sources = [source._replace(by_pattern=source.name not in given) for source in opened]
+    sources = [
+        source._replace(by_pattern=source.name not in given) for source in opened
+    ]
     for name, state in before.items():
         now = _state(name)
-        if len(files) > 1 and not (now.continues(state) if now and state else now is state):
+        if len(files) > 1 and not (
+            now.continues(state) if now and state else now is state
+        ):
             found = f"{name}: this file was replaced or written anew while the others of its run were opened"
             raise FormatError(f"{found}; read them again when they are complete")
     return sources
@@ -97,11 +104,16 @@ def _of_families(names: Sequence[str]) -> dict[str, Source]:
     family = re.compile(_FAMILY)
     found = [name for name in names if family.fullmatch(os.path.basename(name))]  # noqa: PTH119
     try:
-        sources = {name: Source(name, data) for name, data in zip(found, scattered(found), strict=True)}
+        sources = {
+            name: Source(name, data)
+            for name, data in zip(found, scattered(found), strict=True)
+        }
     except OSError as error:
         raise _unread(error.filename, error) from None
     for name, source in sources.items():
-        if not source.data and not name[-1].isdigit():  # a solver opens the next file before it writes a state
+        if (
+            not source.data and not name[-1].isdigit()
+        ):  # a solver opens the next file before it writes a state
             raise _empty(name)
     return sources
 
@@ -112,7 +124,11 @@ def _state(name: str) -> FileState | None:
         found = os.stat(name)  # noqa: PTH116  start-up
     except (OSError, ValueError):
         return None
-    return FileState.of_stat(found) if stat.S_ISREG(found.st_mode) and name != STDIN else None
+    return (
+        FileState.of_stat(found)
+        if stat.S_ISREG(found.st_mode) and name != STDIN
+        else None
+    )
 
 
 def open_source(name: str) -> Source:
@@ -148,7 +164,11 @@ def _files(name: str) -> Sequence[str]:
     if is_folder:
         return _databases(path)
     if _is_pattern(name):
-        found = sorted(str(file) for file in Path(path.anchor).glob(name.removeprefix(path.anchor)) if file.is_file())
+        found = sorted(
+            str(file)
+            for file in Path(path.anchor).glob(name.removeprefix(path.anchor))
+            if file.is_file()
+        )
         if not found:
             raise FormatError(f"{name}: no file matches; check the name and the folder")
         return found
@@ -169,16 +189,27 @@ def _behind(name: str) -> Sequence[str]:
         beside = os.listdir(folder or ".")  # noqa: PTH208  not pathlib: start-up
     except OSError:
         return []
-    numbers = {name: number for name in beside if (number := number_in_family(name, first)) is not None}
-    return [os.path.join(folder, name) for name in sorted(numbers, key=numbers.__getitem__)]  # noqa: PTH118
+    numbers = {
+        name: number
+        for name in beside
+        if (number := number_in_family(name, first)) is not None
+    }
+    in_order = sorted(numbers, key=numbers.__getitem__)
+    return [os.path.join(folder, name) for name in in_order]  # noqa: PTH118
 
 
 def _databases(folder: Path) -> list[str]:
     found = {file: run for file in sorted(folder.iterdir()) if (run := _run_of(file))}
     if not found:
         inner = any(map(_run_of, folder.glob("*/*")))
-        cure = f"its folders are runs: give one, or all to study as '{folder}/*'" if inner else "give the file"
-        raise FormatError(f"{folder}: no glstat, matsum, binout, d3plot or T01 in this folder; {cure}")
+        cure = (
+            f"its folders are runs: give one, or all to study as '{folder}/*'"
+            if inner
+            else "give the file"
+        )
+        raise FormatError(
+            f"{folder}: no glstat, matsum, binout, d3plot or T01 in this folder; {cure}"
+        )
     runs = sorted({*found.values()})
     if len(runs) > 1:
         what = f"{folder}: this folder holds several runs ({listing(runs, most=5)}), one was expected"
@@ -193,7 +224,9 @@ def _run_of(file: Path) -> str:
     for one in READERS.values():
         match = re.fullmatch(rf"{one.files}(?:\.gz)?", file.name) if one.files else None
         if match and file.is_file():
-            return f"{match['root']}T01" if match.groupdict() else f"one of {one.solver}"
+            return (
+                f"{match['root']}T01" if match.groupdict() else f"one of {one.solver}"
+            )
     return ""
 
 
@@ -203,7 +236,9 @@ def _read_stdin() -> bytes:
     try:
         return sys.stdin.buffer.read()
     except OSError as error:
-        raise FormatError(f"{STDIN}: standard input cannot be read ({error.strerror}); give a file") from None
+        raise FormatError(
+            f"{STDIN}: standard input cannot be read ({error.strerror}); give a file"
+        ) from None
 
 
 def _read_file(name: str) -> bytes | OnDisk:
@@ -215,9 +250,13 @@ def _read_file(name: str) -> bytes | OnDisk:
 
 def _unread(name: str, error: OSError | ValueError) -> FormatError:
     if isinstance(error, FileNotFoundError):
-        return FormatError(f"{name}: no such file{_meant(name)}; check the name and the folder")
+        return FormatError(
+            f"{name}: no such file{_meant(name)}; check the name and the folder"
+        )
     reason = getattr(error, "strerror", None) or error
-    return FormatError(f"{name}: cannot be read ({reason}); check the name and the permissions")
+    return FormatError(
+        f"{name}: cannot be read ({reason}); check the name and the permissions"
+    )
 
 
 def _meant(name: str) -> str:
@@ -225,7 +264,9 @@ def _meant(name: str) -> str:
     seconds = in_seconds(name)
     if seconds is not None or re.fullmatch(_NUMBER, name):
         value = "" if seconds is None else f", {seconds:g} where it is s"
-        return f", and a time is given as `td`, a number in the unit of the record{value}"
+        return (
+            f", and a time is given as `td`, a number in the unit of the record{value}"
+        )
     folder, wanted = os.path.split(name)
     try:
         beside = os.listdir(folder or ".")  # noqa: PTH208  not pathlib: start-up
@@ -245,16 +286,24 @@ def _unpacked(name: str, packed: bytes | OnDisk) -> Source:
         pieces, cut = _pieces(name, data)
         return Source(name, b"".join(pieces), cut, packed)
     except zlib.error as error:
-        raise FormatError(f"{name}: damaged gzip data ({error}); copy the file again") from None
+        raise FormatError(
+            f"{name}: damaged gzip data ({error}); copy the file again"
+        ) from None
     except MemoryError:
-        raise FormatError(f"{name}: its unpacked data do not fit into memory; unpack it with gunzip") from None
+        raise FormatError(
+            f"{name}: its unpacked data do not fit into memory; unpack it with gunzip"
+        ) from None
 
 
 def _pieces(name: str, packed: bytes, *, keep: bool = True) -> tuple[list[bytes], bool]:
     """Unpack files packed one behind the other; whether the last of them is cut."""
     import zlib
 
-    found, size, unpacker = list[bytes](), 0, zlib.decompressobj(wbits=31)  # 31: the gzip format
+    found, size, unpacker = (
+        list[bytes](),
+        0,
+        zlib.decompressobj(wbits=31),
+    )  # 31: the gzip format
     for end in range(_BLOCK, len(packed) + _BLOCK, _BLOCK):
         rest = packed[end - _BLOCK : end]
         while rest:
@@ -287,7 +336,11 @@ def later_legs(names: Sequence[str]) -> list[str]:
             beside = sorted(path.parent.iterdir())
         except OSError:
             continue
-        found += [str(one) for one in beside if _split(one.name)[0] == stem and _split(one.name)[1] > number]
+        found += [
+            str(one)
+            for one in beside
+            if _split(one.name)[0] == stem and _split(one.name)[1] > number
+        ]
     named = {str(Path(name)) for name in names}
     return [name for name in dict.fromkeys(found) if name not in named]
 

@@ -41,7 +41,9 @@ class Surroundings:
 
     def supports_of(self, parts: Iterable[Part] | None) -> tuple[Support, ...]:
         """What holds some of these parts, or the model."""
-        return tuple(one for number in _numbers(parts) for one in self.supports.get(number, ()))
+        return tuple(
+            one for number in _numbers(parts) for one in self.supports.get(number, ())
+        )
 
     def held(self, parts: Iterable[Part] | None, time: float) -> str | None:
         """Say what holds some of these parts, or the model, at a time; None where nothing does."""
@@ -52,13 +54,19 @@ class Surroundings:
                     return f"{who} is held or moved by {one.name}: it does not fly"
         return None
 
-    def free(self, parts: Iterable[Part] | None, time: float) -> tuple[float, float] | None:
+    def free(
+        self, parts: Iterable[Part] | None, time: float
+    ) -> tuple[float, float] | None:
         """Give the time around ``time`` in which nothing holds these parts, or the model; None where something does."""
         start, end = -inf, inf
         for one in self.supports_of(parts):
             if one.start <= time <= one.end:
                 return None
-            start, end = (max(start, one.end), end) if one.end < time else (start, min(end, one.start))
+            start, end = (
+                (max(start, one.end), end)
+                if one.end < time
+                else (start, min(end, one.start))
+            )
         return start, end
 
 

@@ -89,12 +89,16 @@ class Parameters:
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
             if value is not None and not (np.isfinite(value) and value >= 0):
-                raise RangeError(f"{name} is {value}, a number of at least 0 was expected")
+                raise RangeError(
+                    f"{name} is {value}, a number of at least 0 was expected"
+                )
         for name in _POSITIVE:
             if not getattr(self, name) > 0:
                 raise RangeError(f"{name} is 0, a positive number was expected")
         if self.mesh < _COARSEST:
-            raise RangeError(f"mesh is {self.mesh}, at least {_COARSEST} cells along each side were expected")
+            raise RangeError(
+                f"mesh is {self.mesh}, at least {_COARSEST} cells along each side were expected"
+            )
 
 
 class Truss(NamedTuple):
@@ -106,7 +110,13 @@ class Truss(NamedTuple):
     strength: Values
 
     @classmethod
-    def between(cls, places: Plane, ends: list[tuple[int, int]], axial: float, yield_strain: float) -> Truss:
+    def between(
+        cls,
+        places: Plane,
+        ends: list[tuple[int, int]],
+        axial: float,
+        yield_strain: float,
+    ) -> Truss:
         """Straight bars of one section, E A = ``axial`` [N], free of stress at these places."""
         pairs = np.array(ends, dtype=np.intp)
         rest = np.abs(places[pairs[:, 1]] - places[pairs[:, 0]])
@@ -150,10 +160,14 @@ def build(parameters: Parameters) -> Structure:
     both = of_box + np.arange(toes.size)
     return Structure(
         places=places,
-        masses=np.repeat([p.mass / of_box, p.step_mass / toes.size], [of_box, toes.size]),
+        masses=np.repeat(
+            [p.mass / of_box, p.step_mass / toes.size], [of_box, toes.size]
+        ),
         of_box=of_box,
         box=walls,
-        step=Truss.between(places, _step(cells, top), p.step_stiffness, p.step_yield_strain),
+        step=Truss.between(
+            places, _step(cells, top), p.step_stiffness, p.step_yield_strain
+        ),
         skin=np.concatenate([np.arange(cells), both]),
         toes=both,
     )
@@ -162,7 +176,9 @@ def build(parameters: Parameters) -> Structure:
 def _ring(mesh: int) -> Plane:
     """Points around a square of side 1 about the origin, from its lower leading corner up and around."""
     side = np.arange(mesh) / mesh - 0.5
-    return np.concatenate([0.5 + 1j * side, -side + 0.5j, -0.5 - 1j * side, side - 0.5j])
+    return np.concatenate(
+        [0.5 + 1j * side, -side + 0.5j, -0.5 - 1j * side, side - 0.5j]
+    )
 
 
 def _scaled(ring: Plane, width: float, height: float) -> Plane:
@@ -183,7 +199,14 @@ def _step(cells: int, top: int) -> list[tuple[int, int]]:
     """Bars of the step: between its two points, from both to the ends of the skin beside it and to what is behind."""
     low, high = 2 * cells, 2 * cells + 1
     to_skin = [(toe, skin) for toe in (low, high) for skin in (0, top)]
-    return [(low, high), *to_skin, (low, 1), (high, top - 1), (low, cells), (high, cells + top)]
+    return [
+        (low, high),
+        *to_skin,
+        (low, 1),
+        (high, top - 1),
+        (low, cells),
+        (high, cells + top),
+    ]
 
 
 class Bars:
@@ -218,7 +241,11 @@ class Bars:
             self.plastic_work += float(held @ flow)
         along *= held / length
         self.evaluations += length.size
-        return (self._pulls @ along.view(np.float64).reshape(-1, 2)).view(np.complex128).ravel()
+        return (
+            (self._pulls @ along.view(np.float64).reshape(-1, 2))
+            .view(np.complex128)
+            .ravel()
+        )
 
     def elastic_energy(self, places: Plane, rest: Values | None = None) -> Values:
         """Energy that the bars give back when they are released, of the shape (...) for places (..., n) [J].
@@ -230,9 +257,16 @@ class Bars:
         )
         return np.asarray(elongation**2 @ self._stiffness) / 2
 
-    def internal_energy(self, places: Plane, rest: Values | None = None, plastic_work: Values | None = None) -> Values:
+    def internal_energy(
+        self,
+        places: Plane,
+        rest: Values | None = None,
+        plastic_work: Values | None = None,
+    ) -> Values:
         """Elastic energy and plastic work, as solvers report them, of now or of then (...) [J]."""
-        return self.elastic_energy(places, rest) + (self.plastic_work if plastic_work is None else plastic_work)
+        return self.elastic_energy(places, rest) + (
+            self.plastic_work if plastic_work is None else plastic_work
+        )
 
 
 def stiffest_rate(masses: Values, *trusses: Truss, extra: Values) -> float:

@@ -14,7 +14,17 @@ from typing import NamedTuple
 import numpy as np
 
 from d2rpick.base.errors import RangeError
-from d2rpick.models.box_model import GRAVITY, Bars, Ends, Parameters, Plane, Structure, Values, build, stiffest_rate
+from d2rpick.models.box_model import (
+    GRAVITY,
+    Bars,
+    Ends,
+    Parameters,
+    Plane,
+    Structure,
+    Values,
+    build,
+    stiffest_rate,
+)
 
 # Of floor and curb at one point [N/m]: softer than the box, so that contact does not set the time step; the weight of
 # the box sinks in by half a millimetre.
@@ -87,7 +97,11 @@ class Contact:
         self._into_sled = complex(np.exp(1j * np.radians(parameters.tilt)))
         self._crushed = np.zeros(self._toes.size)
         self._sleeps_until = 0.0
-        self._fastest = FASTEST * parameters.speed + FALL + 2 * np.sqrt(2 * GRAVITY * (parameters.drop or 0.0))
+        self._fastest = (
+            FASTEST * parameters.speed
+            + FALL
+            + 2 * np.sqrt(2 * GRAVITY * (parameters.drop or 0.0))
+        )
         self.released: float | None = None
         self.landings: list[tuple[float, float]] = []
 
@@ -100,11 +114,18 @@ class Contact:
         if gap > 0:
             self._sleeps_until = time + gap / self._fastest
             return None
-        push = Push(self._sled(time, on_sled, velocities), self._on_all(self._ground(places, velocities), self._skin))
+        push = Push(
+            self._sled(time, on_sled, velocities),
+            self._on_all(self._ground(places, velocities), self._skin),
+        )
         if push.sled.normal.any() and not self.landings:
             self.released = time
         if push.ground.normal.any():
-            last = self.landings.pop() if self.landings and time - self.landings[-1][1] < SAME_CONTACT else (time, time)
+            last = (
+                self.landings.pop()
+                if self.landings and time - self.landings[-1][1] < SAME_CONTACT
+                else (time, time)
+            )
             self.landings.append((last[0], time))
         return push
 
@@ -113,10 +134,16 @@ class Contact:
         if self._p.drop is not None:
             return Face(nothing, nothing)
         sliding = (velocities - self.sled.velocity(time)) * self._into_sled
-        floor = self._on_all(self._floor(on_sled[self._skin], sliding[self._skin]), self._skin)
-        curb = self._on_all(self._curb(on_sled[self._toes], sliding[self._toes]), self._toes)
+        floor = self._on_all(
+            self._floor(on_sled[self._skin], sliding[self._skin]), self._skin
+        )
+        curb = self._on_all(
+            self._curb(on_sled[self._toes], sliding[self._toes]), self._toes
+        )
         back = self._into_sled.conjugate()
-        return Face((floor.normal + curb.normal) * back, (floor.friction + curb.friction) * back)
+        return Face(
+            (floor.normal + curb.normal) * back, (floor.friction + curb.friction) * back
+        )
 
     def _on_all(self, face: Face, points: Ends) -> Face:
         """Forces on some points as forces on all."""
@@ -141,15 +168,21 @@ class Contact:
 
     def _ground(self, places: Plane, sliding: Plane) -> Face:
         depth = np.maximum(-self._p.ground - places[self._skin].imag, 0.0)
-        return self._with_friction(self._p.ground_stiffness * depth, sliding[self._skin].real)
+        return self._with_friction(
+            self._p.ground_stiffness * depth, sliding[self._skin].real
+        )
 
     def _curb(self, places: Plane, sliding: Plane) -> Face:
         """Push back, along -x, with friction along z: a floor that is turned by a quarter."""
-        before = (places.imag < self._p.curb) & (places.real < self._p.cushion_depth + DEEPEST)
+        before = (places.imag < self._p.curb) & (
+            places.real < self._p.cushion_depth + DEEPEST
+        )
         depth = np.where(before, np.maximum(places.real, 0.0), 0.0)
         trial = STIFFNESS * np.maximum(depth - self._crushed, 0.0)
         yields = np.minimum(trial, self._p.cushion)
-        self._crushed = np.minimum(self._crushed + (trial - yields) / STIFFNESS, self._p.cushion_depth)
+        self._crushed = np.minimum(
+            self._crushed + (trial - yields) / STIFFNESS, self._p.cushion_depth
+        )
         held = STIFFNESS * np.maximum(depth - self._crushed, 0.0)
         face = self._with_friction(held, sliding.imag)
         return Face(np.asarray(1j * face.normal), np.asarray(1j * face.friction))
@@ -189,7 +222,9 @@ class RigidBody:
         """Change the motion by forces on the points (n,) [N] and damping [1/s] during a step [s]."""
         half = damping * dt / 2
         moment = float(np.vdot(self.arms, forces).imag)
-        self.velocity = ((1 - half) * self.velocity + dt * complex(forces.sum()) / self._mass) / (1 + half)
+        self.velocity = (
+            (1 - half) * self.velocity + dt * complex(forces.sum()) / self._mass
+        ) / (1 + half)
         self.spin = ((1 - half) * self.spin + dt * moment / self._inertia) / (1 + half)
 
     def move(self, dt: float) -> None:
@@ -242,7 +277,9 @@ class Motion:
         self.every = int(np.ceil(interval / (_SAFETY * limit)))
         self.dt = interval / self.every
         self.damping = parameters.damping
-        self._weight: Plane = np.asarray(s.masses * (-1j * GRAVITY), dtype=np.complex128)
+        self._weight: Plane = np.asarray(
+            s.masses * (-1j * GRAVITY), dtype=np.complex128
+        )
         self._mobility = self.dt / s.masses
         self.places = s.places.copy()
         self.velocities: Plane = np.full(s.places.size, complex(parameters.speed))
@@ -267,13 +304,19 @@ class Motion:
 
     def make_rigid(self) -> None:
         """Switch the box to a rigid body: its momenta stay, its vibration stops, its deformation is frozen."""
-        self.box.forces(self.places)  # for the last time: where it yields now, it does so before it is frozen
+        self.box.forces(
+            self.places
+        )  # for the last time: where it yields now, it does so before it is frozen
         of_box = slice(self.structure.of_box)
         masses, before = self.structure.masses[of_box], self.velocities[of_box]
         self.body = RigidBody(masses, self.places[of_box], before)
         after = self.body.velocities
-        self.accounts.lost += float(masses @ (np.abs(before) ** 2 - np.abs(after) ** 2)) / 2
-        self.velocities = np.concatenate([after, self.velocities[self.structure.of_box :]])
+        self.accounts.lost += (
+            float(masses @ (np.abs(before) ** 2 - np.abs(after) ** 2)) / 2
+        )
+        self.velocities = np.concatenate(
+            [after, self.velocities[self.structure.of_box :]]
+        )
 
     def make_deformable(self) -> None:
         """Switch back: the points go on with the motion of the body, the bars with the elongations they had."""
@@ -319,7 +362,14 @@ class Motion:
         if push:
             speed = self.contact.sled.velocity(self.time)
             by_sled = float(push.sled.whole.real.sum()) * speed
-            against = float((np.vdot(push.sled.friction, mean - speed) + np.vdot(push.ground.friction, mean)).real)
+            against = float(
+                (
+                    np.vdot(push.sled.friction, mean - speed)
+                    + np.vdot(push.ground.friction, mean)
+                ).real
+            )
             accounts.external_work += dt * by_sled
             accounts.friction -= dt * against
-            accounts.walls += dt * (by_sled - float(np.vdot(push.forces, mean).real) + against)
+            accounts.walls += dt * (
+                by_sled - float(np.vdot(push.forces, mean).real) + against
+            )

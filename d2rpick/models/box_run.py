@@ -73,26 +73,42 @@ class Record(NamedTuple):
     def total_energy(self) -> Values:
         """What energy is there or was spent, as a solver sums it up: without what was lost at tr (n,) [J]."""
         there = self.internal_energy.sum(axis=1) + self.kinetic_energy.sum(axis=1)
-        return np.asarray(there + self.friction_energy + self.wall_energy + self.damping_energy)
+        return np.asarray(
+            there + self.friction_energy + self.wall_energy + self.damping_energy
+        )
 
     @property
     def energy_ratio(self) -> Values:
         """Total energy over that of the start and the work done; 1 where both are 0 (n,) [-]."""
         reference = self.total_energy[0] + self.external_work - self.external_work[0]
-        return np.asarray(np.divide(self.total_energy, reference, out=1 + 0 * reference, where=reference != 0))
+        return np.asarray(
+            np.divide(
+                self.total_energy,
+                reference,
+                out=1 + 0 * reference,
+                where=reference != 0,
+            )
+        )
 
     @property
     def imbalance(self) -> Values:
         """Energy that came from nowhere, over the largest total energy (n,) [-]."""
         total = self.total_energy + self.lost_energy
-        return np.asarray((total - total[0] - self.external_work + self.external_work[0]) / np.abs(total).max())
+        return np.asarray(
+            (total - total[0] - self.external_work + self.external_work[0])
+            / np.abs(total).max()
+        )
 
 
 class Recorder:
     """Collects states of a ``motion`` up to its step ``last``."""
 
     def __init__(self, motion: Motion, last: int) -> None:
-        self._motion, self._began, self._updates = motion, perf_counter(), _updates(motion)
+        self._motion, self._began, self._updates = (
+            motion,
+            perf_counter(),
+            _updates(motion),
+        )
         s = motion.structure
         states = last // motion.every - -(-motion.count // motion.every) + 1
         self._reals = np.zeros((states, _REALS))
@@ -102,8 +118,12 @@ class Recorder:
         self._box_masses = s.masses[: s.of_box]
         self._box_mass = float(self._box_masses.sum())
         self._start = self._box_masses * self._arms(s.places)
-        self._places, self._means = np.zeros((2, _BLOCK, s.places.size), dtype=np.complex128)
-        self._rests = [np.zeros((_BLOCK, bars.rest.size)) for bars in (motion.box, motion.step)]
+        self._places, self._means = np.zeros(
+            (2, _BLOCK, s.places.size), dtype=np.complex128
+        )
+        self._rests = [
+            np.zeros((_BLOCK, bars.rest.size)) for bars in (motion.box, motion.step)
+        ]
 
     def note(self, mean: Plane) -> None:
         """Note the state of the motion, with the velocities ``mean`` (n,) [m/s] over the step around it."""
@@ -130,11 +150,17 @@ class Recorder:
         reals = self._reals[states].T
         reals[1] = np.angle(np.conj(arms) @ self._start)
         reals[2] = -spin / (np.abs(arms) ** 2 @ self._box_masses)
-        for place, (bars, rest) in enumerate(zip((self._motion.box, self._motion.step), self._rests, strict=True)):
-            reals[3 + place] = bars.internal_energy(places, rest[:count], reals[3 + place])
+        for place, (bars, rest) in enumerate(
+            zip((self._motion.box, self._motion.step), self._rests, strict=True)
+        ):
+            reals[3 + place] = bars.internal_energy(
+                places, rest[:count], reals[3 + place]
+            )
         reals[5], reals[6] = kinetic[:, :n].sum(axis=1), kinetic[:, n:].sum(axis=1)
         centre = places[:, 0] - arms[:, 0]
-        self._planes[states] = np.stack([centre, of_box / self._box_mass, of_box, of_step], axis=1)
+        self._planes[states] = np.stack(
+            [centre, of_box / self._box_mass, of_box, of_step], axis=1
+        )
         self._outline[states] = places[:, : n // 2]
 
     def record(self) -> Record:
@@ -146,7 +172,13 @@ class Recorder:
             raise RangeError(
                 "the motion of the box becomes infinite: these parameters are beyond what the model can do"
             )
-        exchanged = ("external_work", "friction_energy", "wall_energy", "damping_energy", "lost_energy")
+        exchanged = (
+            "external_work",
+            "friction_energy",
+            "wall_energy",
+            "damping_energy",
+            "lost_energy",
+        )
         return Record(
             time=real[0],
             centre=plane[0],
@@ -169,7 +201,9 @@ class Recorder:
     def _arms(self, places: Plane) -> Plane:
         """From the centre of mass of the box to its points, of the shape (..., points of the box) [m]."""
         of_box = places[..., : self._box_masses.size]
-        return np.asarray(of_box - (of_box @ self._box_masses / self._box_mass)[..., np.newaxis])
+        return np.asarray(
+            of_box - (of_box @ self._box_masses / self._box_mass)[..., np.newaxis]
+        )
 
 
 def _updates(motion: Motion) -> int:
@@ -191,10 +225,17 @@ class RigidWindow:
 
     def __post_init__(self) -> None:
         if not 0 <= self.tr <= self.td:
-            raise RangeError(f"tr {self.tr:g} and td {self.td:g} must be in this order after the start at 0")
+            raise RangeError(
+                f"tr {self.tr:g} and td {self.td:g} must be in this order after the start at 0"
+            )
 
 
-def simulate(parameters: Parameters, t_end: float, *windows: RigidWindow, interval: float = INTERVAL) -> Record:
+def simulate(
+    parameters: Parameters,
+    t_end: float,
+    *windows: RigidWindow,
+    interval: float = INTERVAL,
+) -> Record:
     """Compute a run from 0 to ``t_end``, with a state every ``interval`` [s].
 
     RangeError when it takes too many steps, or when ``windows`` overlap or are not in order.
@@ -206,13 +247,19 @@ def simulate(parameters: Parameters, t_end: float, *windows: RigidWindow, interv
     >>> run.time.size, bool(abs(run.imbalance).max() < 0.01)
     (101, True)
     """
-    with np.errstate(over="ignore"):  # the number of steps tells whether it can be computed
+    with np.errstate(
+        over="ignore"
+    ):  # the number of steps tells whether it can be computed
         motion = Motion(parameters, interval)
     if motion.step_at(t_end) > MOST_STEPS:
-        raise RangeError(f"steps of {motion.dt:.3g} s make more than {MOST_STEPS} until {t_end:g}; choose softer bars")
+        raise RangeError(
+            f"steps of {motion.dt:.3g} s make more than {MOST_STEPS} until {t_end:g}; choose softer bars"
+        )
     for one, following in pairwise(windows):
         if not one.td < following.tr:
-            raise RangeError(f"the window from tr {following.tr:g} begins before the one up to td {one.td:g} is over")
+            raise RangeError(
+                f"the window from tr {following.tr:g} begins before the one up to td {one.td:g} is over"
+            )
     return proceed(motion, t_end, *windows)
 
 
@@ -222,8 +269,13 @@ def proceed(motion: Motion, t_end: float, *windows: RigidWindow) -> Record:
     RangeError when its numbers become infinite.
     """
     last = motion.every * (motion.step_at(t_end) // motion.every)
-    rigid, deformable = {motion.step_at(one.tr) for one in windows}, {motion.step_at(one.td) for one in windows}
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # the record tells whether it went well
+    rigid, deformable = (
+        {motion.step_at(one.tr) for one in windows},
+        {motion.step_at(one.td) for one in windows},
+    )
+    with np.errstate(
+        over="ignore", invalid="ignore", divide="ignore"
+    ):  # the record tells whether it went well
         recorder = Recorder(motion, last)
         while True:
             if motion.count in rigid:
@@ -248,7 +300,9 @@ def run_to(motion: Motion, time: float) -> None:
 def history_of(record: Record) -> History:
     """Give the energy of the box, with the momenta of both parts."""
     parts = tuple(Part(number, title) for number, title in enumerate(PARTS, start=1))
-    momentum = np.stack([record.momentum.real, 0 * record.momentum.real, record.momentum.imag], axis=2)
+    momentum = np.stack(
+        [record.momentum.real, 0 * record.momentum.real, record.momentum.imag], axis=2
+    )
     return History(
         time=record.time,
         energy=record.internal_energy[:, BOX],
@@ -292,8 +346,13 @@ def scan_times(released: float, td: float) -> list[float]:
     """
     dense = min(1.5 * released, td - _LAST)
     if not dense > _FINE:
-        raise RangeError(f"td {td:g} leaves no time for tr; the earliest possible td is {_FINE + _LAST:g}")
-    return [*np.arange(_FINE, dense, _FINE).tolist(), *np.arange(dense, td - _LAST, _COARSE).tolist()]
+        raise RangeError(
+            f"td {td:g} leaves no time for tr; the earliest possible td is {_FINE + _LAST:g}"
+        )
+    return [
+        *np.arange(_FINE, dense, _FINE).tolist(),
+        *np.arange(dense, td - _LAST, _COARSE).tolist(),
+    ]
 
 
 def comparison_end(reference: Record, td: float) -> float:
@@ -305,7 +364,11 @@ def comparison_end(reference: Record, td: float) -> float:
 
 
 def scan(
-    parameters: Parameters, reference: Record, times: Sequence[float], td: float, jobs: int | None = None
+    parameters: Parameters,
+    reference: Record,
+    times: Sequence[float],
+    td: float,
+    jobs: int | None = None,
 ) -> Iterator[Outcome]:
     """Compute a switched run for each of ``times``; give outcomes in the order of tr as they are ready.
 
@@ -317,7 +380,10 @@ def scan(
     ordered = sorted(times)
     following = 0
     with on_cores(jobs or cores(), "d2rpick.models.box_run") as farm:
-        for answer in farm.answers(_switched, _branches(Motion(parameters, _interval(reference)), ordered, td, end)):
+        for answer in farm.answers(
+            _switched,
+            _branches(Motion(parameters, _interval(reference)), ordered, td, end),
+        ):
             if answer.error:
                 raise answer.error
             ready[answer.number] = answer.result
@@ -347,7 +413,10 @@ def compare(reference: Record, switched: Record, tr: float, td: float) -> Outcom
     here, there = slice(at, end), slice(at - begin, end - begin)
     energy = float(np.interp(tr, reference.time, reference.internal_energy[:, BOX]))
     way = complex(switched.centre[at - begin] - reference.centre[at])
-    means = [float(run.internal_energy[part, BOX].mean()) for run, part in ((switched, there), (reference, here))]
+    means = [
+        float(run.internal_energy[part, BOX].mean())
+        for run, part in ((switched, there), (reference, here))
+    ]
     return Outcome(
         tr=tr,
         energy=energy,

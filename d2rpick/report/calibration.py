@@ -50,7 +50,12 @@ def as_table(found: Calibration, shown: Shown) -> str:
 
 def as_markdown(found: Calibration, _: Shown) -> str:
     """The weights and the legs as Markdown tables."""
-    return "\n\n".join([tables.as_markdown(HEAD, _rows(found)), tables.as_markdown(LEG_HEAD, _legs(found))])
+    return "\n\n".join(
+        [
+            tables.as_markdown(HEAD, _rows(found)),
+            tables.as_markdown(LEG_HEAD, _legs(found)),
+        ]
+    )
 
 
 def as_csv(found: Calibration, _: Shown) -> str:
@@ -65,12 +70,20 @@ def as_toml(found: Calibration, _: Shown) -> str:
 
 def plain_rows(found: Calibration) -> list[list[tables.Cell]]:
     """Cells of a row per formulation at full precision, below ``COLUMNS``."""
-    return [[name, weight, MEASURED[name], name in found.told] for name, weight in found.weights.per_element.items()]
+    return [
+        [name, weight, MEASURED[name], name in found.told]
+        for name, weight in found.weights.per_element.items()
+    ]
 
 
 def _rows(found: Calibration) -> list[list[tables.Cell]]:
     return [
-        [name, f"{weight:.3g}", f"{MEASURED[name]:.3g}", "these legs" if name in found.told else "ratio as measured"]
+        [
+            name,
+            f"{weight:.3g}",
+            f"{MEASURED[name]:.3g}",
+            "these legs" if name in found.told else "ratio as measured",
+        ]
         for name, weight in found.weights.per_element.items()
     ]
 

@@ -61,15 +61,39 @@ def legs(found: Driven) -> tuple[list[str], list[list[tables.Cell]]]:
     rows: list[list[tables.Cell]] = []
     for kind in dict.fromkeys(one.kind for one in found.legs):
         own = [one for one in found.legs if one.kind == kind]
-        cpu = None if any(one.cpu is None for one in own) else f"{sum(one.cpu or 0.0 for one in own):.4g}"
-        rows.append([kind, len(own), f"{sum(one.length for one in own):.4g}", sum(one.cycles or 0 for one in own), cpu])
+        cpu = (
+            None
+            if any(one.cpu is None for one in own)
+            else f"{sum(one.cpu or 0.0 for one in own):.4g}"
+        )
+        rows.append(
+            [
+                kind,
+                len(own),
+                f"{sum(one.length for one in own):.4g}",
+                sum(one.cycles or 0 for one in own),
+                cpu,
+            ]
+        )
     return ["kind", "legs", "time", "cycles", "CPU s"], rows
 
 
 def outlook(found: Driven) -> list[tuple[str, str]]:
     """What was saved, and what to know of it; a name and a sentence each."""
-    words = zip(found.saved, ("by the cost model", "by the processor time of its legs"), strict=True)
+    words = zip(
+        found.saved,
+        ("by the cost model", "by the processor time of its legs"),
+        strict=True,
+    )
     saved = [f"{value:.0%} {by}" for value, by in words if value is not None]
-    lines = [("saves", f"{', '.join(saved)}, against a deformable run")] if saved else []
-    lines += [("place", one.message) for one in found.cautions if one.code == "out-of-place"]
-    return [*lines, *([("wait", found.why)] if found.why else []), ("keeps", _NOT_KNOWN)]
+    lines = (
+        [("saves", f"{', '.join(saved)}, against a deformable run")] if saved else []
+    )
+    lines += [
+        ("place", one.message) for one in found.cautions if one.code == "out-of-place"
+    ]
+    return [
+        *lines,
+        *([("wait", found.why)] if found.why else []),
+        ("keeps", _NOT_KNOWN),
+    ]

@@ -44,7 +44,9 @@ def styles() -> tuple[Markup, ...]:
 def scripts() -> tuple[Markup, ...]:
     """Give the scripts, in their order; that of uPlot with its licence."""
     licence = join([Markup("/*!\n"), resource("uplot/LICENSE"), Markup("*/\n")])
-    return Markup(licence + resource("uplot/uPlot.iife.min.js")), resource("explorer.js")
+    return Markup(licence + resource("uplot/uPlot.iife.min.js")), resource(
+        "explorer.js"
+    )
 
 
 def explorer(explored: Explorer | None) -> Markup:
@@ -55,17 +57,33 @@ def explorer(explored: Explorer | None) -> Markup:
     if explored is None:
         return Markup()
     flights = [_flight(one) for one in explored.trade_offs]
-    known = {name for flight in flights for name in flight["texts"]}  # what no pair has is left out
-    listed = (tag("div", tag("dt", name), tag("dd", data_value=key)) for key, name in _VALUES.items() if key in known)
+    known = {
+        name for flight in flights for name in flight["texts"]
+    }  # what no pair has is left out
+    listed = (
+        tag("div", tag("dt", name), tag("dd", data_value=key))
+        for key, name in _VALUES.items()
+        if key in known
+    )
     section, motion, values = _closed_up(resource("explorer.html")).split(_NEXT)
     values = Template(values).substitute(listed=join(listed))
-    below = (motion, values) if any(flight["motion"] for flight in flights) else (values, "")
-    options = (tag("option", f"flight {i + 1}", value=str(i)) for i in range(len(flights)))
+    below = (
+        (motion, values)
+        if any(flight["motion"] for flight in flights)
+        else (values, "")
+    )
+    options = (
+        tag("option", f"flight {i + 1}", value=str(i)) for i in range(len(flights))
+    )
     unit = explored.trade_offs[0].situation.history.time_unit
     section = Template(section).substitute(
-        chooser=tag("label", "flight", tag("select", *options, id="explorer-flight")) if len(flights) > 1 else "",
+        chooser=tag("label", "flight", tag("select", *options, id="explorer-flight"))
+        if len(flights) > 1
+        else "",
         unit=join([f" [{unit}]"] if unit else []),
-        windows=tag("li", tag("i", class_="windows"), "acceptable tr") if "windows" in known else "",
+        windows=tag("li", tag("i", class_="windows"), "acceptable tr")
+        if "windows" in known
+        else "",
         below_energy=below[0],
         below_trade=below[1],
     )
@@ -99,7 +117,11 @@ def _flight(found: TradeOff) -> dict[str, Any]:
     inner = history.between(seen.start, seen.end)
     time, energy = outline(*inner, stretches=_STRETCHES)
     unit = history.time_unit
-    above = [f"the {what}, up to {energy:.4g}" for what, energy in seen.above if energy > scale.high]
+    above = [
+        f"the {what}, up to {energy:.4g}"
+        for what, energy in seen.above
+        if energy > scale.high
+    ]
     cut = f"; cut at the top: {' and '.join(above)}" if above else ""
     return {
         "caption": f"Internal energy in the flight{cut}",
@@ -113,7 +135,10 @@ def _flight(found: TradeOff) -> dict[str, Any]:
         ],
         "heights": [scale.low, scale.high],
         "log": scale.logarithmic,
-        "energy": [_brief(time), _brief(np.maximum(energy, scale.low) if scale.logarithmic else energy)],
+        "energy": [
+            _brief(time),
+            _brief(np.maximum(energy, scale.low) if scale.logarithmic else energy),
+        ],
         "whole": [_brief(column) for column in whole],
         "motion": _motion(situation),
         "start": found.offers.index(first),
@@ -126,8 +151,15 @@ def _motion(situation: Situation) -> dict[str, Any] | None:
     found = response(situation)
     if found is None:
         return None
-    columns = {"time": found.time, "reference": found.reference, "release": found.release}
-    return {**{name: _brief(column) for name, column in columns.items()}, "preload": found.preload}
+    columns = {
+        "time": found.time,
+        "reference": found.reference,
+        "release": found.release,
+    }
+    return {
+        **{name: _brief(column) for name, column in columns.items()},
+        "preload": found.preload,
+    }
 
 
 def _brief(values: Samples) -> list[float]:
@@ -167,7 +199,9 @@ def _table(found: TradeOff, first: Offer, seen: View) -> dict[str, Any]:
         "tr": lambda one: _short(one.tr),
         "level": lambda one: _short(one.energy_td),
         "locked": lambda one: _short(one.best.energy if one.best else None),
-        "deformation": lambda one: _short(locked_in(situation, one.tr) if one.basis == "oscillator" else None),
+        "deformation": lambda one: _short(
+            locked_in(situation, one.tr) if one.basis == "oscillator" else None
+        ),
         "saved": lambda one: _short(_saved(one)),
         "error": lambda one: _short(one.error),
         "windows": lambda one: _marked_columns(one.answer.windows or (), seen),
@@ -176,14 +210,23 @@ def _table(found: TradeOff, first: Offer, seen: View) -> dict[str, Any]:
     }
     names, numbers = filled(columns, found.offers)
     texts = [_texts(one, first, f" {unit}" if unit else "") for one in found.offers]
-    said = list(dict.fromkeys(name for row in texts for name, text in row.items() if text))
-    rows = [[values, [row.get(name) or "" for name in said]] for values, row in zip(numbers, texts, strict=True)]
+    said = list(
+        dict.fromkeys(name for row in texts for name, text in row.items() if text)
+    )
+    rows = [
+        [values, [row.get(name) or "" for name in said]]
+        for values, row in zip(numbers, texts, strict=True)
+    ]
     return {"numbers": names, "texts": said, "rows": rows}
 
 
 def _saved(offer: Offer) -> float | None:
     """What a pair saves [%]: of the run time, or of the record where no cost is known."""
-    share = offer.best.rigid_fraction if offer.best and offer.saving is None else offer.saving
+    share = (
+        offer.best.rigid_fraction
+        if offer.best and offer.saving is None
+        else offer.saving
+    )
     return None if share is None else 100 * share
 
 
@@ -193,7 +236,13 @@ def _marked_columns(windows: Sequence[AcceptableWindow], view: View) -> str:
     However many windows noise makes, this is short, and finer than a screen shows.
     """
     ends = np.array([(one.start, one.end) for one in windows]).reshape(-1, 2)
-    first, last = np.clip((ends - view.start) / (view.end - view.start) * _COLUMNS, 0, _COLUMNS - 1).astype(int).T
+    first, last = (
+        np.clip(
+            (ends - view.start) / (view.end - view.start) * _COLUMNS, 0, _COLUMNS - 1
+        )
+        .astype(int)
+        .T
+    )
     marked = np.zeros(_COLUMNS, dtype=bool)
     for low, high in zip(first.tolist(), last.tolist(), strict=True):
         marked[low : high + 1] = True
@@ -207,7 +256,11 @@ def _short(value: float | None) -> float | None:
 
 def _error_name(offers: Sequence[Offer]) -> str:
     """Name what offers are compared by."""
-    return "shortfall of the level at td" if all(one.basis == "energy" for one in offers) else "residual"
+    return (
+        "shortfall of the level at td"
+        if all(one.basis == "energy" for one in offers)
+        else "residual"
+    )
 
 
 def _saved_name(offers: Sequence[Offer]) -> str:
@@ -239,11 +292,19 @@ def _of_best(offer: Offer, best: Candidate, unit: str) -> dict[str, str | None]:
     kept, windows = offer.answer.kept, offer.answer.windows
     return {
         "residual": shown(best.residual, ".3f"),
-        "after": None if kept is None else f"{mean_energy(kept)} of what the reference has",
-        "level_error": shown(best.level_error if best.residual is None else None, ".3f"),
+        "after": None
+        if kept is None
+        else f"{mean_energy(kept)} of what the reference has",
+        "level_error": shown(
+            best.level_error if best.residual is None else None, ".3f"
+        ),
         "rigid": f"for {short(best.rigid_time)}{unit}, {best.rigid_fraction:.1%} of the record",
-        "run_time": None if best.run_time_share is None else f"about {best.run_time_share:.0%} of the reference's",
-        "tolerance": None if best.timing_tolerance is None else f"{best.timing_tolerance:.1e}{unit}",
+        "run_time": None
+        if best.run_time_share is None
+        else f"about {best.run_time_share:.0%} of the reference's",
+        "tolerance": None
+        if best.timing_tolerance is None
+        else f"{best.timing_tolerance:.1e}{unit}",
         "windows": acceptable(windows, best.tr) if windows else None,
     }
 
@@ -263,7 +324,9 @@ def _compared(offer: Offer, start: Offer, unit: str) -> str:
     if offer is start:
         return ""
     apart = offer.td - start.td
-    said = [f"{abs(apart):.{_READ}g}{unit} {'later' if apart > 0 else 'earlier'} than {short(start.td)}{unit}"]
+    said = [
+        f"{abs(apart):.{_READ}g}{unit} {'later' if apart > 0 else 'earlier'} than {short(start.td)}{unit}"
+    ]
     if offer.best and start.best:
         longer = offer.best.rigid_time - start.best.rigid_time
         share = offer.best.rigid_fraction - start.best.rigid_fraction
@@ -271,7 +334,15 @@ def _compared(offer: Offer, start: Offer, unit: str) -> str:
             f"rigid for {abs(longer):.{_READ}g}{unit} {'longer' if longer > 0 else 'less'} ({share:+.1%} of the record)"
         )
     if offer.saving is not None and start.saving is not None:
-        said.append(f"saves {offer.saving:.1%} of the run time instead of {start.saving:.1%}")
-    if offer.error is not None and start.error is not None and (offer.basis == "energy") == (start.basis == "energy"):
-        said.append(f"{_error_name([offer])} {measure(offer.error)} instead of {measure(start.error)}")
+        said.append(
+            f"saves {offer.saving:.1%} of the run time instead of {start.saving:.1%}"
+        )
+    if (
+        offer.error is not None
+        and start.error is not None
+        and (offer.basis == "energy") == (start.basis == "energy")
+    ):
+        said.append(
+            f"{_error_name([offer])} {measure(offer.error)} instead of {measure(start.error)}"
+        )
     return ", ".join(said)

@@ -31,7 +31,9 @@ class Kind(NamedTuple):
         """Names of the fields: columns of a csv or a frame."""
         return [field.key for field in self.fields]
 
-    def of_part(self, part: Callable[[Any], Any], keys: Iterable[str] = ()) -> list[Field]:
+    def of_part(
+        self, part: Callable[[Any], Any], keys: Iterable[str] = ()
+    ) -> list[Field]:
         """Take the fields with these ``keys``, or all, into the row of things with such a ``part``."""
         return [_in_part(self.field(key), part) for key in (keys or self.keys)]
 
@@ -67,14 +69,24 @@ class Field(NamedTuple):
         """Give the value as the thing has it."""
         if self.get:
             return self.get(thing)
-        return thing[self.key] if isinstance(thing, Mapping) else getattr(thing, self.key)
+        return (
+            thing[self.key] if isinstance(thing, Mapping) else getattr(thing, self.key)
+        )
 
 
 def _in_part(field: Field, part: Callable[[Any], Any]) -> Field:
-    return field._replace(get=lambda thing: None if (found := part(thing)) is None else field.taken(found))
+    return field._replace(
+        get=lambda thing: None if (found := part(thing)) is None else field.taken(found)
+    )
 
 
-def row(*fields: Field, name: str = "", later: Iterable[str] = (), closed: bool = False, **more: Any) -> Kind:
+def row(
+    *fields: Field,
+    name: str = "",
+    later: Iterable[str] = (),
+    closed: bool = False,
+    **more: Any,
+) -> Kind:
     """Make a row; keys that came ``later`` than its schema may be missing from results, a ``closed`` one has no others.
 
     ``more`` goes into its schema as it is.
@@ -88,18 +100,27 @@ def row(*fields: Field, name: str = "", later: Iterable[str] = (), closed: bool 
     """
     schema = {
         "type": "object",
-        "required": [field.key for field in fields if not field.later and field.key not in later],
+        "required": [
+            field.key for field in fields if not field.later and field.key not in later
+        ],
         "properties": {field.key: field for field in fields},
         **({"additionalProperties": False} if closed else {}),
         **more,
     }
-    return Kind(schema, lambda thing: {field.key: field.of(thing) for field in fields}, name, fields)
+    return Kind(
+        schema,
+        lambda thing: {field.key: field.of(thing) for field in fields},
+        name,
+        fields,
+    )
 
 
 def kind_of(kind: Kind | Name, **limits: Any) -> Kind:
     """Give a kind by its name, within limits in the words of JSON schema: ``minimum=0``."""
     known = _KINDS[kind] if isinstance(kind, str) else kind
-    return Kind({**known.schema, **limits}, known.plain, known.name) if limits else known
+    return (
+        Kind({**known.schema, **limits}, known.plain, known.name) if limits else known
+    )
 
 
 def maybe(kind: Kind | Name) -> Kind:
@@ -108,14 +129,25 @@ def maybe(kind: Kind | Name) -> Kind:
     known = kind.schema
     if None in known.get("enum", ()) or "null" in known.get("type", ()):
         return kind
-    null = {"enum": [*known["enum"], None]} if "enum" in known else {"type": [known["type"], "null"]}
-    return Kind({**known, **null}, lambda value: None if value is None else kind.plain(value), kind.name)
+    null = (
+        {"enum": [*known["enum"], None]}
+        if "enum" in known
+        else {"type": [known["type"], "null"]}
+    )
+    return Kind(
+        {**known, **null},
+        lambda value: None if value is None else kind.plain(value),
+        kind.name,
+    )
 
 
 def many(kind: Kind | Name) -> Kind:
     """Give the kind of an array."""
     one = kind_of(kind)
-    return Kind({"type": "array", "items": one}, lambda values: [one.plain(value) for value in values])
+    return Kind(
+        {"type": "array", "items": one},
+        lambda values: [one.plain(value) for value in values],
+    )
 
 
 def each(kind: Name) -> Kind:
@@ -137,7 +169,9 @@ _KNOWN: Final = {
     "text": _TEXT,
     "texts": Kind({"type": "array", "items": _TEXT}, list),
     "flag": Kind({"type": "boolean"}),
-    "span": Kind({"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": 2}, list),
+    "span": Kind(
+        {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": 2}, list
+    ),
 }
 _KINDS: Final = {**_KNOWN, **{f"{name}?": maybe(kind) for name, kind in _KNOWN.items()}}
 
@@ -157,25 +191,43 @@ class Document(NamedTuple):
     @property
     def whole(self) -> Kind:
         """All its fields."""
-        head = (Field("schema", Kind({"const": self.name})), Field("tool_version", "text"), Field("command", "texts"))
+        head = (
+            Field("schema", Kind({"const": self.name})),
+            Field("tool_version", "text"),
+            Field("command", "texts"),
+        )
         known = self.row.schema
         later = {*self.row.keys} - {*known["required"]}
-        more = {key: value for key, value in known.items() if key not in ("type", "required", "properties")}
+        more = {
+            key: value
+            for key, value in known.items()
+            if key not in ("type", "required", "properties")
+        }
         return row(*head, *self.row.fields, later=later, **more)
 
     def of(self, answer: Any, command: Sequence[str]) -> dict[str, Any]:
         """Give what the JSON holds; ``command`` are the arguments that repeat the answer."""
-        head = {"schema": self.name, "tool_version": __version__, "command": list(command)}
+        head = {
+            "schema": self.name,
+            "tool_version": __version__,
+            "command": list(command),
+        }
         return {**head, **self.row.plain(answer)}
 
-    def as_json(self, answer: Any, command: Sequence[str], indent: int | None = 2) -> str:
+    def as_json(
+        self, answer: Any, command: Sequence[str], indent: int | None = 2
+    ) -> str:
         """Write an answer by its schema; without an ``indent`` in one line, to be appended to those of other runs."""
         return tables.as_json(self.of(answer, command), indent)
 
 
-def csv_of(keys: Sequence[str], rows: Iterable[Mapping[str, Any]], between: str = "; ") -> str:
+def csv_of(
+    keys: Sequence[str], rows: Iterable[Mapping[str, Any]], between: str = "; "
+) -> str:
     """Write rows as csv with these columns; what is a list in JSON is joined in its cell."""
-    return tables.as_csv(keys, ([_cell(found[key], between) for key in keys] for found in rows)).rstrip("\n")
+    return tables.as_csv(
+        keys, ([_cell(found[key], between) for key in keys] for found in rows)
+    ).rstrip("\n")
 
 
 def _cell(value: Any, between: str) -> tables.Cell:

@@ -28,7 +28,13 @@ if TYPE_CHECKING:
 
 FORMATS = ("png", "svg", "pdf")
 # Okabe and Ito's palette: told apart with any colour vision.
-REFERENCE, SWITCHED, GOOD, FLIGHT, BETTER = "#000000", "#d55e00", "#009e73", "#56b4e9", "#0072b2"
+REFERENCE, SWITCHED, GOOD, FLIGHT, BETTER = (
+    "#000000",
+    "#d55e00",
+    "#009e73",
+    "#56b4e9",
+    "#0072b2",
+)
 # Width of a figure that is written to a file [inch].
 WIDTH: Final = 10.0
 # Share of the axes that the label of a switch time takes up, at most: in a file and on a page.
@@ -54,12 +60,24 @@ def begin(count: int, height: float, *, page: bool) -> tuple[Figure, list[Axes]]
     return figure, list(figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
 
 
-def shade(axes: Axes, span: Sequence[float], label: str, colour: str = FLIGHT, alpha: float = 0.15) -> None:
+def shade(
+    axes: Axes,
+    span: Sequence[float],
+    label: str,
+    colour: str = FLIGHT,
+    alpha: float = 0.15,
+) -> None:
     """Shade a span of times, a flight if nothing else is said."""
     axes.axvspan(*span, color=colour, alpha=alpha, linewidth=0, label=label)
 
 
-def note(axes: Axes, text: str, place: tuple[float, float], offset: tuple[float, float], **look: Any) -> None:
+def note(
+    axes: Axes,
+    text: str,
+    place: tuple[float, float],
+    offset: tuple[float, float],
+    **look: Any,
+) -> None:
     """Write at a place, its height a share of the axes, ``offset`` by some points; by default at a time."""
     look = {"xycoords": ("data", "axes fraction"), "fontsize": "small", **look}
     axes.annotate(text, place, xytext=offset, textcoords="offset points", **look)
@@ -69,7 +87,9 @@ def picture_format(name: str) -> str:
     """Tell the format that the suffix of ``name`` asks for; FormatError unless it is png, svg or pdf."""
     form = PurePath(name).suffix.lower().lstrip(".")
     if form not in FORMATS:
-        raise FormatError(f"{name}: plots are written as {', '.join(FORMATS)}; give the file such a suffix")
+        raise FormatError(
+            f"{name}: plots are written as {', '.join(FORMATS)}; give the file such a suffix"
+        )
     return form
 
 
@@ -100,7 +120,12 @@ def make_logarithmic(axes: Axes, low: float, high: float) -> None:
         axes.yaxis.set_minor_formatter(LogFormatter())
 
 
-def show_span(axes: Axes, span: tuple[float, float], scale: Scale, above: Sequence[tuple[str, float]]) -> None:
+def show_span(
+    axes: Axes,
+    span: tuple[float, float],
+    scale: Scale,
+    above: Sequence[tuple[str, float]],
+) -> None:
     """Show of a curve the times in ``span``; what is higher than the scale is cut, with a mark.
 
     Parameters
@@ -127,24 +152,39 @@ def show_span(axes: Axes, span: tuple[float, float], scale: Scale, above: Sequen
         )  # fmt: skip
 
 
-def mark_times(panels: Sequence[Axes], tr: float | None, td: float | None, *, page: bool) -> None:
+def mark_times(
+    panels: Sequence[Axes], tr: float | None, td: float | None, *, page: bool
+) -> None:
     """Mark the switch times; their labels stand above the first axes, away from each other and from the edges.
 
     Where a label would reach over an edge it changes its side if there is room.
     """
     width, (low, high) = LABEL[page], panels[0].get_xlim()
-    places = [None if time is None else (time - low) / (high - low) for time in (tr, td)]
+    places = [
+        None if time is None else (time - low) / (high - low) for time in (tr, td)
+    ]
     room = 1.0 if places[0] is None or places[1] is None else places[1] - places[0]
     sides = ["right", "left"]
     if places[0] is not None and places[0] < width < room:
         sides[0] = "left"
-    if places[1] is not None and places[1] > 1 - width and room > width * (1 + (sides[0] == "left")):
+    if (
+        places[1] is not None
+        and places[1] > 1 - width
+        and room > width * (1 + (sides[0] == "left"))
+    ):
         sides[1] = "right"
     for name, time, side in zip(("tr", "td"), (tr, td), sides, strict=True):
         if time is not None:
             for axes in panels:
                 axes.axvline(time, color=SWITCHED, linestyle="--", linewidth=0.8)
-            note(panels[0], f" {name} = {time:.6g} ", (time, 1), (0, 3), ha=side, color=SWITCHED)
+            note(
+                panels[0],
+                f" {name} = {time:.6g} ",
+                (time, 1),
+                (0, 3),
+                ha=side,
+                color=SWITCHED,
+            )
 
 
 def finish(axes: Axes, *, legend: bool = True) -> None:
@@ -165,10 +205,22 @@ def _entries(panels: Sequence[Axes]) -> dict[str, Artist]:
     return {name: handle for pairs in known for handle, name in pairs}
 
 
-def legend_below(figure: figures.Figure, panels: Sequence[Axes], columns: int = 4, size: str | None = "small") -> None:
+def legend_below(
+    figure: figures.Figure,
+    panels: Sequence[Axes],
+    columns: int = 4,
+    size: str | None = "small",
+) -> None:
     """Put one legend of all panels below them."""
     if known := _entries(panels):
-        figure.legend(known.values(), known, loc="outside lower left", ncols=columns, fontsize=size, frameon=False)
+        figure.legend(
+            known.values(),
+            known,
+            loc="outside lower left",
+            ncols=columns,
+            fontsize=size,
+            frameon=False,
+        )
 
 
 def with_unit(name: str, unit: str) -> str:
@@ -212,12 +264,22 @@ def arrange(figure: figures.Figure, panels: Sequence[Axes], height: float) -> No
     panels[-1].locator_params(axis="x", nbins=_NUMBERS)
     _place(panels, 0.15 * PAGE_WIDTH, height, full)
     boxes = ((panel, panel.yaxis.get_tightbbox()) for panel in panels)
-    left = max(panel.bbox.x0 - box.x0 for panel, box in boxes if box) / figure.dpi + _EDGE
+    left = (
+        max(panel.bbox.x0 - box.x0 for panel, box in boxes if box) / figure.dpi + _EDGE
+    )
     _place(panels, left, height, full)
     for panel in panels:
-        panel.yaxis.set_label_coords((_EDGE + _NAME - left) / (PAGE_WIDTH - left - _RIGHT), 0.5)
+        panel.yaxis.set_label_coords(
+            (_EDGE + _NAME - left) / (PAGE_WIDTH - left - _RIGHT), 0.5
+        )
     figure.legend(
-        known.values(), known, loc="lower left", ncols=_COLUMNS, fontsize="small", frameon=False, borderaxespad=0.1
+        known.values(),
+        known,
+        loc="lower left",
+        ncols=_COLUMNS,
+        fontsize="small",
+        frameon=False,
+        borderaxespad=0.1,
     )
 
 
@@ -225,7 +287,14 @@ def _place(panels: Sequence[Axes], left: float, height: float, full: float) -> N
     """Give each panel its place in a figure that is ``full`` high [inch]."""
     for place, panel in enumerate(panels):
         bottom = full - _TOP - (place + 1) * height - place * _BETWEEN
-        panel.set_position((left / PAGE_WIDTH, bottom / full, 1 - (left + _RIGHT) / PAGE_WIDTH, height / full))
+        panel.set_position(
+            (
+                left / PAGE_WIDTH,
+                bottom / full,
+                1 - (left + _RIGHT) / PAGE_WIDTH,
+                height / full,
+            )
+        )
 
 
 def svg_element(figure: figures.Figure, prefix: str) -> str:
@@ -235,13 +304,20 @@ def svg_element(figure: figures.Figure, prefix: str) -> str:
     """
     content = io.StringIO()
     nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": prefix}), any_letters():
+    with (
+        mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": prefix}),
+        any_letters(),
+    ):
         canvas: Any = FigureCanvasSVG(figure)
         canvas.print_svg(content, metadata=nothing)  # `Figure.savefig` draws it twice
     element = content.getvalue()
     element = element[element.index("<svg") :]
-    element = re.sub(r' (?:width|height)="[\d.]+pt"', "", element, count=2)  # the page says how wide
+    element = re.sub(
+        r' (?:width|height)="[\d.]+pt"', "", element, count=2
+    )  # the page says how wide
     # a hundredth of a point is finer than any screen
-    element = re.sub(r'(?<= d=")[^"]*', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), element)
+    element = re.sub(
+        r'(?<= d=")[^"]*', lambda path: re.sub(r"(\.\d\d)\d+", r"\1", path[0]), element
+    )
     element = re.sub(r"<style.*?</style>", "", element, flags=re.DOTALL)
     return re.sub(r'(?<= id=")|(?<=href="#)|(?<=url\(#)', prefix, element)

@@ -10,11 +10,30 @@ from matplotlib.collections import LineCollection
 from d2rpick.choice.study import Study, StudyRow, outliers, runs_of
 from d2rpick.histories.samples import outline
 from d2rpick.report import figures
-from d2rpick.report.figures import BETTER, FLIGHT, GOOD, REFERENCE, STRETCHES, SWITCHED, Figure, plain, shade, with_unit
+from d2rpick.report.figures import (
+    BETTER,
+    FLIGHT,
+    GOOD,
+    REFERENCE,
+    STRETCHES,
+    SWITCHED,
+    Figure,
+    plain,
+    shade,
+    with_unit,
+)
 from d2rpick.report.figures_modal import draw_halfway, draw_residuals
 from d2rpick.report.situation import energy_name
 from d2rpick.report.study import short_names
-from d2rpick.report.view import Motion, View, merged, replayed_motion, scale_in, scale_of, view_of
+from d2rpick.report.view import (
+    Motion,
+    View,
+    merged,
+    replayed_motion,
+    scale_in,
+    scale_of,
+    view_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -50,7 +69,9 @@ def draw_suggestion(answer: Suggestion, *, page: bool = False) -> Figure:
     shown = tuple(answer.candidates) if few else (best,) if best else ()
     bands = () if few else answer.acceptable_windows
     better = answer.clearly_better if page else None
-    return _draw(answer.situation, best.tr if best else None, shown, bands, better, page=page)
+    return _draw(
+        answer.situation, best.tr if best else None, shown, bands, better, page=page
+    )
 
 
 def draw_verdict(answer: Verdict, *, page: bool = False) -> Figure:
@@ -71,7 +92,9 @@ def _draw(
     modal = situation.basis == "modal" and tr is not None
     below = modal or motion is not None
     figure, panels = figures.begin(2 if below else 1, _HEIGHTS[below], page=page)
-    seen = view_of(situation, *(() if tr is None else (tr,)), *(better[:2] if better else ()))
+    seen = view_of(
+        situation, *(() if tr is None else (tr,)), *(better[:2] if better else ())
+    )
     _draw_energy(panels[0], situation, seen, candidates, bands)
     if modal and tr is not None:
         draw_halfway(panels[0], situation, tr)
@@ -99,18 +122,30 @@ def _draw_energy(
     candidates: Sequence[Candidate],
     bands: Sequence[tuple[float, float]],
 ) -> None:
-    history, level, flight, span = situation.history, situation.energy_td, situation.flight, situation.evidence.span
+    history, level, flight, span = (
+        situation.history,
+        situation.energy_td,
+        situation.flight,
+        situation.evidence.span,
+    )
     drawn = outline(*history.between(seen.start, seen.end), stretches=STRETCHES)
     if flight.start is not None:
-        known = span.end if span else situation.td  # without a contact, as far as it was seen
+        known = (
+            span.end if span else situation.td
+        )  # without a contact, as far as it was seen
         end = known if flight.end is None else flight.end
         shade(axes, (flight.start, end), f"flight ({flight.source})")
     axes.plot(*drawn, color=REFERENCE, linewidth=1, label=plain(energy_name(history)))
-    axes.axhline(level, color=SWITCHED, linewidth=0.8, label=f"level at td, {level:.4g}")
+    axes.axhline(
+        level, color=SWITCHED, linewidth=0.8, label=f"level at td, {level:.4g}"
+    )
     for number, band in enumerate(merged(bands, (seen.end - seen.start) / STRETCHES)):
         label = "_" if number else "acceptable tr"
         axes.axvspan(*band, ymax=_BAND, facecolor=GOOD, linewidth=0, label=label)
-    for acceptable, fill, name in ((True, GOOD, "acceptable"), (False, "none", "not acceptable")):
+    for acceptable, fill, name in (
+        (True, GOOD, "acceptable"),
+        (False, "none", "not acceptable"),
+    ):
         some = [one for one in candidates if one.acceptable == acceptable]
         if some:
             label = name if len(candidates) > 1 else "tr"
@@ -142,7 +177,11 @@ def _draw_motion(axes: Axes, motion: Motion) -> None:
 
 
 _COLOURS: Final = {"supported": GOOD, "re-plan": SWITCHED, "done": "#999999"}
-_HATCHES: Final = {"supported": None, "re-plan": "//", "done": None}  # told apart without colour, too
+_HATCHES: Final = {
+    "supported": None,
+    "re-plan": "//",
+    "done": None,
+}  # told apart without colour, too
 # Of the figure in a file, and of the axes on a page [inch].
 _PLAN_HEIGHT, _PLAN_PANEL = 4.0, 2.8
 # Share of the axes below the energy in which the windows are drawn; parts of which the energy is drawn.
@@ -154,7 +193,13 @@ def draw_plan(plan: Plan, *, page: bool = False) -> Figure:
     """Draw the energy over time, the flights behind it and the rigid windows below it."""
     figure, (axes,) = figures.begin(1, _PLAN_HEIGHT, page=page)
     history = plan.history
-    axes.plot(history.time, history.energy, color=REFERENCE, linewidth=1, label="internal energy")
+    axes.plot(
+        history.time,
+        history.energy,
+        color=REFERENCE,
+        linewidth=1,
+        label="internal energy",
+    )
     for row in plan.flights:
         shade(axes, (row.start, row.end), "flight")
         if row.window:
@@ -162,18 +207,34 @@ def draw_plan(plan: Plan, *, page: bool = False) -> Figure:
                 *row.window, ymax=_STRIP, facecolor=_COLOURS[row.status], hatch=_HATCHES[row.status],
                 edgecolor="white", linewidth=0, label=f"rigid, {row.status}",
             )  # fmt: skip
-            figures.note(axes, str(row.number), (sum(row.window) / 2, _STRIP), (0, 2), ha="center")
+            figures.note(
+                axes,
+                str(row.number),
+                (sum(row.window) / 2, _STRIP),
+                (0, 2),
+                ha="center",
+            )
     low, high = axes.get_ylim()
     axes.set_ylim(low - 2 * _STRIP * (high - low), high)
     _finish(figure, axes, with_unit("time", history.time_unit), page=page)
     return figure
 
 
-def draw_run(history: History, flights: Sequence[Times], windows: Sequence[Times] = ()) -> Figure:
+def draw_run(
+    history: History, flights: Sequence[Times], windows: Sequence[Times] = ()
+) -> Figure:
     """Draw the energy of a run, as far as it is believed, its flights and the windows in which parts were rigid."""
     figure, (axes,) = figures.begin(1, _PLAN_HEIGHT, page=True)
-    rigid = np.any([(history.time > tr) & (history.time < td) for tr, td in windows], axis=0)
-    axes.plot(history.time, np.where(rigid, np.nan, history.energy), color=REFERENCE, linewidth=1, label="energy")
+    rigid = np.any(
+        [(history.time > tr) & (history.time < td) for tr, td in windows], axis=0
+    )
+    axes.plot(
+        history.time,
+        np.where(rigid, np.nan, history.energy),
+        color=REFERENCE,
+        linewidth=1,
+        label="energy",
+    )
     for flight in flights:
         shade(axes, flight, "flight")
     for window in windows:
@@ -221,18 +282,27 @@ def draw_trade_off(found: TradeOff, *, page: bool = False) -> Figure:
     inner = history.between(*found.td_window)
     energy.plot(*outline(*inner, stretches=STRETCHES), color=REFERENCE, linewidth=1)
     energy.set(ylabel="internal energy")
-    by_energy = bool(found.offers) and all(one.basis == "energy" for one in found.offers)
+    by_energy = bool(found.offers) and all(
+        one.basis == "energy" for one in found.offers
+    )
     _curve(error, found, [one.error for one in found.offers])
     error.set(ylabel=_ERRORS[by_energy], ylim=(0, None))
     saved = [one.saving for one in found.offers]
     cost = any(one is not None for one in saved)
     _curve(rigid, found, saved if cost else [one.rigid_time for one in found.offers])
     td = with_unit("td", history.time_unit)
-    rigid.set(ylabel="run time saved" if cost else "rigid time", xlabel=td, ylim=(0, None))
+    rigid.set(
+        ylabel="run time saved" if cost else "rigid time", xlabel=td, ylim=(0, None)
+    )
     for axes in panels:
-        for one, colour, name in ((found.asked, FLIGHT, "td asked for"), (found.recommended, SWITCHED, "recommended")):
+        for one, colour, name in (
+            (found.asked, FLIGHT, "td asked for"),
+            (found.recommended, SWITCHED, "recommended"),
+        ):
             if one:
-                axes.axvline(one.td, color=colour, linewidth=1, linestyle="--", label=name)
+                axes.axvline(
+                    one.td, color=colour, linewidth=1, linestyle="--", label=name
+                )
         figures.finish(axes, legend=False)
         axes.margins(x=_AT_EDGE)
     if page:
@@ -248,11 +318,21 @@ def _curve(axes: Axes, found: TradeOff, values: list[float | None]) -> None:
     shown = np.array([np.nan if value is None else value for value in values])
     best = np.array([one.unbeaten for one in found.offers], dtype=bool)
     axes.plot(td, shown, color=REFERENCE, linewidth=0.8, label="best pair for each td")
-    axes.plot(td[best], shown[best], "o", color=GOOD, markersize=4, label="nothing beats it")
+    axes.plot(
+        td[best], shown[best], "o", color=GOOD, markersize=4, label="nothing beats it"
+    )
 
 
 # Okabe and Ito's palette, without the yellow that white swallows; dashes tell apart lines of the same colour.
-_RUN_COLOURS: Final = (REFERENCE, SWITCHED, GOOD, "#0072b2", "#cc79a7", "#e69f00", "#56b4e9")
+_RUN_COLOURS: Final = (
+    REFERENCE,
+    SWITCHED,
+    GOOD,
+    "#0072b2",
+    "#cc79a7",
+    "#e69f00",
+    "#56b4e9",
+)
 _PATTERNS: Final = ("-", "--")
 # Up to so many runs each has its own colour and name; beyond, all are grey and those that stand out are named.
 _NAMED: Final = 10
@@ -284,19 +364,27 @@ class _Named(NamedTuple):
 def draw_study(answer: Study, *, page: bool = False) -> Figure:
     """Draw energies around td over each other, the tr of each, the common one and td."""
     # names of runs stand beside the axes, so that the margins are not known, on a page neither
-    figure = Figure(figsize=(figures.PAGE_WIDTH if page else figures.WIDTH, _HEIGHT), layout="constrained")
+    figure = Figure(
+        figsize=(figures.PAGE_WIDTH if page else figures.WIDTH, _HEIGHT),
+        layout="constrained",
+    )
     axes = figure.subplots()
     drawn = {id(row): row.curve for row in answer.runs if row.curve is not None}
     runs = [row for row in answer.runs if id(row) in drawn]
     named = _named(runs, drawn)
     _draw_others(axes, [*drawn.values()], named)
     for one in named:
-        axes.plot(*one.curve, color=one.colour, linestyle=one.pattern, linewidth=1, label="_")
+        axes.plot(
+            *one.curve, color=one.colour, linestyle=one.pattern, linewidth=1, label="_"
+        )
     if answer.common.window:
         shade(axes, answer.common.window, "acceptable in all runs", GOOD, alpha=0.2)
     _draw_times(axes, runs)
     units = {row.time_unit for row in answer.runs if row.judged}
-    axes.set(xlabel=with_unit("time", units.pop() if len(units) == 1 else ""), ylabel="internal energy")
+    axes.set(
+        xlabel=with_unit("time", units.pop() if len(units) == 1 else ""),
+        ylabel="internal energy",
+    )
     figures.finish(axes, legend=False)
     _show_runs(axes, answer, runs, [*drawn.values()])
     _name(axes, named, page=page)
@@ -307,19 +395,33 @@ def draw_study(answer: Study, *, page: bool = False) -> Figure:
 
 def _named(runs: Sequence[StudyRow], curves: Mapping[int, Samples]) -> list[_Named]:
     """Give the runs that have a colour and a name: all where they are few, else those that stand out."""
-    chosen = list(runs) if len(runs) <= _NAMED else list(outliers(runs))[:_MOST_OUTLIERS]
-    names = dict(zip(map(id, runs), short_names([row.source for row in runs]), strict=True))
+    chosen = (
+        list(runs) if len(runs) <= _NAMED else list(outliers(runs))[:_MOST_OUTLIERS]
+    )
+    names = dict(
+        zip(map(id, runs), short_names([row.source for row in runs]), strict=True)
+    )
     palette = _RUN_COLOURS if len(runs) <= _NAMED else _RUN_COLOURS[1:]
     return [
-        _Named(curves[id(row)], plain(names[id(row)]), palette[i % len(palette)], _PATTERNS[i // len(palette) % 2])
+        _Named(
+            curves[id(row)],
+            plain(names[id(row)]),
+            palette[i % len(palette)],
+            _PATTERNS[i // len(palette) % 2],
+        )
         for i, row in enumerate(chosen)
     ]
 
 
-def _draw_others(axes: Axes, curves: Sequence[Samples], named: Sequence[_Named]) -> None:
+def _draw_others(
+    axes: Axes, curves: Sequence[Samples], named: Sequence[_Named]
+) -> None:
     """Draw the runs without a name in grey; taken together they stay as dark as ten lines."""
     told = {id(one.curve) for one in named}
-    others, many = [curve.T for curve in curves if id(curve) not in told], len(curves) > _MANY
+    others, many = (
+        [curve.T for curve in curves if id(curve) not in told],
+        len(curves) > _MANY,
+    )
     lines = LineCollection(
         others, colors=_GREY if told or len(others) > 1 else REFERENCE, linewidths=0.6 if many else 1, rasterized=many,
         alpha=max(_FAINTEST, min(1.0, _DARK / max(1, len(others)))),
@@ -340,17 +442,36 @@ def _draw_times(axes: Axes, drawn: Sequence[StudyRow]) -> None:
         )  # fmt: skip
 
 
-def _show_runs(axes: Axes, answer: Study, drawn: Sequence[StudyRow], curves: Sequence[Samples]) -> None:
+def _show_runs(
+    axes: Axes, answer: Study, drawn: Sequence[StudyRow], curves: Sequence[Samples]
+) -> None:
     """Show the time from a little before the first tr to a little after td; what is higher there is cut."""
     if not curves:
         return
-    first, last = min(float(one[0, 0]) for one in curves), max(float(one[0, -1]) for one in curves)
+    first, last = (
+        min(float(one[0, 0]) for one in curves),
+        max(float(one[0, -1]) for one in curves),
+    )
     times = [row.tr for row in drawn if row.tr is not None]
-    td = max((row.td for row in drawn if row.td is not None), default=last) if answer.td is None else answer.td
-    early = min([*times, td if answer.common.tr is None else answer.common.tr]) if times else first
-    span = max(first, early - _BEFORE * (td - early)), min(last, td + _AFTER * (td - early))
+    td = (
+        max((row.td for row in drawn if row.td is not None), default=last)
+        if answer.td is None
+        else answer.td
+    )
+    early = (
+        min([*times, td if answer.common.tr is None else answer.common.tr])
+        if times
+        else first
+    )
+    span = (
+        max(first, early - _BEFORE * (td - early)),
+        min(last, td + _AFTER * (td - early)),
+    )
     levels = np.array([row.energy_td for row in drawn if row.energy_td is not None])
-    inner, seen = (np.concatenate([levels, *_energies(curves, *window)]) for window in ((early, td), span))
+    inner, seen = (
+        np.concatenate([levels, *_energies(curves, *window)])
+        for window in ((early, td), span)
+    )
     # the lowest level stays in sight beside the middle one
     level = min(float(np.median(levels)), _LOWEST * float(levels.min()))
     scale = scale_of(float(inner.min()), float(inner.max()), level)

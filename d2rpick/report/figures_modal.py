@@ -21,7 +21,9 @@ def draw_halfway(axes: Axes, situation: Situation, tr: float) -> None:
     """Mark the energy halfway between tr and td, which tells how the two deformations lie to each other."""
     middle = (tr + situation.td) / 2
     energy = situation.history.energy_at(middle)
-    axes.scatter([middle], [energy], s=40, marker="D", color=SWITCHED, zorder=3, label="halfway")
+    axes.scatter(
+        [middle], [energy], s=40, marker="D", color=SWITCHED, zorder=3, label="halfway"
+    )
 
 
 def draw_residuals(axes: Axes, situation: Situation) -> None:
@@ -29,7 +31,14 @@ def draw_residuals(axes: Axes, situation: Situation) -> None:
     profile, start = situation.vibration.profile, situation.earliest_tr
     assert profile is not None
     shown = profile.time >= (-np.inf if start is None else start)
-    residuals = np.asarray(residual(profile.error[shown], situation.kinetic_share or 0.0))
-    axes.plot(*outline(profile.time[shown], residuals, stretches=STRETCHES), color=REFERENCE, linewidth=1, label="_")
+    residuals = np.asarray(
+        residual(profile.error[shown], situation.kinetic_share or 0.0)
+    )
+    axes.plot(
+        *outline(profile.time[shown], residuals, stretches=STRETCHES),
+        color=REFERENCE,
+        linewidth=1,
+        label="_",
+    )
     axes.axhline(NOTHING_KEPT, color=SWITCHED, linewidth=0.8, label="no vibration kept")
     axes.set(ylabel="residual R of tr", ylim=(0, None))

@@ -33,32 +33,57 @@ def draw_replay(motion: Trajectory, switched: Replay | None) -> Figure:
     upper.plot(motion.time, motion.state.z, color=REFERENCE, label="z, frame")
     upper.plot(motion.time, motion.state.y, color=SWITCHED, label="y, suspended mass")
     upper.set_ylabel("displacement")
-    lower.plot(motion.time, motion.internal_energy, color=REFERENCE, label="internal energy")
-    lower.plot(motion.time, motion.kinetic_energy, color=SWITCHED, label="kinetic energy")
+    lower.plot(
+        motion.time, motion.internal_energy, color=REFERENCE, label="internal energy"
+    )
+    lower.plot(
+        motion.time, motion.kinetic_energy, color=SWITCHED, label="kinetic energy"
+    )
     lower.set(xlabel="time", ylabel="energy")
     for axes in (upper, lower):
         if switched:
-            axes.axvspan(switched.tr, switched.td, color=FLIGHT, alpha=0.2, label="rigid", linewidth=0)
+            axes.axvspan(
+                switched.tr,
+                switched.td,
+                color=FLIGHT,
+                alpha=0.2,
+                label="rigid",
+                linewidth=0,
+            )
         finish(axes)
     return figure
 
 
 def draw_rollover(
-    parameters: Parameters, reference: Record, switched: Record | None = None, windows: Sequence[RigidWindow] = ()
+    parameters: Parameters,
+    reference: Record,
+    switched: Record | None = None,
+    windows: Sequence[RigidWindow] = (),
 ) -> Figure:
     """Outlines of the box at even times with sled, curb and ground; roll and height over time, and what differs.
 
     ``switched`` is the same box, rigid in ``windows``; without it there is nothing to compare.
     """
-    rows = ["roll", "roll difference", "height", "height difference"] if switched else ["roll", "height"]
+    rows = (
+        ["roll", "roll difference", "height", "height difference"]
+        if switched
+        else ["roll", "height"]
+    )
     figure = Figure(figsize=(12, 8 if switched else 5.5), layout="constrained")
-    grid = figure.subplot_mosaic([["outlines", row] for row in rows], width_ratios=(1.4, 1))
+    grid = figure.subplot_mosaic(
+        [["outlines", row] for row in rows], width_ratios=(1.4, 1)
+    )
     _draw_outlines(grid["outlines"], parameters, reference, switched)
     time = reference.time
     runs = [(reference, REFERENCE, "-", "without switching")]
     runs += [(switched, SWITCHED, "--", "switched")] if switched else []
     for record, colour, style, name in runs:
-        drawn: dict[str, Any] = {"color": colour, "linewidth": 1, "linestyle": style, "label": name}
+        drawn: dict[str, Any] = {
+            "color": colour,
+            "linewidth": 1,
+            "linestyle": style,
+            "label": name,
+        }
         grid["roll"].plot(time, np.degrees(record.roll), **drawn)
         grid["height"].plot(time, record.centre.imag, **drawn)
     if switched:
@@ -80,22 +105,43 @@ def draw_rollover(
     return figure
 
 
-def _draw_outlines(axes: Axes, parameters: Parameters, reference: Record, switched: Record | None) -> None:
+def _draw_outlines(
+    axes: Axes, parameters: Parameters, reference: Record, switched: Record | None
+) -> None:
     """Outlines at even times, each with its time; the sled where it starts and where it comes to rest, the ground."""
     shown = np.linspace(0, reference.time.size - 1, _OUTLINES).round().astype(int)
     sled = Sled(parameters.speed, parameters.braking)
     for time in (0.0, float(reference.time[-1])):
         draw_sled(axes, parameters, sled.place(time))
-    for record, colour, style in ((reference, REFERENCE, "-"), (switched, SWITCHED, "--")):
+    for record, colour, style in (
+        (reference, REFERENCE, "-"),
+        (switched, SWITCHED, "--"),
+    ):
         if record:
-            closed = np.column_stack([record.outline[shown], record.outline[shown, 0]]).T
-            axes.plot(closed.real, closed.imag, color=colour, linewidth=0.9, linestyle=style)
+            closed = np.column_stack(
+                [record.outline[shown], record.outline[shown, 0]]
+            ).T
+            axes.plot(
+                closed.real, closed.imag, color=colour, linewidth=0.9, linestyle=style
+            )
     for state in shown:
         centre = reference.centre[state]
         text = f"{1e3 * reference.time[state]:.0f}"
-        axes.text(centre.real, centre.imag, text, fontsize="small", ha="center", va="center", color=GOOD)
+        axes.text(
+            centre.real,
+            centre.imag,
+            text,
+            fontsize="small",
+            ha="center",
+            va="center",
+            color=GOOD,
+        )
     axes.set(aspect="equal", xlabel="x [m]", ylabel="z [m]")
-    around = "; sled at start and end, curb, ground" if parameters.drop is None else "; ground"
+    around = (
+        "; sled at start and end, curb, ground"
+        if parameters.drop is None
+        else "; ground"
+    )
     axes.set_title(f"box at the times named [ms]{around}", fontsize="medium")
     axes.grid(visible=True, linewidth=0.3)
 
@@ -104,34 +150,80 @@ def _draw_times(axes: Axes, reference: Record, windows: Sequence[RigidWindow]) -
     """Shade the rigid windows; mark when the sled pushed last and when the ground pushes."""
     for number, window in enumerate(windows):
         label = "_" if number else "rigid"
-        axes.axvspan(window.tr, window.td, color=FLIGHT, alpha=0.2, linewidth=0, label=label)
+        axes.axvspan(
+            window.tr, window.td, color=FLIGHT, alpha=0.2, linewidth=0, label=label
+        )
     if reference.released is not None:
-        axes.axvline(reference.released, color=GOOD, linestyle=":", linewidth=1, label="sled pushed last")
+        axes.axvline(
+            reference.released,
+            color=GOOD,
+            linestyle=":",
+            linewidth=1,
+            label="sled pushed last",
+        )
     for number, (start, _) in enumerate(reference.landings):
         label = "_" if number else "landing"
         axes.axvline(start, color=SWITCHED, linestyle=":", linewidth=1, label=label)
 
 
-def draw_scan(reference: Record, outcomes: Sequence[Outcome], answer: Suggestion) -> Figure:
+def draw_scan(
+    reference: Record, outcomes: Sequence[Outcome], answer: Suggestion
+) -> Figure:
     """Energy of the box against its level at td; below it, against tr, the errors of roll and of mean energy."""
     figure = Figure(figsize=(9, 8), layout="constrained")
     energy, roll, mean = figure.subplots(3, 1, sharex=True)
     before = reference.time <= answer.situation.td
     internal = reference.internal_energy[before, 0]
-    energy.plot(reference.time[before], internal, color=REFERENCE, linewidth=1, label="internal energy of the box")
-    energy.axhline(internal[-1], color=SWITCHED, linewidth=0.8, label=f"level at td, {internal[-1]:.4g}")
+    energy.plot(
+        reference.time[before],
+        internal,
+        color=REFERENCE,
+        linewidth=1,
+        label="internal energy of the box",
+    )
+    energy.axhline(
+        internal[-1],
+        color=SWITCHED,
+        linewidth=0.8,
+        label=f"level at td, {internal[-1]:.4g}",
+    )
     times = [one.tr for one in outcomes]
-    roll.plot(times, [abs(one.roll_error) for one in outcomes], ".-", color=REFERENCE, label="roll error at td")
-    mean.plot(times, [one.mean_ratio - 1 for one in outcomes], ".-", color=REFERENCE, label="error of the mean energy")
+    roll.plot(
+        times,
+        [abs(one.roll_error) for one in outcomes],
+        ".-",
+        color=REFERENCE,
+        label="roll error at td",
+    )
+    mean.plot(
+        times,
+        [one.mean_ratio - 1 for one in outcomes],
+        ".-",
+        color=REFERENCE,
+        label="error of the mean energy",
+    )
     mean.axhline(0, color=REFERENCE, linewidth=0.5)
     energy.set_ylabel("energy [J]")
     roll.set(ylabel="|roll error| [degrees]", yscale="log")
     mean.set(ylabel="mean energy after td,\nrelative error", xlabel="tr [s]")
     for axes in (energy, roll, mean):
         if reference.released is not None:
-            axes.axvspan(0, reference.released, color=SWITCHED, alpha=0.1, linewidth=0, label="the sled pushes")
+            axes.axvspan(
+                0,
+                reference.released,
+                color=SWITCHED,
+                alpha=0.1,
+                linewidth=0,
+                label="the sled pushes",
+            )
         if answer.recommended:
-            axes.axvline(answer.recommended.tr, color=GOOD, linestyle="--", linewidth=1, label="recommended tr")
+            axes.axvline(
+                answer.recommended.tr,
+                color=GOOD,
+                linestyle="--",
+                linewidth=1,
+                label="recommended tr",
+            )
         finish(axes)
     return figure
 
@@ -147,8 +239,23 @@ def draw_sled(axes: Axes, parameters: Parameters, place: float) -> None:
         return
     turn = np.exp(-1j * np.radians(p.tilt))
     for corners, colour in (
-        ((-_SLED_LENGTH, CURB_THICKNESS, CURB_THICKNESS - 0.04j, -_SLED_LENGTH - 0.04j), FLIGHT),
+        (
+            (
+                -_SLED_LENGTH,
+                CURB_THICKNESS,
+                CURB_THICKNESS - 0.04j,
+                -_SLED_LENGTH - 0.04j,
+            ),
+            FLIGHT,
+        ),
         ((0.0, CURB_THICKNESS, CURB_THICKNESS + 1j * p.curb, 1j * p.curb), SWITCHED),
     ):
         shape = place + np.array(corners) * turn
-        axes.add_patch(Polygon(np.column_stack([shape.real, shape.imag]), closed=True, color=colour, alpha=0.6))
+        axes.add_patch(
+            Polygon(
+                np.column_stack([shape.real, shape.imag]),
+                closed=True,
+                color=colour,
+                alpha=0.6,
+            )
+        )

@@ -24,8 +24,16 @@ if TYPE_CHECKING:
 
 
 SARIF_SCHEMA: Final = "https://json.schemastore.org/sarif-2.1.0.json"
-_GITHUB: Final = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: "notice"}
-_SARIF: Final = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.INFO: "note"}
+_GITHUB: Final = {
+    Severity.ERROR: "error",
+    Severity.WARNING: "warning",
+    Severity.INFO: "notice",
+}
+_SARIF: Final = {
+    Severity.ERROR: "error",
+    Severity.WARNING: "warning",
+    Severity.INFO: "note",
+}
 _NOT_XML: Final = "[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"  # compiled where it is needed
 
 
@@ -49,7 +57,11 @@ _LINE: Final = kind_of("integer", minimum=1)
 _COUNTS: Final = ("errors", "warnings", "infos", "decks")
 FINDING: Final = row(
     Field("rule", kind_of("text", pattern="^D2R[0-9]{3}$")),
-    Field("severity", one_of(*map(str, Severity)), get=lambda finding: str(finding.severity)),
+    Field(
+        "severity",
+        one_of(*map(str, Severity)),
+        get=lambda finding: str(finding.severity),
+    ),
     Field("message", "text"),
     Field("file", "text"),
     Field("line", _LINE),
@@ -94,7 +106,12 @@ def as_csv(checks: Checks, _: Shown) -> str:
 def as_markdown(checks: Checks, _: Shown) -> str:
     """The findings as a Markdown table, and how many there are."""
     found = [list(FINDING.plain(one).values()) for one in _findings(checks)]
-    return "\n\n".join([*([tables.as_markdown(FINDING.keys, found)] if found else []), _last_line(checks)])
+    return "\n\n".join(
+        [
+            *([tables.as_markdown(FINDING.keys, found)] if found else []),
+            _last_line(checks),
+        ]
+    )
 
 
 def as_github(checks: Checks, _: Shown) -> str:
@@ -105,7 +122,15 @@ def as_github(checks: Checks, _: Shown) -> str:
         for f in _findings(checks)
     ]
     failed = ((_shown(one.deck, checks.root), one.reason) for one in checks.failed)
-    return "\n".join([*found, *(f"::error file={_escaped(deck, ',:')}::{_escaped(reason)}" for deck, reason in failed)])
+    return "\n".join(
+        [
+            *found,
+            *(
+                f"::error file={_escaped(deck, ',:')}::{_escaped(reason)}"
+                for deck, reason in failed
+            ),
+        ]
+    )
 
 
 def as_junit(checks: Checks, _: Shown) -> str:
@@ -125,15 +150,26 @@ def as_junit(checks: Checks, _: Shown) -> str:
         ET.SubElement(case, "error", type=failed.code, message=_xml(failed.reason))
     for result in checks.results:
         failing = [one.severity.rank <= checks.fail_on.rank for one in result.findings]
-        suite, name = begin(result.deck, tests=max(1, len(failing)), failures=sum(failing), errors=0)
+        suite, name = begin(
+            result.deck, tests=max(1, len(failing)), failures=sum(failing), errors=0
+        )
         if not failing:
             ET.SubElement(suite, "testcase", name="d2rpick check", classname=name)
         for one, fails in zip(_findings(checks, result), failing, strict=True):
-            case = ET.SubElement(suite, "testcase", name=_xml(f"{one.rule} {_place(one)}"), classname=name)
+            case = ET.SubElement(
+                suite,
+                "testcase",
+                name=_xml(f"{one.rule} {_place(one)}"),
+                classname=name,
+            )
             about = {"type": one.rule, "message": _xml(one.message)} if fails else {}
-            ET.SubElement(case, "failure" if fails else "system-out", about).text = _xml(_line(one))
+            ET.SubElement(
+                case, "failure" if fails else "system-out", about
+            ).text = _xml(_line(one))
     ET.indent(suites)
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(suites, encoding="unicode")
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(
+        suites, encoding="unicode"
+    )
 
 
 def as_sarif(checks: Checks, _: Shown) -> str:
@@ -154,18 +190,29 @@ def as_sarif(checks: Checks, _: Shown) -> str:
             "ruleIndex": ids.index(f.rule),
             "level": _SARIF[f.severity],
             "message": {"text": f.message},
-            "locations": _places(f.file, region={"startLine": f.line, "startColumn": f.column}),
+            "locations": _places(
+                f.file, region={"startLine": f.line, "startColumn": f.column}
+            ),
         }
         for f in _findings(checks)
     ]
     messages = [
-        {"level": "error", "message": {"text": one.reason}, "locations": _places(_shown(one.deck, checks.root))}
+        {
+            "level": "error",
+            "message": {"text": one.reason},
+            "locations": _places(_shown(one.deck, checks.root)),
+        }
         for one in checks.failed
     ]
     run = {
         "tool": {"driver": {"name": "d2rpick", "version": __version__, "rules": rules}},
         "columnKind": "unicodeCodePoints",
-        "invocations": [{"executionSuccessful": not checks.failed, "toolExecutionNotifications": messages}],
+        "invocations": [
+            {
+                "executionSuccessful": not checks.failed,
+                "toolExecutionNotifications": messages,
+            }
+        ],
         "results": found,
     }
     return tables.as_json({"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]})
@@ -181,7 +228,10 @@ def _line(one: Finding) -> str:
 
 def _window_lines(windows: Sequence[CheckedWindow], root: str) -> Iterator[str]:
     """Windows that the same cards make at the same times are one line."""
-    alike = (((window.cards, window.unit.kind, window.tr, window.td), window) for window in windows)
+    alike = (
+        ((window.cards, window.unit.kind, window.tr, window.td), window)
+        for window in windows
+    )
     for group in grouped(alike).values():
         first = group[0]
         until = "the end" if first.td is None else f"{first.td:g}"
@@ -208,7 +258,9 @@ def _windows(checks: Checks) -> Iterator[dict[str, Any]]:
 def _findings(checks: Checks, *results: Checked) -> Iterator[Finding]:
     """Give what was found in all decks, or in some ``results``, with paths as they are shown."""
     for one in (one for result in results or checks.results for one in result.findings):
-        yield one._replace(file=_shown(one.file, checks.root), deck=_shown(one.deck, checks.root))
+        yield one._replace(
+            file=_shown(one.file, checks.root), deck=_shown(one.deck, checks.root)
+        )
 
 
 def _warnings(checks: Checks) -> list[Caution]:
@@ -233,14 +285,19 @@ DOCUMENT: Final = Document(
 
 
 def _counts(results: Sequence[Checked]) -> dict[str, int]:
-    counted = Counter(finding.severity for result in results for finding in result.findings)
+    counted = Counter(
+        finding.severity for result in results for finding in result.findings
+    )
     return {f"{severity}s": counted[severity] for severity in Severity}
 
 
 def _last_line(checks: Checks) -> str:
     """How many findings and decks there are, and what was not judged."""
     results = checks.results
-    found = [f"{count} {name if count != 1 else name[:-1]}" for name, count in _counts(results).items()]
+    found = [
+        f"{count} {name if count != 1 else name[:-1]}"
+        for name, count in _counts(results).items()
+    ]
     decks = "1 deck" if len(results) == 1 else f"{len(results)} decks"
     left_out = f", {len(checks.failed)} not checked" if checks.failed else ""
     unjudged = checks.history is None and any(result.windows for result in results)
@@ -252,7 +309,11 @@ def _shown(path: str, root: str) -> str:
     if path == STDIN:
         return path
     absolute = os.path.abspath(os.path.join(root, path))  # noqa: PTH100, PTH118  start-up
-    shown = os.path.relpath(absolute, root) if absolute.startswith(os.path.join(root, "")) else absolute  # noqa: PTH118
+    shown = (
+        os.path.relpath(absolute, root)
+        if absolute.startswith(os.path.join(root, ""))  # noqa: PTH118
+        else absolute
+    )
     return os.fsencode(shown).decode("utf-8", "replace").replace(os.sep, "/")
 
 
@@ -277,12 +338,16 @@ def _xml(text: str) -> str:
 
 def as_list() -> str:
     """Id, severity and summary of every rule."""
-    return "\n".join(f"{rule.id}  {rule.severity:<7}  {rule.summary}" for rule in RULES.values())
+    return "\n".join(
+        f"{rule.id}  {rule.severity:<7}  {rule.summary}" for rule in RULES.values()
+    )
 
 
 def explained_rules(names: Iterable[str], width: int) -> str:
     """Explain the rules by ids or their beginnings; ConfigurationError where there is none of them."""
-    return "\n\n\n".join(as_text(rule, width) for name in names for rule in find_rules(name))
+    return "\n\n\n".join(
+        as_text(rule, width) for name in names for rule in find_rules(name)
+    )
 
 
 def as_text(rule: Rule, width: int) -> str:
@@ -301,8 +366,13 @@ def _example(title: str, example: Example, width: int) -> Iterator[str]:
     """A deck as it stands in its file, with what it includes and what it is checked against."""
     if example.history:
         yield f"{title}, with the history of"
-        yield tables.continued(f"  d2rpick {example.computed_by} {example.history} -o energy.csv", width)
-        yield f"checked by d2rpick check {example.name} --history energy.csv {example.options}".rstrip() + ":"
+        yield tables.continued(
+            f"  d2rpick {example.computed_by} {example.history} -o energy.csv", width
+        )
+        yield (
+            f"checked by d2rpick check {example.name} --history energy.csv {example.options}".rstrip()
+            + ":"
+        )
     elif example.stdin:
         yield f"{title}, read by d2rpick check -:"
     elif example.name != MAIN_DECK:

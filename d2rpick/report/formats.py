@@ -65,4 +65,6 @@ def written_by(report: Any, form: str, answer: Any, shown: Shown) -> str:
     """Write an answer in a form of the module of its result."""
     if own := getattr(report, f"as_{form}", None):
         return str(own(answer, shown))
-    return str(report.DOCUMENT.as_json(answer, shown.command, 2 if form == "json" else None))
+    return str(
+        report.DOCUMENT.as_json(answer, shown.command, 2 if form == "json" else None)
+    )

@@ -41,7 +41,9 @@ def format_of(name: str | None, formats: Sequence[str]) -> str:
     by_name = next((form for form in ("glstat", "matsum") if form in path.name), None)
     asked = _SUFFIXES.get(path.suffix[1:], by_name)
     if asked not in formats:
-        raise FormatError(f"{printable(name)}: the suffix names no format; give `write_as`: {', '.join(formats)}")
+        raise FormatError(
+            f"{printable(name)}: the suffix names no format; give `write_as`: {', '.join(formats)}"
+        )
     return str(asked)
 
 
@@ -75,8 +77,16 @@ def _oscillator_matsum(motion: Trajectory, oscillator: Oscillator) -> bytes:
     frame, suspended, state = oscillator.frame_mass, oscillator.mass, motion.state
     zero = 0.0 * motion.time
     parts = (
-        matsum.PartColumns("frame", zero, frame / 2 * state.vz**2, zero, frame * state.vz),
-        matsum.PartColumns("suspended mass", zero, suspended / 2 * state.vy**2, zero, suspended * state.vy),
+        matsum.PartColumns(
+            "frame", zero, frame / 2 * state.vz**2, zero, frame * state.vz
+        ),
+        matsum.PartColumns(
+            "suspended mass",
+            zero,
+            suspended / 2 * state.vy**2,
+            zero,
+            suspended * state.vy,
+        ),
         matsum.PartColumns("spring", motion.internal_energy, zero, zero, zero),
     )
     return matsum.write("floating oscillator", motion.time, parts)
@@ -110,7 +120,10 @@ def _box_glstat(record: Record) -> bytes:
     The walls of the model are floor, curb and ground, see `Record`; the friction on them is energy of the contacts and
     is listed once more by itself, as Radioss does, since health asks for the energy of the contacts without friction.
     """
-    internal, kinetic = record.internal_energy.sum(axis=1), record.kinetic_energy.sum(axis=1)
+    internal, kinetic = (
+        record.internal_energy.sum(axis=1),
+        record.kinetic_energy.sum(axis=1),
+    )
     zero = 0 * record.time
     speed = record.momentum.sum(axis=1) / record.mass
     return glstat.write(
@@ -128,22 +141,33 @@ def _box_glstat(record: Record) -> bytes:
 
 def _box_matsum(record: Record) -> bytes:
     """Parts box and step with their energies and momenta; while the box is rigid, those of its motion as one body."""
-    from d2rpick.models.box_run import PARTS  # not above: columns are written without the model
+    from d2rpick.models.box_run import (
+        PARTS,
+    )  # not above: columns are written without the model
 
     columns = zip(
         PARTS, record.internal_energy.T, record.kinetic_energy.T, record.momentum.T.real, record.momentum.T.imag,
         strict=True,
     )  # fmt: skip
-    return matsum.write("rollover box", record.time, tuple(matsum.PartColumns(*one) for one in columns))
+    return matsum.write(
+        "rollover box", record.time, tuple(matsum.PartColumns(*one) for one in columns)
+    )
 
 
 def _writers(
-    table: Callable[..., Table], glstat: Callable[..., bytes], matsum: Callable[..., bytes]
+    table: Callable[..., Table],
+    glstat: Callable[..., bytes],
+    matsum: Callable[..., bytes],
 ) -> Mapping[str, Callable[..., bytes]]:
     """Give how to write a run in each format, by what makes its columns or writes it."""
-    tables = {form: lambda run, *_, form=form: write_table(form, table(run)) for form in TABLES}
+    tables = {
+        form: lambda run, *_, form=form: write_table(form, table(run))
+        for form in TABLES
+    }
     return {**tables, "glstat": glstat, "matsum": matsum}
 
 
-OSCILLATOR_WRITERS: Final = _writers(_oscillator_table, _oscillator_glstat, _oscillator_matsum)
+OSCILLATOR_WRITERS: Final = _writers(
+    _oscillator_table, _oscillator_glstat, _oscillator_matsum
+)
 BOX_WRITERS: Final = _writers(_box_table, _box_glstat, _box_matsum)

@@ -21,13 +21,21 @@ SHARE: Final = kind_of("number", minimum=0, maximum=1)
 BASIS: Final = one_of(*MODELS)
 KIND: Final = one_of("crossing", "start", "extremum", "match")
 
-WARNING: Final = row(Field("code", kind_of("text", pattern="^[a-z0-9-]+$")), Field("message", "text"), name="warning")
+WARNING: Final = row(
+    Field("code", kind_of("text", pattern="^[a-z0-9-]+$")),
+    Field("message", "text"),
+    name="warning",
+)
 WARNINGS: Final = Field("warnings", many(WARNING), get=lambda answer: answer.cautions)
 PART: Final = row(Field("id", "integer"), Field("title", "text"), name="part")
 TIMES: Final = row(Field("tr", "number"), Field("td", "number"))
-PAIR: Final = row(Field("td", "number"), Field("tr", "number"), Field("residual", "size?"))
+PAIR: Final = row(
+    Field("td", "number"), Field("tr", "number"), Field("residual", "size?")
+)
 WINDOW: Final = row(
-    Field("start", "number"), Field("end", "number"), Field("share", "number", "of the flight up to td")
+    Field("start", "number"),
+    Field("end", "number"),
+    Field("share", "number", "of the flight up to td"),
 )
 
 
@@ -49,7 +57,11 @@ def _once(files: Iterable[Read]) -> dict[str, Read]:
 
 FILES: Final = (
     Field("source", "texts", get=lambda read: _once(read.files)),
-    Field("sha256", "texts", get=lambda read: [file.sha256() for file in _once(read.files).values()]),
+    Field(
+        "sha256",
+        "texts",
+        get=lambda read: [file.sha256() for file in _once(read.files).values()],
+    ),
 )
 WEIGHTS: Final = (
     Field("source", "text", "where they come from, in words"),
@@ -75,7 +87,9 @@ HISTORY: Final = row(
 
 def _asked(answer: Any) -> Plan | Situation:
     """Give what knows the history of an answer, and the settings."""
-    known: Plan | Situation = answer if hasattr(answer, "settings") else answer.situation
+    known: Plan | Situation = (
+        answer if hasattr(answer, "settings") else answer.situation
+    )
     return known
 
 
@@ -97,14 +111,28 @@ FRAME: Final = (
 )  # fmt: skip
 
 _SOURCE: Final = one_of(
-    "given", "momentum", "contact-force", "contact-energy", "energy-balance", "oscillator", "energy"
+    "given",
+    "momentum",
+    "contact-force",
+    "contact-energy",
+    "energy-balance",
+    "oscillator",
+    "energy",
 )
 FLIGHT: Final = row(
     Field("start", "number?"),
     Field("end", "number?", "next contact, null when none was seen"),
     Field("source", maybe(_SOURCE)),
-    Field("certain", "flag", "false where the level of the energy alone shows it, or nothing"),
-    Field("parts", maybe(many(PART)), "seen to fly together, null for the whole model or where momentum did not tell"),
+    Field(
+        "certain",
+        "flag",
+        "false where the level of the energy alone shows it, or nothing",
+    ),
+    Field(
+        "parts",
+        maybe(many(PART)),
+        "seen to fly together, null for the whole model or where momentum did not tell",
+    ),
     name="flight",
 )
 
@@ -192,11 +220,24 @@ CANDIDATE: Final = row(
     Field("acceptable", "flag"),
     Field("recommended", "flag"),
     Field("notes", "texts"),
-    Field("run_time_share", "size?", "expected run time over that of the reference, with --cost-share"),
-    Field("same_swing", "flag", "the energy turns less than twice from tr to td: hardly anything is saved"),
+    Field(
+        "run_time_share",
+        "size?",
+        "expected run time over that of the reference, with --cost-share",
+    ),
+    Field(
+        "same_swing",
+        "flag",
+        "the energy turns less than twice from tr to td: hardly anything is saved",
+    ),
     Field("residual_high", "size?", "the highest residual that the record allows"),
     *_POSITION,
-    Field("residual_low", "size?", "the lowest residual that the record allows", later=True),
+    Field(
+        "residual_low",
+        "size?",
+        "the lowest residual that the record allows",
+        later=True,
+    ),
 )
 # What tells a tr and does not measure the pair; and the measures that ``verify`` shows first, in their order there.
 _OF_TR: Final = (
@@ -213,11 +254,25 @@ _FIRST: Final = (
         "residual_high",
         "residual_low",
     ),
-    *("part_mismatch", "timing_tolerance", "rigid_time", "rigid_fraction", "run_time_share"),
+    *(
+        "part_mismatch",
+        "timing_tolerance",
+        "rigid_time",
+        "rigid_fraction",
+        "run_time_share",
+    ),
 )
-MEASURES: Final = (*_FIRST, *(key for key in CANDIDATE.keys if key not in (*_OF_TR, *_FIRST)))
+MEASURES: Final = (
+    *_FIRST,
+    *(key for key in CANDIDATE.keys if key not in (*_OF_TR, *_FIRST)),
+)
 # Keys that came later than the schemas of ``suggest`` and ``verify``, but not than others.
-LATER: Final = ("run_time_share", "same_swing", "residual_high", *(field.key for field in _POSITION))
+LATER: Final = (
+    "run_time_share",
+    "same_swing",
+    "residual_high",
+    *(field.key for field in _POSITION),
+)
 
 MATCHES: Final = Field("parts", many(row(
     Field("name", "text"),

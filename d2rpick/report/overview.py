@@ -14,7 +14,14 @@ if TYPE_CHECKING:
     from d2rpick.flight.window import FreeFlight
     from d2rpick.report.formats import Shown
 
-_EVIDENCE: Final = one_of("momentum", "contact-force", "contact-energy", "energy-balance", "oscillator", "energy")
+_EVIDENCE: Final = one_of(
+    "momentum",
+    "contact-force",
+    "contact-energy",
+    "energy-balance",
+    "oscillator",
+    "energy",
+)
 _FLIGHT: Final = row(
     Field("start", "number", get=lambda seen: seen[1].start),
     Field("end", "number?", "null where the record ends in flight",
@@ -24,17 +31,27 @@ _FLIGHT: Final = row(
     Field("source", _EVIDENCE, get=lambda seen: seen[0]),
 )  # fmt: skip
 _TIMES: Final = row(
-    Field("start", "number", get=lambda times: times[0]), Field("end", "number", get=lambda times: times[1])
+    Field("start", "number", get=lambda times: times[0]),
+    Field("end", "number", get=lambda times: times[1]),
 )
 _FORCE: Final = row(
-    Field("name", "text", "of a contact, an interface or a rigid wall, or of a column of forces"),
+    Field(
+        "name",
+        "text",
+        "of a contact, an interface or a rigid wall, or of a column of forces",
+    ),
     Field("acts", many(_TIMES), "times in which it acts, to one output interval"),
 )
 _PART: Final = row(
     *keys.PART.of_part(lambda one: one.part),
     Field("energy_max", "number?", "null where not written in every state"),
 )
-_SAMPLING: Final = row(*(Field(key, kind_of("number", exclusiveMinimum=0)) for key in ("min", "median", "max")))
+_SAMPLING: Final = row(
+    *(
+        Field(key, kind_of("number", exclusiveMinimum=0))
+        for key in ("min", "median", "max")
+    )
+)
 DOCUMENT: Final = Document("d2rpick/info/1", "Answer of d2rpick info; times in the unit of the history.", row(
     keys.WARNINGS,
     Field("source", kind_of("texts", minItems=1)),
@@ -60,7 +77,16 @@ DOCUMENT: Final = Document("d2rpick/info/1", "Answer of d2rpick info; times in t
 _MOST_TIMES: Final = 4  # that are named of a contact which acts at many
 _PARTS_HEAD = ("part", "title", "highest internal energy")
 # Keys of the JSON output with a single value.
-_PLAIN = ("format", "version", "title", "states", "time_start", "time_end", "time_unit", "complete")
+_PLAIN = (
+    "format",
+    "version",
+    "title",
+    "states",
+    "time_start",
+    "time_end",
+    "time_unit",
+    "complete",
+)
 
 
 def as_table(overview: Overview, shown: Shown) -> str:
@@ -76,10 +102,23 @@ def as_table(overview: Overview, shown: Shown) -> str:
 def as_markdown(overview: Overview, _: Shown) -> str:
     """The facts as a Markdown table of two columns, another one of the parts, and the notes below."""
     told = tables.as_markdown(("what", "value"), facts(overview))
-    parts = [tables.as_markdown(_PARTS_HEAD, _parts(overview))] if overview.parts else []
+    parts = (
+        [tables.as_markdown(_PARTS_HEAD, _parts(overview))] if overview.parts else []
+    )
     listed = _health(overview)
-    health = [tables.as_markdown(head(overview.health), listed)] if overview.health and listed else []
-    return "\n\n".join([told, *parts, *health, *(f"* {tables.in_markdown(note)}" for note in overview.notes)])
+    health = (
+        [tables.as_markdown(head(overview.health), listed)]
+        if overview.health and listed
+        else []
+    )
+    return "\n\n".join(
+        [
+            told,
+            *parts,
+            *health,
+            *(f"* {tables.in_markdown(note)}" for note in overview.notes),
+        ]
+    )
 
 
 def as_csv(overview: Overview, _: Shown) -> str:
@@ -88,9 +127,14 @@ def as_csv(overview: Overview, _: Shown) -> str:
     row: dict[str, tables.Cell] = {
         "source": "; ".join(overview.source),
         **{name: getattr(overview, name) for name in _PLAIN},
-        **{f"sampling_{name}": getattr(sampling, name) if sampling else None for name in ("min", "median", "max")},
+        **{
+            f"sampling_{name}": getattr(sampling, name) if sampling else None
+            for name in ("min", "median", "max")
+        },
         "channels": "; ".join(overview.channels),
-        "parts": "; ".join(f"{one.part.id} {one.part.title}".rstrip() for one in overview.parts),
+        "parts": "; ".join(
+            f"{one.part.id} {one.part.title}".rstrip() for one in overview.parts
+        ),
         "flights": "; ".join(_flight(*flight) for flight in overview.flights),
         "should_write": overview.should_write,
         "health": "; ".join(f"{what} {value}" for what, value, *_ in _health(overview)),
@@ -130,7 +174,11 @@ def _health(overview: Overview) -> list[list[tables.Cell]]:
     if overview.health is None:
         return []
     verdicts = {True: "kept", False: "exceeded", None: None}
-    return [[one.what, one.value, one.limit, verdicts[one.good]] for one in measures_of(overview.health) if one.value]
+    return [
+        [one.what, one.value, one.limit, verdicts[one.good]]
+        for one in measures_of(overview.health)
+        if one.value
+    ]
 
 
 def _parts(overview: Overview) -> list[list[tables.Cell]]:
@@ -147,5 +195,9 @@ def _force(force: ForceOverview) -> str:
 def _flight(source: str, flight: FreeFlight) -> str:
     names = [part.name if part.title else str(part.id) for part in flight.parts or ()]
     who = ", ".join(names) or "the whole model"
-    end = f"to {flight.end:.6g}" if flight.end_seen else f"to the end of the record, {flight.end:.6g}"
+    end = (
+        f"to {flight.end:.6g}"
+        if flight.end_seen
+        else f"to the end of the record, {flight.end:.6g}"
+    )
     return f"{who} from {flight.start:.6g} {end} ({spoken(source)})"

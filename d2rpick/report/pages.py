@@ -6,9 +6,29 @@ from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import if_written
 from d2rpick.choice.study import Study, runs_of
-from d2rpick.report import drive, overview, page, parts, plan, study, suggestion, trade_off, verdict
+from d2rpick.report import (
+    drive,
+    overview,
+    page,
+    parts,
+    plan,
+    study,
+    suggestion,
+    trade_off,
+    verdict,
+)
 from d2rpick.report.explorer import explorer, scripts, styles
-from d2rpick.report.page import Explorer, Markup, document, grid, pairs, remarks, section, table, tag
+from d2rpick.report.page import (
+    Explorer,
+    Markup,
+    document,
+    grid,
+    pairs,
+    remarks,
+    section,
+    table,
+    tag,
+)
 from d2rpick.report.situation import what_was_read
 from d2rpick.report.tables import Cell, known, measure, short, unstarred
 
@@ -36,7 +56,12 @@ _TOLD = ("quality", "keeps", "saves")
 def _of_run(record: page.PageContext, *sections: Markup) -> str:
     """Write a page about one run; where something can be explored it runs a script."""
     needed = {"styles": styles(), "scripts": scripts()} if record.explorer else {}
-    return document(f"Switch times: {page.title_of(record.run)}", *sections, signed=page.SIGNED, **needed)
+    return document(
+        f"Switch times: {page.title_of(record.run)}",
+        *sections,
+        signed=page.SIGNED,
+        **needed,
+    )
 
 
 def _figures(prefix: str, caption: str, kind: str, *asked: Any, **how: Any) -> Markup:
@@ -48,8 +73,16 @@ def _figures(prefix: str, caption: str, kind: str, *asked: Any, **how: Any) -> M
 
 
 def _draw_suggestion(answer: Suggestion) -> Markup:
-    shown = "the choice, and a better pair" if answer.clearly_better else "and the choice"
-    return _figures("choice-", f"Internal energy with its level at td, {shown}", "suggestion", answer, page=True)
+    shown = (
+        "the choice, and a better pair" if answer.clearly_better else "and the choice"
+    )
+    return _figures(
+        "choice-",
+        f"Internal energy with its level at td, {shown}",
+        "suggestion",
+        answer,
+        page=True,
+    )
 
 
 def _starred(title: str, head: Sequence[str], rows: Sequence[Sequence[Cell]]) -> Markup:
@@ -76,9 +109,18 @@ def _choice(answer: Suggestion) -> Markup:
     """Give the section above the figures: the pairs, large, and what to know of them."""
     cards, better = [_recommended(answer)], answer.clearly_better
     if better:
-        told, times = tag("p", suggestion.better_about(answer, better)), (better.tr, better.td)
-        cards.append(page.pair("Better pair: another td", times, told, answer.situation.history, "card"))
-    return page.front(cards, remarks(answer.cautions), pairs(suggestion.outlook(answer)))
+        told, times = (
+            tag("p", suggestion.better_about(answer, better)),
+            (better.tr, better.td),
+        )
+        cards.append(
+            page.pair(
+                "Better pair: another td", times, told, answer.situation.history, "card"
+            )
+        )
+    return page.front(
+        cards, remarks(answer.cautions), pairs(suggestion.outlook(answer))
+    )
 
 
 def _recommended(answer: Suggestion) -> Markup:
@@ -86,7 +128,16 @@ def _recommended(answer: Suggestion) -> Markup:
     if pair is None or quality is None:
         return page.refused("No tr can be recommended for this td.")
     wrong = [("residual", measure(pair.residual))] if pair.residual is not None else []
-    told = pairs([*((name, text) for name, text in suggestion.verdict(answer) if name in _TOLD), *wrong])
+    told = pairs(
+        [
+            *(
+                (name, text)
+                for name, text in suggestion.verdict(answer)
+                if name in _TOLD
+            ),
+            *wrong,
+        ]
+    )
     title = suggestion.headline(answer).capitalize()
     class_ = "card refused" if quality.grade == "poor" else "card chosen"
     return page.pair(title, (pair.tr, pair.td), told, answer.situation.history, class_)
@@ -111,7 +162,11 @@ def _of_verdict(answer: Verdict, record: page.PageContext) -> Iterator[Markup]:
     times = candidate.tr, situation.td
     poor = answer.quality is not None and answer.quality.grade == "poor"
     off = candidate.residual
-    left_over = "judged by its energy level alone" if off is None else f"residual {measure(off)}"
+    left_over = (
+        "judged by its energy level alone"
+        if off is None
+        else f"residual {measure(off)}"
+    )
     card = page.pair(
         f"{answer.word.capitalize()}{', but of poor quality' * poor}",
         times,
@@ -124,10 +179,15 @@ def _of_verdict(answer: Verdict, record: page.PageContext) -> Iterator[Markup]:
     caption = "Internal energy with its level at td, and the pair"
     yield _figures("pair-", caption, "verdict", answer, page=True)
     measures = _told(verdict.MEASURES.plain(answer).items())
-    yield section("Measures", pairs((name.replace("_", " "), short(value)) for name, value in measures))
+    yield section(
+        "Measures",
+        pairs((name.replace("_", " "), short(value)) for name, value in measures),
+    )
     yield page.parts(candidate)
     if answer.switched:
-        yield _switched(answer.switched, record.switched.files if record.switched else ())
+        yield _switched(
+            answer.switched, record.switched.files if record.switched else ()
+        )
     yield from page.evidence(situation, answer.health, record)
     if answer.verified:
         yield page.solver_input(times, record)
@@ -136,9 +196,17 @@ def _of_verdict(answer: Verdict, record: page.PageContext) -> Iterator[Markup]:
 def _switched(found: Comparison, files: Iterable[Source]) -> Markup:
     """Show what the finished switched run has of the reference."""
     title = "The switched run"
-    listed = [("compared", f"from td to {found.end:.6g}"), *verdict.deviations(found), *page.digests(files)]
+    listed = [
+        ("compared", f"from td to {found.end:.6g}"),
+        *verdict.deviations(found),
+        *page.digests(files),
+    ]
     listed += [("note", note) for note in found.notes]
-    return section(title, table(title, ("quantity", *verdict.COMPARED[1:]), verdict.comparison(found)), pairs(listed))
+    return section(
+        title,
+        table(title, ("quantity", *verdict.COMPARED[1:]), verdict.comparison(found)),
+        pairs(listed),
+    )
 
 
 def trade_off_page(found: TradeOff, record: page.PageContext) -> str:
@@ -146,7 +214,11 @@ def trade_off_page(found: TradeOff, record: page.PageContext) -> str:
     further = [one for one in found.cautions if one not in found.suggestion.cautions]
     caption = "Error and rigid time of the best pair for each td"
     best = trade_off.some_of(found, _MOST_ROWS)
-    left = tag("p", f"{len(found.offers) - len(best)} more td in the csv and json results.", class_="soft")
+    left = tag(
+        "p",
+        f"{len(found.offers) - len(best)} more td in the csv and json results.",
+        class_="soft",
+    )
     return _of_run(
         record,
         _choice(found.suggestion),
@@ -154,12 +226,22 @@ def trade_off_page(found: TradeOff, record: page.PageContext) -> str:
         explorer(record.explorer),
         _draw_suggestion(found.suggestion),
         _figures("explore-", caption, "trade_off", found, page=True),
-        section("Pairs that nothing beats", _starred("Pairs", *known(*trade_off.table(best))), left),
+        section(
+            "Pairs that nothing beats",
+            _starred("Pairs", *known(*trade_off.table(best))),
+            left,
+        ),
         *_below_figures(found.suggestion, record),
     )
 
 
-def plan_page(found: Plan, run: Run, command: Sequence[str], card: str | None, explored: Explorer | None = None) -> str:
+def plan_page(
+    found: Plan,
+    run: Run,
+    command: Sequence[str],
+    card: str | None,
+    explored: Explorer | None = None,
+) -> str:
     """Write the page of ``plan``.
 
     Parameters
@@ -181,12 +263,25 @@ def plan_page(found: Plan, run: Run, command: Sequence[str], card: str | None, e
     notes = [("note", note) for note in found.history.notes]
     return _of_run(
         page.PageContext(run, command, (), explorer=explored),
-        page.front(cards, remarks(found.cautions), pairs([("plan", plan.sentence(found)), *plan.outlook(found)])),
+        page.front(
+            cards,
+            remarks(found.cautions),
+            pairs([("plan", plan.sentence(found)), *plan.outlook(found)]),
+        ),
         explorer(explored),
         _figures("plan-", caption, "plan", found, page=True),
-        section("Flights", table("Flights", *unstarred(*plan.table(found))), pairs(plan.reasons(found))),
-        section("For the solver's input", tag("pre", card, tabindex="0")) if card else Markup(),
-        section("What was read", pairs([("history", what_was_read(found.history)), *files, *notes])),
+        section(
+            "Flights",
+            table("Flights", *unstarred(*plan.table(found))),
+            pairs(plan.reasons(found)),
+        ),
+        section("For the solver's input", tag("pre", card, tabindex="0"))
+        if card
+        else Markup(),
+        section(
+            "What was read",
+            pairs([("history", what_was_read(found.history)), *files, *notes]),
+        ),
         *page.method(command),
     )
 
@@ -195,19 +290,34 @@ def _window(row: Planned, found: Plan) -> Markup:
     assert row.window is not None
     assert row.quality is not None
     saves = page.rigid_for(row.window, found.history)
-    told = pairs([("saves", saves), ("quality", row.quality.told), ("error", plan.error(row) or "-")])
-    return page.pair(f"Flight {row.number}", row.window, told, found.history, "card chosen")
+    told = pairs(
+        [
+            ("saves", saves),
+            ("quality", row.quality.told),
+            ("error", plan.error(row) or "-"),
+        ]
+    )
+    return page.pair(
+        f"Flight {row.number}", row.window, told, found.history, "card chosen"
+    )
 
 
 def study_page(answer: Study, command: Sequence[str]) -> str:
     """Write the page of ``study``; ``command`` are the arguments that repeat it."""
-    caption = "Internal energies of all runs, with the tr of each, the common one and td"
+    caption = (
+        "Internal energies of all runs, with the tr of each, the common one and td"
+    )
     head, rows = study.table(answer)
     return document(
         f"Switch times of {runs_of(len(answer.runs))}",
-        page.front([_common(answer)], remarks(answer.cautions), pairs(study.outcome(answer))),
+        page.front(
+            [_common(answer)], remarks(answer.cautions), pairs(study.outcome(answer))
+        ),
         _figures("runs-", caption, "study", answer, page=True),
-        section("Runs", table("Runs", *known([name.replace("+-", "±") for name in head], rows))),
+        section(
+            "Runs",
+            table("Runs", *known([name.replace("+-", "±") for name in head], rows)),
+        ),
         section("Files", tag("pre", _files(answer), class_="wrap")),
         *page.method(command),
         signed=page.CHECKED,
@@ -217,11 +327,22 @@ def study_page(answer: Study, command: Sequence[str]) -> str:
 def _common(answer: Study) -> Markup:
     tr, title = answer.common.tr, tag("h2", "One tr for all runs")
     if tr is None:
-        return tag("div", title, tag("p", "None: ", answer.common.reason or ""), class_="card")
-    times = (tag("span", tag("i", name), text) for name, text in (("tr", f"{tr:.6g}"), ("td", study.td_of(answer))))
-    exact = f"in full: tr = {tr!r}" + ("" if answer.td is None else f", td = {answer.td!r}")
+        return tag(
+            "div", title, tag("p", "None: ", answer.common.reason or ""), class_="card"
+        )
+    times = (
+        tag("span", tag("i", name), text)
+        for name, text in (("tr", f"{tr:.6g}"), ("td", study.td_of(answer)))
+    )
+    exact = f"in full: tr = {tr!r}" + (
+        "" if answer.td is None else f", td = {answer.td!r}"
+    )
     rule = "Acceptable by the rules of d2rpick verify in every run that was judged."
-    lines = (tag("div", *times, class_="times"), tag("p", rule), tag("p", exact, class_="soft"))
+    lines = (
+        tag("div", *times, class_="times"),
+        tag("p", rule),
+        tag("p", exact, class_="soft"),
+    )
     return tag("div", title, *lines, class_="card chosen")
 
 
@@ -238,17 +359,38 @@ def _files(answer: Study) -> str:
 
 def parts_page(found: Parts, command: Sequence[str]) -> str:
     """Write the page of ``parts``; ``command`` are the arguments that repeat the answer."""
-    sets = [section("Sets", _starred("Sets", *parts.set_table(found, parts.SETS)))] if found.sets else []
-    tables = {name: unstarred(*parts.table(found, columns)) for name, columns in parts.TABLES.items()}
+    sets = (
+        [section("Sets", _starred("Sets", *parts.set_table(found, parts.SETS)))]
+        if found.sets
+        else []
+    )
+    tables = {
+        name: unstarred(*parts.table(found, columns))
+        for name, columns in parts.TABLES.items()
+    }
     weights = [("weights", found.weights.source)] if found.weights else []
-    deck = page.deck_digests(found.inventory.files, found.weights) if found.inventory else []
+    deck = (
+        page.deck_digests(found.inventory.files, found.weights)
+        if found.inventory
+        else []
+    )
     return document(
         f"Parts to switch: {page.title_of(found.files)}",
         page.front([_set(found.recommended)], remarks(found.cautions)),
         *sets,
         *(section(name, table(name, *cells)) for name, cells in tables.items()),
         section("What it means", pairs(parts.outlook(found))),
-        section("What was read", pairs([*parts.heading(found), *weights, *page.digests(found.files.files), *deck])),
+        section(
+            "What was read",
+            pairs(
+                [
+                    *parts.heading(found),
+                    *weights,
+                    *page.digests(found.files.files),
+                    *deck,
+                ]
+            ),
+        ),
         page.repeated(command),
         signed=page.SIGNED,
     )
@@ -257,9 +399,20 @@ def parts_page(found: Parts, command: Sequence[str]) -> str:
 def _set(best: PartSet | None) -> Markup:
     if best is None:
         return page.refused("No set of parts can be recommended.")
-    saved = tag("span", tag("i", "saves about"), f"{best.saving:.0%}", tag("i", " of the run time"))
+    saved = tag(
+        "span",
+        tag("i", "saves about"),
+        f"{best.saving:.0%}",
+        tag("i", " of the run time"),
+    )
     listed = tag("p", f"parts {parts.ranges(best.parts)}")
-    return tag("div", tag("h2", best.name), tag("div", saved, class_="times"), listed, class_="card chosen")
+    return tag(
+        "div",
+        tag("h2", best.name),
+        tag("div", saved, class_="times"),
+        listed,
+        class_="card chosen",
+    )
 
 
 def drive_page(found: Driven, command: Sequence[str]) -> str:
@@ -268,14 +421,28 @@ def drive_page(found: Driven, command: Sequence[str]) -> str:
 
     history = found.run.history(Selection(parts=tuple(map(str, found.deck.parts))))
     switched = [one for one in found.windows if not one.reason]
-    contacts = ("none to the end" if one.contact is None else f"{one.contact:.6g}" for one in switched)
+    contacts = (
+        "none to the end" if one.contact is None else f"{one.contact:.6g}"
+        for one in switched
+    )
     cards = [
-        page.pair(f"Window {number}", (one.tr, one.td), pairs([("contact", text)]), history, "card chosen")
-        for number, (one, text) in enumerate(zip(switched, contacts, strict=True), start=1)
+        page.pair(
+            f"Window {number}",
+            (one.tr, one.td),
+            pairs([("contact", text)]),
+            history,
+            "card chosen",
+        )
+        for number, (one, text) in enumerate(
+            zip(switched, contacts, strict=True), start=1
+        )
     ]
     cards = cards or [tag("p", "No flight was switched.")]
     caption = "Internal energy in the deformable legs, with the rigid windows; rigid legs have none that is believed"
-    flights, rigid = [(one.free, one.contact or one.td) for one in switched], [(one.tr, one.td) for one in switched]
+    flights, rigid = (
+        [(one.free, one.contact or one.td) for one in switched],
+        [(one.tr, one.td) for one in switched],
+    )
     return document(
         f"First run: {found.deck.name}",
         page.front(cards, remarks(found.cautions), pairs(drive.outlook(found))),
@@ -292,14 +459,19 @@ def drive_page(found: Driven, command: Sequence[str]) -> str:
 _FEW_ROWS: Final = 12
 _WIDEST: Final = "max-width: 40em"  # a picture without a width is as wide as the screen
 # What is said, the shortest first, and the head and rows of the table.
-_LOOKS: Final[Mapping[str, tuple[Callable[[Any], list[tuple[str, str]]], Callable[[Any], Any]]]] = {
+_LOOKS: Final[
+    Mapping[str, tuple[Callable[[Any], list[tuple[str, str]]], Callable[[Any], Any]]]
+] = {
     "overview": (
         lambda seen: [("run", ", ".join(seen.source))],
         lambda seen: (("", ""), _told(overview.facts(seen)[1:])),
     ),
     "suggestion": (suggestion.verdict, lambda one: suggestion.table(one, _FEW_ROWS)),
     "verdict": (
-        lambda one: [("", verdict.told(one)), *(("but", reason) for reason in one.reasons)],
+        lambda one: [
+            ("", verdict.told(one)),
+            *(("but", reason) for reason in one.reasons),
+        ],
         lambda one: (("measure", "value"), _told(verdict.MEASURES.plain(one).items())),
     ),
     "trade_off": (
@@ -307,7 +479,10 @@ _LOOKS: Final[Mapping[str, tuple[Callable[[Any], list[tuple[str, str]]], Callabl
         lambda one: trade_off.table(trade_off.some_of(one, _FEW_ROWS)),
     ),
     "plan": (lambda one: [("", plan.sentence(one)), *plan.outlook(one)], plan.table),
-    "parts": (parts.outlook, lambda one: parts.table(one, next(iter(parts.TABLES.values())))),
+    "parts": (
+        parts.outlook,
+        lambda one: parts.table(one, next(iter(parts.TABLES.values()))),
+    ),
     "study": (lambda one: study.outcome(one)[::-1], study.table),
 }
 
@@ -323,7 +498,10 @@ def of_run(run: Run) -> str:
     time = if_written(lambda: first.time if first.channels else first.part_time)
     told = [" + ".join(one.format for one in run.databases)]
     if time is not None and time.size:
-        told += [f"{time.size} states", f"{time[0]:.6g} to {time[-1]:.6g} {first.time_unit}".rstrip()]
+        told += [
+            f"{time.size} states",
+            f"{time[0]:.6g} to {time[-1]:.6g} {first.time_unit}".rstrip(),
+        ]
     told += [f"{len(run.parts)} part{'s' * (len(run.parts) > 1)}"] if run.parts else []
     return f"{', '.join(map(repr, run.sources))}: {', '.join(told)}"
 
@@ -334,7 +512,11 @@ def glance(kind: str, answer: Any, figure: Figure | None) -> str:
     lines = [tag("div", tag("b", name), f" {text}") for name, text in said(answer)]
     head, rows = table(answer)
     lines += [grid(*known(head, rows[:_FEW_ROWS]))] if rows else []
-    lines += [tag("div", f"... and {len(rows) - _FEW_ROWS} more")] if len(rows) > _FEW_ROWS else []
+    lines += (
+        [tag("div", f"... and {len(rows) - _FEW_ROWS} more")]
+        if len(rows) > _FEW_ROWS
+        else []
+    )
     return tag("div", *lines, *([_picture(figure)] if figure else []))
 
 

@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import in_rows, listing, printable
 from d2rpick.report import keys, tables
-from d2rpick.report.fields import Document, Field, csv_of, each, many, maybe, one_of, row
+from d2rpick.report.fields import (
+    Document,
+    Field,
+    csv_of,
+    each,
+    many,
+    maybe,
+    one_of,
+    row,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -17,19 +26,64 @@ if TYPE_CHECKING:
     from d2rpick.report.formats import Shown
 
 # Columns of the sets, and of the parts in two tables: as many as a screen and a sheet hold side by side.
-SETS = ("set", "parts", "saved of a step", "tr", "td", "run time", "saved", "out of place", "turned [deg]")
+SETS = (
+    "set",
+    "parts",
+    "saved of a step",
+    "tr",
+    "td",
+    "run time",
+    "saved",
+    "out of place",
+    "turned [deg]",
+)
 TABLES = {
-    "Parts": ("part", "title", "verdict", "flies", "deforms", "energy", "scatter", "why"),
-    "Elements": ("part", "title", "elements", "formulation", "material", "mass", "cost", "step", "shares nodes with"),
+    "Parts": (
+        "part",
+        "title",
+        "verdict",
+        "flies",
+        "deforms",
+        "energy",
+        "scatter",
+        "why",
+    ),
+    "Elements": (
+        "part",
+        "title",
+        "elements",
+        "formulation",
+        "material",
+        "mass",
+        "cost",
+        "step",
+        "shares nodes with",
+    ),
 }
 
 _COUNTS: Final = maybe(each("integer"))
 _IN_FLIGHT: Final = row(
-    Field("energy", "number?", "mean internal energy in the flight", lambda one: one.mean),
-    Field("energy_change", "number?", "at its end less at its start", lambda one: one.change),
-    Field("energy_scatter", "number?", "standard deviation over mean", lambda one: one.scatter),
+    Field(
+        "energy", "number?", "mean internal energy in the flight", lambda one: one.mean
+    ),
+    Field(
+        "energy_change",
+        "number?",
+        "at its end less at its start",
+        lambda one: one.change,
+    ),
+    Field(
+        "energy_scatter",
+        "number?",
+        "standard deviation over mean",
+        lambda one: one.scatter,
+    ),
     Field("flies", "flag?", "whether the part flies with the rest"),
-    Field("deforms", "flag?", "whether its energy still scatters by a tenth of its mean or more"),
+    Field(
+        "deforms",
+        "flag?",
+        "whether its energy still scatters by a tenth of its mean or more",
+    ),
 )
 # What it does in flight is that of the longest.
 PART: Final = row(
@@ -37,14 +91,21 @@ PART: Final = row(
     Field("elements", _COUNTS, "numbers by kind; null without a deck"),
     Field("formulations", "texts"),
     Field("material", "text?"),
-    Field("kind", maybe(one_of("deformable", "rigid", "spring", "airbag", "void", "particles"))),
+    Field(
+        "kind",
+        maybe(one_of("deformable", "rigid", "spring", "airbag", "void", "particles")),
+    ),
     Field("mass", "number?"),
     Field("mass_source", maybe(one_of("history", "deck"))),
     *_IN_FLIGHT.of_part(lambda part: part.flight),
     Field("cost_share", "number?", "share of its elements in the cost of all elements"),
     Field("smallest_step", "number?", "smallest stable time step"),
     Field("step_source", maybe(one_of("deck", "glstat", "d3hsp"))),
-    Field("shares_nodes", maybe(many("integer")), "parts that share nodes with it; null without a deck"),
+    Field(
+        "shares_nodes",
+        maybe(many("integer")),
+        "parts that share nodes with it; null without a deck",
+    ),
     Field("verdict", one_of("switch", "merge", "keep", "unknown")),
     Field("merge_with", "integer?"),
     Field("reasons", "texts"),
@@ -89,26 +150,42 @@ SET: Final = row(
 _HISTORY: Final = row(
     Field("source", "texts", get=lambda run: run.sources),
     Field("sha256", "texts", get=lambda run: [file.sha256() for file in run.files]),
-    Field("format", "text", get=lambda run: " + ".join(one.format for one in run.databases)),
+    Field(
+        "format",
+        "text",
+        get=lambda run: " + ".join(one.format for one in run.databases),
+    ),
     Field("notes", "texts"),
 )
 _DECK: Final = row(
     *keys.FILES,
     Field("solver", one_of("ls-dyna", "radioss")),
     Field("parts", "integer", get=lambda deck: len(deck.parts)),
-    Field("elements", "integer", get=lambda deck: sum(sum(counts.values()) for counts in deck.counts.values())),
+    Field(
+        "elements",
+        "integer",
+        get=lambda deck: sum(sum(counts.values()) for counts in deck.counts.values()),
+    ),
     Field("complete", "flag"),
     Field("notes", "texts"),
 )
 _WEIGHTS: Final = row(
-    *keys.WEIGHTS, Field("element_share", "number"), Field("rigid_node", "number"), Field("per_element", each("number"))
+    *keys.WEIGHTS,
+    Field("element_share", "number"),
+    Field("rigid_node", "number"),
+    Field("per_element", each("number")),
 )
-_FLIGHT: Final = row(Field("start", "number"), Field("end", "number"), Field("longest", "flag"))
+_FLIGHT: Final = row(
+    Field("start", "number"), Field("end", "number"), Field("longest", "flag")
+)
 
 
 def _flights(found: Parts) -> list[dict[str, Any]]:
     facts = found.facts
-    return [{"start": one[0], "end": one[1], "longest": at == facts.longest} for at, one in enumerate(facts.flights)]
+    return [
+        {"start": one[0], "end": one[1], "longest": at == facts.longest}
+        for at, one in enumerate(facts.flights)
+    ]
 
 
 DOCUMENT: Final = Document(
@@ -121,9 +198,16 @@ DOCUMENT: Final = Document(
         Field("weights", maybe(_WEIGHTS)),
         Field("step_ratio", "number", get=lambda found: found.settings.step_ratio),
         Field("flights", many(_FLIGHT), get=_flights),
-        Field("parts", many(row(*PART.fields, Field("flights", many(_IN_FLIGHT)))), get=lambda found: found.rows),
+        Field(
+            "parts",
+            many(row(*PART.fields, Field("flights", many(_IN_FLIGHT)))),
+            get=lambda found: found.rows,
+        ),
         Field("sets", many(SET)),
-        Field("recommended", maybe(row(Field("name", "text"), Field("parts", many("integer"))))),
+        Field(
+            "recommended",
+            maybe(row(Field("name", "text"), Field("parts", many("integer")))),
+        ),
     ),
     closed=True,
 )
@@ -147,7 +231,9 @@ def as_table(found: Parts, shown: Shown) -> str:
 def as_markdown(found: Parts, _: Shown) -> str:
     """The parts and the sets as Markdown tables, and below them the set to take."""
     sets = [tables.as_markdown(*set_table(found))] if found.sets else []
-    return "\n\n".join([tables.as_markdown(*table(found)), *sets, *tables.listed(outlook(found))])
+    return "\n\n".join(
+        [tables.as_markdown(*table(found)), *sets, *tables.listed(outlook(found))]
+    )
 
 
 def as_csv(found: Parts, _: Shown) -> str:
@@ -164,30 +250,53 @@ def heading(found: Parts) -> list[tuple[str, str]]:
     """What was read, by names."""
     run, deck = found.files, found.inventory
     formats = " + ".join(one.format for one in run.databases)
-    lines = [("history", f"{', '.join(run.sources)}: {formats}, {_number(len(run.parts), 'part')}")]
+    lines = [
+        (
+            "history",
+            f"{', '.join(run.sources)}: {formats}, {_number(len(run.parts), 'part')}",
+        )
+    ]
     if deck is None:
         lines.append(("deck", "none"))
     else:
         number = sum(sum(counts.values()) for counts in deck.counts.values())
-        lines.append(("deck", f"{deck.solver}, {_number(len(deck.parts), 'part')}, {_number(number, 'element')}"))
+        lines.append(
+            (
+                "deck",
+                f"{deck.solver}, {_number(len(deck.parts), 'part')}, {_number(number, 'element')}",
+            )
+        )
     longest = found.facts.longest
     if longest is not None:
         start, end = found.facts.flights[longest]
-        lines.append(("flight", f"{start:.6g} to {end:.6g}, the longest of {len(found.facts.flights)}"))
+        lines.append(
+            (
+                "flight",
+                f"{start:.6g} to {end:.6g}, the longest of {len(found.facts.flights)}",
+            )
+        )
     return [(name, printable(text)) for name, text in lines]
 
 
-def table(found: Parts, names: Iterable[str] = ()) -> tuple[list[str], list[list[tables.Cell]]]:
+def table(
+    found: Parts, names: Iterable[str] = ()
+) -> tuple[list[str], list[list[tables.Cell]]]:
     """Give names and cells of all columns of the parts, or of some; the parts of the recommended set have a star."""
     best = set(found.recommended.parts) if found.recommended else set()
     columns = {name: COLUMNS[name] for name in names or COLUMNS}
-    return tables.filled({"": lambda row: "*" if row.id in best else " ", **columns}, found.rows)
+    return tables.filled(
+        {"": lambda row: "*" if row.id in best else " ", **columns}, found.rows
+    )
 
 
-def set_table(found: Parts, names: Iterable[str] = ()) -> tuple[list[str], list[list[tables.Cell]]]:
+def set_table(
+    found: Parts, names: Iterable[str] = ()
+) -> tuple[list[str], list[list[tables.Cell]]]:
     """Give the same of the sets, among which the recommended one has a star."""
     columns = {name: SET_COLUMNS[name] for name in names or SET_COLUMNS}
-    return tables.filled({"": lambda one: "*" if one.recommended else " ", **columns}, found.sets)
+    return tables.filled(
+        {"": lambda one: "*" if one.recommended else " ", **columns}, found.sets
+    )
 
 
 def _position(one: PartSet) -> str | None:
@@ -198,7 +307,11 @@ def _position(one: PartSet) -> str | None:
 
 def _least(one: PartSet, value: float | None) -> str | None:
     """An error, and whether it may be larger."""
-    return f">= {value:.3g}" if one.position_is_lower_bound and value is not None else _short(value)
+    return (
+        f">= {value:.3g}"
+        if one.position_is_lower_bound and value is not None
+        else _short(value)
+    )
 
 
 def verdict(row: PartRow) -> str:
@@ -213,14 +326,33 @@ def outlook(found: Parts) -> list[tuple[str, str]]:
     if best is None:
         lines.append(("recommended", "no set"))
     else:
-        bodies = "one rigid body" if len(best.bodies) == 1 else f"{len(best.bodies)} rigid bodies"
-        lines.append(("recommended", f"{best.name}: --part {ranges(best.parts)} ({bodies})"))
+        bodies = (
+            "one rigid body"
+            if len(best.bodies) == 1
+            else f"{len(best.bodies)} rigid bodies"
+        )
+        lines.append(
+            ("recommended", f"{best.name}: --part {ranges(best.parts)} ({bodies})")
+        )
         flights = len(found.facts.flights)
-        where = f", rigid in the longest of {flights} flights alone" if flights > 1 else ""
-        lines.append(("run time", f"about {best.run_time_share:.0%} of the reference's{where}"))
+        where = (
+            f", rigid in the longest of {flights} flights alone" if flights > 1 else ""
+        )
+        lines.append(
+            ("run time", f"about {best.run_time_share:.0%} of the reference's{where}")
+        )
         if best.step_growth is not None and best.step_growth > 1:
-            much = "without limit" if isinf(best.step_growth) else f"{best.step_growth:.2g} times"
-            lines.append(("step", f"may grow {much} while rigid, which saves more (--step-ratio); cap it (--step-cap)"))
+            much = (
+                "without limit"
+                if isinf(best.step_growth)
+                else f"{best.step_growth:.2g} times"
+            )
+            lines.append(
+                (
+                    "step",
+                    f"may grow {much} while rigid, which saves more (--step-ratio); cap it (--step-cap)",
+                )
+            )
     lines += [(one.name, reason) for one in found.sets for reason in one.reasons]
     return lines
 
@@ -230,11 +362,19 @@ def _number(count: int, what: str) -> str:
 
 
 def _counted(row: PartRow) -> str | None:
-    return None if row.elements is None else ", ".join(f"{count} {kind}" for kind, count in row.elements.items())
+    return (
+        None
+        if row.elements is None
+        else ", ".join(f"{count} {kind}" for kind, count in row.elements.items())
+    )
 
 
 def _sharing(row: PartRow) -> str | None:
-    return None if row.shares_nodes is None else listing(row.shares_nodes, most=_MOST_SHOWN, between=",")
+    return (
+        None
+        if row.shares_nodes is None
+        else listing(row.shares_nodes, most=_MOST_SHOWN, between=",")
+    )
 
 
 def ranges(ids: Sequence[int]) -> str:
@@ -279,7 +419,9 @@ SET_COLUMNS: Final[dict[str, Callable[[PartSet], tables.Cell]]] = {
     "elements": lambda one: one.elements,
     "mass": lambda one: _percent(one.mass_fraction),
     "saved of a step": lambda one: _percent(one.cost_share),
-    "step grows": lambda one: "free" if _free(one) else tables.shown(one.step_growth, ".2g"),
+    "step grows": lambda one: (
+        "free" if _free(one) else tables.shown(one.step_growth, ".2g")
+    ),
     "tr": lambda one: one.window[0] if one.window else None,
     "td": lambda one: one.window[1] if one.window else None,
     "run time": lambda one: _percent(one.run_time_share),

@@ -6,7 +6,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import printable
 from d2rpick.report import keys, tables
-from d2rpick.report.fields import Document, Field, csv_of, kind_of, many, maybe, one_of, row
+from d2rpick.report.fields import (
+    Document,
+    Field,
+    csv_of,
+    kind_of,
+    many,
+    maybe,
+    one_of,
+    row,
+)
 from d2rpick.report.situation import what_was_read
 from d2rpick.report.suggestion import given_up
 
@@ -32,7 +41,12 @@ def _margin(key: str) -> Callable[[Planned], Any]:
 
 
 _BEST: Final = row(*keys.CANDIDATE.of_part(lambda planned: planned.candidate))
-_POSITION: Final = ("position_error", "position_error_part", "position_error_body", "position_error_assumes")
+_POSITION: Final = (
+    "position_error",
+    "position_error_part",
+    "position_error_body",
+    "position_error_assumes",
+)
 WINDOW: Final = row(
     Field("flight", kind_of("integer", minimum=1), "number of the flight in the record, from 1",
           lambda row: row.number),
@@ -84,26 +98,44 @@ _SPARE: Final = ("margin", "of record", "error", "run time", "out of place")
 
 def as_table(plan: Plan, shown: Shown) -> str:
     """The plan in a sentence, what was read, a row per flight, what is saved, and why others are not supported."""
-    rows = tables.as_text(*table(plan), shown.width, _SPARE) if plan.flights else "no flight"
+    rows = (
+        tables.as_text(*table(plan), shown.width, _SPARE)
+        if plan.flights
+        else "no flight"
+    )
     told = [(name, printable(text)) for name, text in (*outlook(plan), *reasons(plan))]
     above = tables.in_line([("history", what_was_read(plan.history))], 8)
-    return "\n".join([sentence(plan), "", *above, "", rows, "", *tables.in_line(told, 9)])
+    return "\n".join(
+        [sentence(plan), "", *above, "", rows, "", *tables.in_line(told, 9)]
+    )
 
 
 def sentence(plan: Plan) -> str:
     """What to do, in a sentence."""
     new = plan.windows
     waiting = len(plan.all_windows) - len(new)
-    more = f"{waiting} more windows" if waiting > 1 else "a second window" if len(new) == 1 else "another window"
+    more = (
+        f"{waiting} more windows"
+        if waiting > 1
+        else "a second window"
+        if len(new) == 1
+        else "another window"
+    )
     spans = " and ".join(f"from {tr:.6g} to {td:.6g}" for tr, td in new)
-    found = f"make rigid {spans}, {plan.rigid_fraction:.0%} of the record" if new else "nothing to make rigid"
+    found = (
+        f"make rigid {spans}, {plan.rigid_fraction:.0%} of the record"
+        if new
+        else "nothing to make rigid"
+    )
     return f"{found}; {more} must wait" if waiting else found
 
 
 def as_markdown(plan: Plan, _: Shown) -> str:
     """The flights as a Markdown table, and below it what is saved, and why windows are not supported."""
     below = tables.listed((*outlook(plan), *reasons(plan)))
-    return "\n\n".join([tables.in_markdown(sentence(plan)), tables.as_markdown(*table(plan)), *below])
+    return "\n\n".join(
+        [tables.in_markdown(sentence(plan)), tables.as_markdown(*table(plan)), *below]
+    )
 
 
 def reasons(plan: Plan) -> list[tuple[str, str]]:
@@ -127,12 +159,17 @@ def as_value(plan: Plan, shown: Shown) -> str:
 
 def outlook(plan: Plan) -> list[tuple[str, str]]:
     """What the supported windows save, and what comes next; a name and a sentence each."""
-    supported, waiting = plan.supported, [row for row in plan.flights if row.status == "re-plan"]
+    supported, waiting = (
+        plan.supported,
+        [row for row in plan.flights if row.status == "re-plan"],
+    )
     if not supported:
         return []
     lines = []
     if plan.run_time_share is not None:
-        lines.append(("run time", f"about {plan.run_time_share:.0%} of the reference's"))
+        lines.append(
+            ("run time", f"about {plan.run_time_share:.0%} of the reference's")
+        )
     found = [(row.number, row.answer) for row in supported if row.answer]
     lines += [
         (f"flight {number}", given_up(one.longer, one.recommended))
@@ -140,14 +177,27 @@ def outlook(plan: Plan) -> list[tuple[str, str]]:
         if one.longer and one.recommended
     ]
     graded = [(f"flight {row.number}", row.quality) for row in supported if row.quality]
-    lines += [(name, quality.told) for name, quality in graded if quality.grade == "poor"]
-    assumed = [row for row in plan.flights if row.candidate and row.candidate.position_error_assumes]
+    lines += [
+        (name, quality.told) for name, quality in graded if quality.grade == "poor"
+    ]
+    assumed = [
+        row
+        for row in plan.flights
+        if row.candidate and row.candidate.position_error_assumes
+    ]
     if assumed:
         told = "; `deck` tells which do" if plan.settings.bodies is None else ""
         listed = ", ".join(f"flight {row.number} by {_place(row)}" for row in assumed)
-        lines.append(("place", f"out of place at td if the parts become one rigid body: {listed}{told}"))
+        lines.append(
+            (
+                "place",
+                f"out of place at td if the parts become one rigid body: {listed}{told}",
+            )
+        )
     if waiting or plan.done:
-        what = "with those that are done and these" if plan.done else "with these windows"
+        what = (
+            "with those that are done and these" if plan.done else "with these windows"
+        )
         after = ", and plan the others from that run (--done)" if waiting else ""
         lines.append(("next", f"run from the start {what}{after}"))
     return lines
@@ -155,9 +205,18 @@ def outlook(plan: Plan) -> list[tuple[str, str]]:
 
 def table(plan: Plan) -> tuple[list[str], list[list[tables.Cell]]]:
     """Give names of columns and cells of all flights; run time and place only where they are known."""
-    placed = any(row.candidate and row.candidate.position_error is not None for row in plan.flights)
-    unknown = [*["run time"] * (plan.settings.cost_share is None), *["out of place"] * (not placed)]
-    return tables.filled({name: cell for name, cell in _COLUMNS.items() if name not in unknown}, plan.flights)
+    placed = any(
+        row.candidate and row.candidate.position_error is not None
+        for row in plan.flights
+    )
+    unknown = [
+        *["run time"] * (plan.settings.cost_share is None),
+        *["out of place"] * (not placed),
+    ]
+    return tables.filled(
+        {name: cell for name, cell in _COLUMNS.items() if name not in unknown},
+        plan.flights,
+    )
 
 
 def error(row: Planned) -> str | None:
@@ -167,7 +226,11 @@ def error(row: Planned) -> str | None:
         return None
     if best.kind == "start":
         return "nothing vibrates"
-    name, off = ("level error", best.level_error) if best.residual is None else ("residual", best.residual)
+    name, off = (
+        ("level error", best.level_error)
+        if best.residual is None
+        else ("residual", best.residual)
+    )
     return f"{name} {tables.measure(off)}"
 
 
@@ -190,7 +253,9 @@ _COLUMNS: Final[dict[str, Callable[[Planned], tables.Cell]]] = {
     "td": lambda row: _times(row, 1),
     "rigid": lambda row: row.rigid_time,
     "of record": lambda row: tables.shown(row.rigid_fraction, ".0%"),
-    "run time": lambda row: tables.shown(row.candidate.run_time_share if row.candidate else None, ".0%"),
+    "run time": lambda row: tables.shown(
+        row.candidate.run_time_share if row.candidate else None, ".0%"
+    ),
     "error": error,
     "out of place": _place,
     "quality": lambda row: row.quality.grade if row.quality else None,

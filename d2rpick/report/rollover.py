@@ -50,17 +50,25 @@ def as_table(scan: Scan, shown: Shown) -> str:
     reference, outcomes, answer, _ = scan
     td, recommended = answer.situation.td, _recommended(answer)
     above = [
-        ("load", f"until {_time(reference.released)} s, next contact at {_time(reference.landed)} s"),
+        (
+            "load",
+            f"until {_time(reference.released)} s, next contact at {_time(reference.landed)} s",
+        ),
         ("td", f"{td:.6g} s: energy of the box {_energy(reference, td):.6g} J"),
         ("units", "s, J, m, rad/s; roll_error in degrees"),
     ]
     rows = [["*" if one.tr == recommended else "", *_short(one)] for one in outcomes]
     told = "none"
     if chosen := next((one for one in outcomes if one.tr == recommended), None):
-        error, worst = abs(chosen.roll_error), max(abs(one.roll_error) for one in outcomes)
+        error, worst = (
+            abs(chosen.roll_error),
+            max(abs(one.roll_error) for one in outcomes),
+        )
         told = f"tr = {chosen.tr:.6g}: roll error {error:.3g} degrees, {error / worst:.2g} of the largest"
     shown_rows = tables.as_text(("", *RUN.keys), rows, shown.width)
-    return "\n".join([*tables.in_line(above), "", shown_rows, "", f"recommended  {told}"])
+    return "\n".join(
+        [*tables.in_line(above), "", shown_rows, "", f"recommended  {told}"]
+    )
 
 
 def as_markdown(scan: Scan, _: Shown) -> str:

@@ -31,26 +31,41 @@ def what_was_read(history: History) -> str:
 def energy_name(history: History) -> str:
     """Name the energy; of many parts the first ones."""
     parts = [part.name for part in history.parts or () if part not in history.springs]
-    return history.channel if len(parts) <= _NAMED else f"internal energy of {listing(parts, most=_NAMED)}"
+    return (
+        history.channel
+        if len(parts) <= _NAMED
+        else f"internal energy of {listing(parts, most=_NAMED)}"
+    )
 
 
 def heading(situation: Situation, *, verbose: bool = False) -> list[tuple[str, str]]:
     """What stands above a table, by names: what was read, and what the choice rests on, ``verbose``: why."""
-    flight, share, why = situation.flight, situation.kinetic_share, situation.vibration.reasons if verbose else None
+    flight, share, why = (
+        situation.flight,
+        situation.kinetic_share,
+        situation.vibration.reasons if verbose else None,
+    )
     known = "" if share is None else f", kinetic share {measure(share)}"
     estimate = " (estimate)" if situation.vibration.estimated else ""
     lines = [
         ("history", what_was_read(situation.history)),
-        ("td", f"{situation.td:.6g}: energy {situation.energy_td:.6g}{known}{estimate}"),
+        (
+            "td",
+            f"{situation.td:.6g}: energy {situation.energy_td:.6g}{known}{estimate}",
+        ),
         ("basis", f"{_basis(situation)}{f': {why}' if why else ''}"),
     ]
     if flight.start is None:
         lines.append(("flight", "unknown"))
     else:
         end = "no next contact found" if flight.end is None else f"to {flight.end:.6g}"
-        parts = [part.name if part.title else str(part.id) for part in flight.parts or ()]
+        parts = [
+            part.name if part.title else str(part.id) for part in flight.parts or ()
+        ]
         who = f" of {listing(parts, most=_NAMED)}" if parts else ""
-        lines.append(("flight", f"from {flight.start:.6g} ({spoken(flight.source)}{who}), {end}"))
+        lines.append(
+            ("flight", f"from {flight.start:.6g} ({spoken(flight.source)}{who}), {end}")
+        )
     return [(name, printable(text)) for name, text in lines]
 
 
@@ -64,12 +79,18 @@ def _basis(situation: Situation) -> str:
     fit, vibration = situation.evidence.fit, situation.vibration
     mode, told = vibration.whole.mode, vibration.told
     if not (mode and fit):
-        kinetic = "; kinetic energy from the modes of each part" if vibration.signed else ""
+        kinetic = (
+            "; kinetic energy from the modes of each part" if vibration.signed else ""
+        )
         return f"{told}{kinetic}" if told else _level_alone(situation)
     facts = [f"omega {mode.omega:.6g}", f"alpha {mode.alpha:.4g}"]
     offsets = {"energy_plastic": mode.energy_plastic, "preload": mode.preload}
     facts += [f"{name} {value:.4g}" for name, value in offsets.items() if value]
-    facts.append("misfit below 1e-9" if fit.misfit is None or fit.misfit < 1e-9 else f"misfit {fit.misfit:.1e}")
+    facts.append(
+        "misfit below 1e-9"
+        if fit.misfit is None or fit.misfit < 1e-9
+        else f"misfit {fit.misfit:.1e}"
+    )
     source = "given" if situation.settings.oscillator else "identified"
     front = f"{told}; " if told else ""
     return f"{front}oscillator, {source}: {', '.join(facts)}; tr and energies are refined on it"
@@ -86,7 +107,12 @@ def _level_alone(situation: Situation) -> str:
 
 def head(health: Health) -> tuple[str, ...]:
     """Names of the columns of a table of health; the first says up to when the run was judged."""
-    return "health" if health.until is None else f"health up to {health.until:.6g}", "this run", "practice", "verdict"
+    return (
+        "health" if health.until is None else f"health up to {health.until:.6g}",
+        "this run",
+        "practice",
+        "verdict",
+    )
 
 
 class Measure(NamedTuple):
@@ -113,13 +139,23 @@ def measures_of(health: Health) -> list[Measure]:
             span and max(1 - span[0], span[1] - 1) <= limits.MOST_IMBALANCE,
         ),
         _share("contact energy", health.sliding_share, limits.MOST_SLIDING),
-        _share("negative contact energy", health.negative_sliding_share, limits.MOST_NEGATIVE_SLIDING),
+        _share(
+            "negative contact energy",
+            health.negative_sliding_share,
+            limits.MOST_NEGATIVE_SLIDING,
+        ),
         _share("energy of deleted elements", health.eroded_share, MOST_WORK),
     ]
     if health.window:
         found += [
-            _share("change of contact energy in the window", health.window_sliding, MOST_WORK),
-            _share("work beyond gravity and damping there", health.window_work, MOST_WORK),
+            _share(
+                "change of contact energy in the window",
+                health.window_sliding,
+                MOST_WORK,
+            ),
+            _share(
+                "work beyond gravity and damping there", health.window_work, MOST_WORK
+            ),
             _share("energy deleted there", health.window_eroded, 0.0),
         ]
     return found
@@ -127,4 +163,9 @@ def measures_of(health: Health) -> list[Measure]:
 
 def _share(what: str, share: float | None, most: float) -> Measure:
     limit = f"at most {most:.0%}" if most else "none"
-    return Measure(what, None if share is None else f"{share:.2%}", limit, None if share is None else share <= most)
+    return Measure(
+        what,
+        None if share is None else f"{share:.2%}",
+        limit,
+        None if share is None else share <= most,
+    )

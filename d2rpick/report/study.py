@@ -8,20 +8,36 @@ from typing import TYPE_CHECKING, Any, Final
 from d2rpick.choice.study import Study, StudyRow, cut_runs, runs_of
 from d2rpick.histories.digits import window_as_read
 from d2rpick.report import keys, tables
-from d2rpick.report.fields import Document, Field, csv_of, kind_of, many, maybe, one_of, row
+from d2rpick.report.fields import (
+    Document,
+    Field,
+    csv_of,
+    kind_of,
+    many,
+    maybe,
+    one_of,
+    row,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from d2rpick.report.formats import Shown
 
-STATUS: Final = one_of("ok", "none", "unreadable", "out-of-range", "failed", "internal-error")
+STATUS: Final = one_of(
+    "ok", "none", "unreadable", "out-of-range", "failed", "internal-error"
+)
 _A_NUMBER, _NULL = {"type": "number"}, {"type": "null"}
 # What a run has where it is of status ok, and otherwise.
 _JUDGED: Final[dict[str, Any]] = {
     "description": "One run; null where nothing can be said.",
     "if": {"properties": {"status": {"const": "ok"}}},
-    "then": {"properties": {**dict.fromkeys(("tr", "tr_low", "tr_high", "energy_td"), _A_NUMBER), "message": _NULL}},
+    "then": {
+        "properties": {
+            **dict.fromkeys(("tr", "tr_low", "tr_high", "energy_td"), _A_NUMBER),
+            "message": _NULL,
+        }
+    },
     "else": {"properties": {"tr": _NULL, "message": {"type": "string"}}},
 }
 PLAIN: Final = row(
@@ -45,7 +61,9 @@ _ERROR: Final = Field(
 )  # fmt: skip
 # A run in JSON, and a row of the csv; of a run and its error at the common tr.
 RUN: Final = row(*PLAIN.of_part(lambda one: one[0]), _ERROR, **_JUDGED)
-_RUN: Final = row(*RUN.fields, name="run", later=("common_error", "record_end"), **_JUDGED)
+_RUN: Final = row(
+    *RUN.fields, name="run", later=("common_error", "record_end"), **_JUDGED
+)
 _SHARED: Final = row(
     keys.WARNINGS,
     Field("td", "number?", "null where each run has its own"),
@@ -95,8 +113,19 @@ DOCUMENT: Final = Document(
 def as_table(answer: Study, shown: Shown) -> str:
     """One line per run, by what tells its name from the others, and below what they have in common."""
     head, rows = tables.known(*table(answer))
-    rows = [[name, *row[1:]] for name, row in zip(short_names([row.source for row in answer.runs]), rows, strict=True)]
-    return "\n".join([tables.as_text(head, rows, shown.width, _SPARE), "", *tables.in_line(outcome(answer))])
+    rows = [
+        [name, *row[1:]]
+        for name, row in zip(
+            short_names([row.source for row in answer.runs]), rows, strict=True
+        )
+    ]
+    return "\n".join(
+        [
+            tables.as_text(head, rows, shown.width, _SPARE),
+            "",
+            *tables.in_line(outcome(answer)),
+        ]
+    )
 
 
 def as_markdown(answer: Study, _: Shown) -> str:
@@ -117,7 +146,9 @@ def as_ndjson(answer: Study, shown: Shown) -> str:
 
 def with_errors(answer: Study) -> Iterator[tuple[StudyRow, float | None]]:
     """Give the runs, each with its error at the common tr."""
-    return zip(answer.runs, answer.common.errors or [None] * len(answer.runs), strict=True)
+    return zip(
+        answer.runs, answer.common.errors or [None] * len(answer.runs), strict=True
+    )
 
 
 def table(answer: Study) -> tuple[list[str], list[list[tables.Cell]]]:
@@ -135,7 +166,9 @@ def table(answer: Study) -> tuple[list[str], list[list[tables.Cell]]]:
         "status": lambda one: one[0].status,
         "message": lambda one: (
             cut.get(one[0].source, "")
-            + (one[0].message or ", ".join(one[0].warnings)).removeprefix(f"{one[0].source.rstrip('/')}: ")
+            + (one[0].message or ", ".join(one[0].warnings)).removeprefix(
+                f"{one[0].source.rstrip('/')}: "
+            )
         ),
     }
     return tables.filled(columns, with_errors(answer))
@@ -147,15 +180,22 @@ def outcome(answer: Study) -> list[tuple[str, str]]:
     found = "none"
     if spread:
         found = f"{spread.min:.6g} to {spread.max:.6g}, median {spread.median:.6g}; "
-        found += "the intervals overlap" if answer.agree else "the intervals do not overlap"
+        found += (
+            "the intervals overlap" if answer.agree else "the intervals do not overlap"
+        )
     shared = f"none: {common.reason}"
     if common.tr is not None and common.window:
         known = [error for error in common.errors if error is not None]
         shared = f"{common.tr:g}, acceptable in {answer.judged} of {runs_of(answer.judged)}; "
         shared += f"so is every tr from {window_as_read(*common.window)}; "
-        shared += f"error there {tables.measure(min(known))} to {tables.measure(max(known))}"
+        shared += (
+            f"error there {tables.measure(min(known))} to {tables.measure(max(known))}"
+        )
     return [
-        ("td", f"{td_of(answer)}, {answer.judged} of {runs_of(len(answer.runs))} judged"),
+        (
+            "td",
+            f"{td_of(answer)}, {answer.judged} of {runs_of(len(answer.runs))} judged",
+        ),
         ("tr", found),
         ("common tr", shared),
     ]
@@ -182,7 +222,15 @@ def short_names(sources: Sequence[str]) -> tuple[str, ...]:
     """
     paths = [PurePath(source).parts for source in sources]
     depth = min(map(len, paths), default=0)
-    first = next((i for i in range(depth) if len({path[i] for path in paths}) > 1), max(depth - 1, 0))
-    last = next((i for i in range(1, depth + 1) if len({path[-i] for path in paths}) > 1), 1)
+    first = next(
+        (i for i in range(depth) if len({path[i] for path in paths}) > 1),
+        max(depth - 1, 0),
+    )
+    last = next(
+        (i for i in range(1, depth + 1) if len({path[-i] for path in paths}) > 1), 1
+    )
     kept = (path[first : len(path) - last + 1] or path[-1:] for path in paths)
-    return tuple("/".join(part.strip("/") for part in one) or source for one, source in zip(kept, sources, strict=True))
+    return tuple(
+        "/".join(part.strip("/") for part in one) or source
+        for one, source in zip(kept, sources, strict=True)
+    )

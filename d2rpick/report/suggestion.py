@@ -22,15 +22,23 @@ if TYPE_CHECKING:
 
 # Windows of acceptable tr that a line names.
 _NAMED = 4
-_WINDOW: Final = row(*keys.WINDOW.fields, Field("recommended", "flag", "holds the recommended tr"))
-CANDIDATE: Final = row(*keys.CANDIDATE.fields, keys.MATCHES, name="candidate", later=(*keys.LATER, "parts"))
+_WINDOW: Final = row(
+    *keys.WINDOW.fields, Field("recommended", "flag", "holds the recommended tr")
+)
+CANDIDATE: Final = row(
+    *keys.CANDIDATE.fields, keys.MATCHES, name="candidate", later=(*keys.LATER, "parts")
+)
 
 
 def _windows(answer: Suggestion) -> list[dict[str, Any]] | None:
     """Give the windows of acceptable tr, and which of them holds the recommended one."""
     tr = answer.recommended.tr if answer.recommended else None
     windows = answer.windows
-    return None if windows is None else [{**one._asdict(), "recommended": holds(one, tr)} for one in windows]
+    return (
+        None
+        if windows is None
+        else [{**one._asdict(), "recommended": holds(one, tr)} for one in windows]
+    )
 
 
 DOCUMENT: Final = Document("d2rpick/suggest/1", "Answer of d2rpick suggest; times in the unit of the history.", row(
@@ -84,7 +92,9 @@ def as_markdown(answer: Suggestion, shown: Shown) -> str:
     return "\n\n".join([tables.as_markdown(*_some(answer, shown)), *said])
 
 
-def _some(answer: Suggestion, shown: Shown) -> tuple[list[str], list[list[tables.Cell]]]:
+def _some(
+    answer: Suggestion, shown: Shown
+) -> tuple[list[str], list[list[tables.Cell]]]:
     """Give the first candidates, in the columns that hold something."""
     head, rows = tables.known(*table(answer, shown.limit))
     kept = [i for i, name in enumerate(head) if shown.verbose or name not in _IN_FULL]
@@ -95,7 +105,9 @@ def as_csv(answer: Suggestion, _: Shown) -> str:
     """All candidates, a column for each key of the JSON output but ``parts``, and the td they belong to."""
     columns = [*(key for key in keys.CANDIDATE.keys if key != "notes"), "td", "notes"]
     td = answer.situation.td
-    return csv_of(columns, ({**keys.CANDIDATE.plain(one), "td": td} for one in answer.candidates))
+    return csv_of(
+        columns, ({**keys.CANDIDATE.plain(one), "td": td} for one in answer.candidates)
+    )
 
 
 def headline(answer: Suggestion) -> str:
@@ -117,7 +129,11 @@ def verdict(answer: Suggestion) -> list[tuple[str, str]]:
             ("quality", _sure(best, quality)),
             *statements(quality),
         ]
-    return [*found, ("better pair", f"{_times(better)}: {better_about(answer, better)}")] if better else found
+    return (
+        [*found, ("better pair", f"{_times(better)}: {better_about(answer, better)}")]
+        if better
+        else found
+    )
 
 
 def _saved(best: Candidate) -> str:
@@ -126,8 +142,16 @@ def _saved(best: Candidate) -> str:
 
 def _sure(best: Candidate, quality: Quality) -> str:
     """How good the pair is, why it is none better, and how exactly tr is known."""
-    known = "" if best.tr_high is None else f"; tr is known to ±{best.tr_high - best.tr:.1g}"
-    room = "" if best.timing_tolerance is None else f" and may be off by {best.timing_tolerance:.1g}"
+    known = (
+        ""
+        if best.tr_high is None
+        else f"; tr is known to ±{best.tr_high - best.tr:.1g}"
+    )
+    room = (
+        ""
+        if best.timing_tolerance is None
+        else f" and may be off by {best.timing_tolerance:.1g}"
+    )
     return f"{quality.told}{known}{room}"
 
 
@@ -137,12 +161,17 @@ def statements(quality: Quality) -> list[tuple[str, str]]:
         return []
     alone = quality.alone
     said = (
-        alone.grade if alone.grade == quality.vibration.grade else f"{quality.vibration.grade}, by itself {alone.grade}"
+        alone.grade
+        if alone.grade == quality.vibration.grade
+        else f"{quality.vibration.grade}, by itself {alone.grade}"
     )
     worth = ""
     if quality.worth is not None:
         worth = f"; its error holds at most {quality.worth.share:.2g} of the energy of the next contact"
-    return [("motion", graded(quality.motion)), ("vibration", f"{graded(alone._replace(grade=said))}{worth}")]
+    return [
+        ("motion", graded(quality.motion)),
+        ("vibration", f"{graded(alone._replace(grade=said))}{worth}"),
+    ]
 
 
 def graded(grade: Grade) -> str:
@@ -173,7 +202,12 @@ def mean_energy(kept: Kept) -> str:
 def _off(best: Candidate) -> str:
     """Give the residual, with its band where that is wide."""
     low, high = best.residual_low, best.residual_high
-    if best.residual is None or low is None or high is None or high <= best.residual + MUCH_HIGHER:
+    if (
+        best.residual is None
+        or low is None
+        or high is None
+        or high <= best.residual + MUCH_HIGHER
+    ):
         return f"{best.residual:.1%}"
     return f"{best.residual:.0%}, between {low:.0%} and {high:.0%}"
 
@@ -185,19 +219,31 @@ def better_about(answer: Suggestion, better: Pair) -> str:
         return "there an acceptable tr exists"
     if better.residual is not None and own.residual is not None:
         return f"residual {tables.measure(better.residual)} instead of {tables.measure(own.residual)}"
-    level, here = answer.situation.vibration.whole.energy(better.td), answer.situation.energy_td
+    level, here = (
+        answer.situation.vibration.whole.energy(better.td),
+        answer.situation.energy_td,
+    )
     return f"the energy there is {level / here:.3g} times as high, so that more of the vibration can be kept"
 
 
 def outlook(answer: Suggestion) -> list[tuple[str, str]]:
     """What else there is to choose from; a name and a sentence each."""
     chosen = answer.recommended.tr if answer.recommended else None
-    lines = [("acceptable", acceptable(answer.windows, chosen))] if answer.windows else []
+    lines = (
+        [("acceptable", acceptable(answer.windows, chosen))] if answer.windows else []
+    )
     best = answer.chosen
     if best and best.run_time_share is not None:
-        lines.append(("run time", f"about {best.run_time_share:.0%} of the reference's"))
+        lines.append(
+            ("run time", f"about {best.run_time_share:.0%} of the reference's")
+        )
     if best and best.position_error is not None:
-        lines.append(("position", position(best, deck=answer.situation.settings.bodies is not None)))
+        lines.append(
+            (
+                "position",
+                position(best, deck=answer.situation.settings.bodies is not None),
+            )
+        )
     if answer.longer and answer.recommended:
         lines.append(("longer", given_up(answer.longer, answer.recommended)))
     return lines
@@ -218,7 +264,11 @@ def position(best: Candidate, *, deck: bool) -> str:
 
 def given_up(longer: Pair, chosen: Pair) -> str:
     """How much rigid time was given up for a better level or residual, and for which."""
-    what = "a lower level at td" if longer.residual is None else f"residual {tables.measure(longer.residual)}"
+    what = (
+        "a lower level at td"
+        if longer.residual is None
+        else f"residual {tables.measure(longer.residual)}"
+    )
     lost = longer.rigid_time - chosen.rigid_time
     times = f"tr = {longer.tr:.6g}, td = {longer.td:.6g} is rigid for {longer.rigid_time:.6g}"
     return f"{times}, with {what}: {lost:.6g} ({lost / longer.rigid_time:.0%}) is given up for quality"
@@ -229,9 +279,18 @@ def acceptable(windows: Sequence[AcceptableWindow], tr: float | None) -> str:
     share = sum(one.share for one in windows)
     if len(windows) == 1:
         return f"every tr from {window_as_read(*windows[0][:2])}, {share:.0%} of the flight up to td"
-    named = sorted(windows, key=lambda one: (not holds(one, tr), one.start - one.end))[:_NAMED]
-    shown = [f"{window_as_read(w.start, w.end)} ({w.share:.1%}{', recommended' * holds(w, tr)})" for w in named]
-    more = f" and {len(windows) - len(named)} shorter windows" if len(windows) > len(named) else ""
+    named = sorted(windows, key=lambda one: (not holds(one, tr), one.start - one.end))[
+        :_NAMED
+    ]
+    shown = [
+        f"{window_as_read(w.start, w.end)} ({w.share:.1%}{', recommended' * holds(w, tr)})"
+        for w in named
+    ]
+    more = (
+        f" and {len(windows) - len(named)} shorter windows"
+        if len(windows) > len(named)
+        else ""
+    )
     return f"every tr from {'; '.join(shown)}{more}; in all {share:.0%} of the flight up to td"
 
 
@@ -262,7 +321,13 @@ def table(answer: Suggestion, limit: int) -> tuple[list[str], list[list[tables.C
         "R": lambda c: tables.measure(c.residual),
         "tolerance": lambda c: tables.shown(c.timing_tolerance, ".1e"),
         "rigid": lambda c: c.rigid_time,
-        "verdict": lambda c: headline(answer) if c.recommended else "acceptable" if c.acceptable else c.notes[0],
+        "verdict": lambda c: (
+            headline(answer)
+            if c.recommended
+            else "acceptable"
+            if c.acceptable
+            else c.notes[0]
+        ),
     }
     return tables.filled(columns, answer.candidates[:limit])
 
@@ -270,7 +335,9 @@ def table(answer: Suggestion, limit: int) -> tuple[list[str], list[list[tables.C
 def _pair(pair: Pair | None) -> str:
     if pair is None:
         return "none"
-    residual = "" if pair.residual is None else f", residual {tables.measure(pair.residual)}"
+    residual = (
+        "" if pair.residual is None else f", residual {tables.measure(pair.residual)}"
+    )
     return f"{_times(pair)}{residual}"
 
 

@@ -63,7 +63,9 @@ def half(low: float | None, high: float | None) -> str | None:
     return None if low is None or high is None else f"{(high - low) / 2:.1e}"
 
 
-def known(head: Sequence[str], rows: Sequence[Sequence[Cell]]) -> tuple[list[str], list[list[Cell]]]:
+def known(
+    head: Sequence[str], rows: Sequence[Sequence[Cell]]
+) -> tuple[list[str], list[list[Cell]]]:
     """Leave the columns out in which nothing is known.
 
     Examples
@@ -71,11 +73,17 @@ def known(head: Sequence[str], rows: Sequence[Sequence[Cell]]) -> tuple[list[str
     >>> known(["tr", "sign", "R"], [[0.5, None, "-"], [0.7, None, "-"]])
     (['tr'], [[0.5], [0.7]])
     """
-    kept = [i for i in range(len(head)) if any(row[i] not in (None, "", "-") for row in rows)]
+    kept = [
+        i
+        for i in range(len(head))
+        if any(row[i] not in (None, "", "-") for row in rows)
+    ]
     return [head[i] for i in kept], [[row[i] for i in kept] for row in rows]
 
 
-def filled(columns: Mapping[str, Callable[[Any], Cell]], things: Iterable[Any]) -> tuple[list[str], list[list[Cell]]]:
+def filled(
+    columns: Mapping[str, Callable[[Any], Cell]], things: Iterable[Any]
+) -> tuple[list[str], list[list[Cell]]]:
     """Give the names of columns, and below them the cells of each thing.
 
     Examples
@@ -83,12 +91,18 @@ def filled(columns: Mapping[str, Callable[[Any], Cell]], things: Iterable[Any]) 
     >>> filled({"word": str, "letters": len}, ["tr", "flight"])
     (['word', 'letters'], [['tr', 2], ['flight', 6]])
     """
-    return list(columns), [[cell(thing) for cell in columns.values()] for thing in things]
+    return list(columns), [
+        [cell(thing) for cell in columns.values()] for thing in things
+    ]
 
 
-def unstarred(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> tuple[list[str], list[list[Cell]]]:
+def unstarred(
+    head: Sequence[str], rows: Iterable[Sequence[Cell]]
+) -> tuple[list[str], list[list[Cell]]]:
     """Leave out the first column, which has a star for what is recommended; ``±`` as it is written on a page."""
-    return [name.replace("+-", "±") for name in head[1:]], [list(row[1:]) for row in rows]
+    return [name.replace("+-", "±") for name in head[1:]], [
+        list(row[1:]) for row in rows
+    ]
 
 
 def in_line(said: Iterable[tuple[str, Cell]], width: int = 0) -> list[str]:
@@ -103,7 +117,12 @@ def listed(said: Iterable[tuple[str, str]]) -> list[str]:
     return [f"{name}: {in_markdown(text)}" for name, text in said]
 
 
-def as_text(head: Sequence[str], rows: Iterable[Sequence[Cell]], width: int = WIDEST, spare: Iterable[str] = ()) -> str:
+def as_text(
+    head: Sequence[str],
+    rows: Iterable[Sequence[Cell]],
+    width: int = WIDEST,
+    spare: Iterable[str] = (),
+) -> str:
     """Columns in line, numbers to the right of their column, two blanks between.
 
     Where it would be wider than ``width``, columns of ``spare`` are left out, the first of them first, and then words
@@ -126,12 +145,21 @@ def as_text(head: Sequence[str], rows: Iterable[Sequence[Cell]], width: int = WI
     texts = {name: [short(name), *map(short, cells)] for name, cells in columns.items()}
     widths = {name: max(map(len, column)) for name, column in texts.items()}
     for name in spare:
-        if name in widths and sum(min(_TEXT, w) + 2 for w in widths.values()) - 2 > width:
+        if (
+            name in widths
+            and sum(min(_TEXT, w) + 2 for w in widths.values()) - 2 > width
+        ):
             del widths[name], texts[name]
-    right = [all(cell is None or isinstance(cell, (int, float)) for cell in columns[name]) for name in texts]
+    right = [
+        all(cell is None or isinstance(cell, (int, float)) for cell in columns[name])
+        for name in texts
+    ]
     narrow = _narrowed([*zip(*texts.values(), strict=True)], [*widths.values()], width)
     lines = (
-        "  ".join(t.rjust(w) if r else t.ljust(w) for t, w, r in zip(line, narrow, right, strict=True))
+        "  ".join(
+            t.rjust(w) if r else t.ljust(w)
+            for t, w, r in zip(line, narrow, right, strict=True)
+        )
         for row in zip(*texts.values(), strict=True)
         for line in _broken(row, narrow)
     )
@@ -148,7 +176,9 @@ def wrapped(text: str, width: int) -> str:
              is unknown
     basis    energy
     """
-    return "\n".join(line if len(line) <= width else _below(line, width) for line in text.split("\n"))
+    return "\n".join(
+        line if len(line) <= width else _below(line, width) for line in text.split("\n")
+    )
 
 
 def continued(line: str, width: int) -> str:
@@ -165,7 +195,12 @@ def continued(line: str, width: int) -> str:
     if len(line) <= width:
         return line
     indent = " " * (len(line) - len(line.lstrip()) + 4)
-    wrapper = TextWrapper(width - 2, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
+    wrapper = TextWrapper(
+        width - 2,
+        subsequent_indent=indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
     wrapper.wordsep_simple_re = re.compile(r"(\s+)(?=--?[a-z][^']*(?:'[^']*'[^']*)*$)")
     return " \\\n".join(wrapper.wrap(line))
 
@@ -176,19 +211,35 @@ def _below(line: str, width: int) -> str:
 
     name = re.match(r"\s*(?:\S+ )*?\S+  +(?=\S)|\s*", line)
     indent = len(name[0]) if name and len(name[0]) <= width // 2 else 2
-    return fill(line, width, subsequent_indent=" " * indent, break_long_words=False, break_on_hyphens=False)
+    return fill(
+        line,
+        width,
+        subsequent_indent=" " * indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
 
 
-def _narrowed(texts: Sequence[Sequence[str]], widths: Sequence[int], width: int) -> list[int]:
+def _narrowed(
+    texts: Sequence[Sequence[str]], widths: Sequence[int], width: int
+) -> list[int]:
     """Take from the widest columns what is too much: names break before cells, and words at last."""
     found = list(widths)
-    names, *cells = ([min(_WORD, max(map(len, text.split()), default=1)) for text in row] for row in texts)
-    whole = [max(name, *(len(row[i]) for row in texts[1:])) for i, name in enumerate(names)]
+    names, *cells = (
+        [min(_WORD, max(map(len, text.split()), default=1)) for text in row]
+        for row in texts
+    )
+    whole = [
+        max(name, *(len(row[i]) for row in texts[1:])) for i, name in enumerate(names)
+    ]
     words = [max(column) for column in zip(names, *cells, strict=True)]
     excess = sum(widths) + 2 * (len(widths) - 1) - width
     for least in (whole, words, [min(_LEAST, word) for word in words]):
         while excess > 0 and any(map(gt, found, least)):
-            widest = max((i for i in range(len(found)) if found[i] > least[i]), key=lambda i: found[i])
+            widest = max(
+                (i for i in range(len(found)) if found[i] > least[i]),
+                key=lambda i: found[i],
+            )
             found[widest] -= 1
             excess -= 1
     return found
@@ -198,7 +249,10 @@ def _broken(row: Sequence[str], widths: Sequence[int]) -> Iterator[list[str]]:
     """Give the lines of a row whose cells are no wider than their columns."""
     from itertools import zip_longest
 
-    cells = (_lines(text, width) if len(text) > width else [text] for text, width in zip(row, widths, strict=True))
+    cells = (
+        _lines(text, width) if len(text) > width else [text]
+        for text, width in zip(row, widths, strict=True)
+    )
     yield from (list(line) for line in zip_longest(*cells, fillvalue=""))
 
 
@@ -238,7 +292,9 @@ def in_markdown(text: str) -> str:
     >>> print(in_markdown("a|b"), in_markdown("C:\\run"), in_markdown("<i>part_1</i>"))
     a\|b C:\\run \<i>part_1\</i>
     """
-    return re.sub(r"[\\|<*\[~]|&(?=#?\w+;)|(?<![^\W_])_|_(?![^\W_])", r"\\\g<0>", printable(text))
+    return re.sub(
+        r"[\\|<*\[~]|&(?=#?\w+;)|(?<![^\W_])_|_(?![^\W_])", r"\\\g<0>", printable(text)
+    )
 
 
 def as_csv(head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
@@ -280,9 +336,17 @@ def as_json(result: Any, indent: int | None = 2) -> str:
     import unicodedata
 
     def seen(found: re.Match[str]) -> str:
-        return json.dumps(found[0])[1:-1] if unicodedata.category(found[0]) in UNSEEN else found[0]
+        return (
+            json.dumps(found[0])[1:-1]
+            if unicodedata.category(found[0]) in UNSEEN
+            else found[0]
+        )
 
-    return re.sub(r"[^\n -~]", seen, json.dumps(result, indent=indent, allow_nan=False, ensure_ascii=False))
+    return re.sub(
+        r"[^\n -~]",
+        seen,
+        json.dumps(result, indent=indent, allow_nan=False, ensure_ascii=False),
+    )
 
 
 def shell_line(words: Iterable[str]) -> str:
@@ -295,7 +359,12 @@ def shell_line(words: Iterable[str]) -> str:
     """
     import shlex  # not above: start-up
 
-    return " ".join(shlex.quote(word) if word.isprintable() else f"$'{''.join(map(_escaped, word))}'" for word in words)
+    return " ".join(
+        shlex.quote(word)
+        if word.isprintable()
+        else f"$'{''.join(map(_escaped, word))}'"
+        for word in words
+    )
 
 
 def positional(names: Sequence[str]) -> tuple[str, ...]:
@@ -306,7 +375,14 @@ def positional(names: Sequence[str]) -> tuple[str, ...]:
     >>> positional(["glstat", "-"]), positional(["-run.csv"])
     (('glstat', '-'), ('--', '-run.csv'))
     """
-    return (*(["--"] if any(name.startswith("-") and name != "-" for name in names) else []), *names)
+    return (
+        *(
+            ["--"]
+            if any(name.startswith("-") and name != "-" for name in names)
+            else []
+        ),
+        *names,
+    )
 
 
 def _escaped(letter: str) -> str:

@@ -38,7 +38,11 @@ OFFER: Final = row(
     keys.EXPECTED._replace(get=lambda offer: offer.answer.expected),
 )  # fmt: skip
 # Columns of the csv and of a frame.
-COLUMNS: Final = [key for key in OFFER.keys if key not in ("quality_reasons", "acceptable_windows", "expected")]
+COLUMNS: Final = [
+    key
+    for key in OFFER.keys
+    if key not in ("quality_reasons", "acceptable_windows", "expected")
+]
 
 
 # A change of the rigid time below this share is none that people read.
@@ -54,10 +58,16 @@ _SPARE: Final = ("tolerance", "level error", "of record", "peak", "K")
 def as_table(found: TradeOff, shown: Shown) -> str:
     """What was read, some of the offers that nothing beats, and the answer in a sentence."""
     some = some_of(found, shown.limit)
-    offered = tables.as_text(*tables.known(*table(some)), shown.width, _SPARE) if some else "nothing to offer"
+    offered = (
+        tables.as_text(*tables.known(*table(some)), shown.width, _SPARE)
+        if some
+        else "nothing to offer"
+    )
     low, high = found.td_window
     window = f"{len(found.offers)} times from {low:.6g} to {high:.6g}"
-    lines = tables.in_line([("history", what_was_read(found.situation.history)), ("td", window)])
+    lines = tables.in_line(
+        [("history", what_was_read(found.situation.history)), ("td", window)]
+    )
     lines += ["", offered]
     left = len(found.offers) - len(some)
     if left:
@@ -91,10 +101,14 @@ def answer(found: TradeOff) -> str:
     if start.best is None:
         what = f"{named} has no acceptable tr"
         return what if step is None else f"{what}; {_away(start, step, unit)} has one"
-    what = f"{named}, {_error(start)}" if not found.asked else f"{named}: {_error(start)}"
+    what = (
+        f"{named}, {_error(start)}" if not found.asked else f"{named}: {_error(start)}"
+    )
     if step is None:
         small = start.error is not None and start.error <= EQUALLY_GOOD
-        return f"{what}; no other td in the window {'is better' if small else _NOT_HALVED}"
+        return (
+            f"{what}; no other td in the window {'is better' if small else _NOT_HALVED}"
+        )
     return f"{what}; {_away(start, step, unit)} {_less(start, step)} and {_cost(start, step)}"
 
 
@@ -146,7 +160,11 @@ def _cost(start: Offer, step: Offer) -> str:
     change = step.rigid_time / start.rigid_time - 1
     if abs(change) < _NO_CHANGE:
         return "costs no rigid time"
-    return f"costs {-change:.1%} of the rigid time" if change < 0 else f"makes the rigid time {change:.1%} longer"
+    return (
+        f"costs {-change:.1%} of the rigid time"
+        if change < 0
+        else f"makes the rigid time {change:.1%} longer"
+    )
 
 
 def _error(one: Offer) -> str:
@@ -160,10 +178,16 @@ def _error(one: Offer) -> str:
 
 def some_of(found: TradeOff, limit: int) -> list[Offer]:
     """Offers that the answer names, and evenly over those that nothing beats as many as make ``limit``."""
-    named = {one.td for one in (found.asked, found.recommended, found.start, found.step) if one}
+    named = {
+        one.td
+        for one in (found.asked, found.recommended, found.start, found.step)
+        if one
+    }
     best = [one.td for one in found.offers if one.unbeaten and one.td not in named]
     room = min(max(limit - len(named), 0), len(best))
-    named.update(best[round((place + 0.5) * len(best) / room - 0.5)] for place in range(room))
+    named.update(
+        best[round((place + 0.5) * len(best) / room - 0.5)] for place in range(room)
+    )
     return [one for one in found.offers if one.td in named]
 
 
@@ -183,7 +207,9 @@ _COLUMNS: Final[dict[str, Callable[[Offer], tables.Cell]]] = {
     "peak": lambda one: "peak" if one.peak else "",
     "tr": lambda one: one.tr,
     "error": lambda one: tables.measure(one.error),
-    "level error": lambda one: tables.measure(one.best.level_error if one.best else None),
+    "level error": lambda one: tables.measure(
+        one.best.level_error if one.best else None
+    ),
     "K": lambda one: tables.measure(one.kinetic_share),
     "rigid": lambda one: one.rigid_time,
     "of record": _of_best("rigid_fraction", ".1%"),

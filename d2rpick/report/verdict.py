@@ -57,11 +57,19 @@ COMPARED = ("", "switched", "reference")
 
 def as_table(answer: Verdict, shown: Shown) -> str:
     """The verdict and its reasons, what it rests on, and the measures of the pair."""
-    lines = tables.in_line((name, value) for name, value in MEASURES.plain(answer).items() if value is not None)
+    lines = tables.in_line(
+        (name, value)
+        for name, value in MEASURES.plain(answer).items()
+        if value is not None
+    )
     reasons = [f"  {printable(reason)}" for reason in answer.reasons]
     if answer.switched:
         lines += ["", *_comparison(answer.switched)]
-    graded = [("quality", answer.quality.told), *statements(answer.quality)] if answer.quality else []
+    graded = (
+        [("quality", answer.quality.told), *statements(answer.quality)]
+        if answer.quality
+        else []
+    )
     head = [("verdict", told(answer)), *graded]
     above = tables.in_line(heading(answer.situation, verbose=shown.verbose))
     return "\n".join([*tables.in_line(head), *reasons, "", *above, "", *lines])
@@ -69,14 +77,23 @@ def as_table(answer: Verdict, shown: Shown) -> str:
 
 def as_markdown(answer: Verdict, _: Shown) -> str:
     """The measures as a Markdown table of two columns, and the reasons below it."""
-    table = tables.as_markdown(("measure", "value"), list({**MEASURES.plain(answer), **_of_switched(answer)}.items()))
-    return "\n".join([table, *(f"\n* {tables.in_markdown(reason)}" for reason in answer.reasons)])
+    table = tables.as_markdown(
+        ("measure", "value"),
+        list({**MEASURES.plain(answer), **_of_switched(answer)}.items()),
+    )
+    return "\n".join(
+        [table, *(f"\n* {tables.in_markdown(reason)}" for reason in answer.reasons)]
+    )
 
 
 def measures(answer: Verdict) -> dict[str, Any]:
     """Each measure by its key, those of a switched run with ``switched_`` before them, and the reasons as one text."""
     situation = answer.situation
-    measured = {"energy_td": situation.energy_td, "kinetic_share": situation.kinetic_share, **MEASURES.plain(answer)}
+    measured = {
+        "energy_td": situation.energy_td,
+        "kinetic_share": situation.kinetic_share,
+        **MEASURES.plain(answer),
+    }
     return {**measured, **_of_switched(answer), "reasons": "; ".join(answer.reasons)}
 
 
@@ -92,7 +109,11 @@ def told(answer: Verdict) -> str:
         return answer.word
     if answer.situation.at_rest:
         return f"{answer.word}: tr lies in the flight, and nothing vibrates there"
-    held = "its level is" if answer.situation.basis == "energy" else "its sign matches and its error is"
+    held = (
+        "its level is"
+        if answer.situation.basis == "energy"
+        else "its sign matches and its error is"
+    )
     return f"{answer.word}: tr lies in the flight, {held} within the tolerance"
 
 
@@ -101,15 +122,27 @@ def comparison(switched: Comparison) -> list[tuple[str, float, float]]:
     return [
         ("energy right after td", switched.energy_frozen, switched.energy_td),
         ("mean energy after td", switched.mean_after, switched.mean_after_reference),
-        ("standard deviation after td", switched.spread_after, switched.spread_after_reference),
+        (
+            "standard deviation after td",
+            switched.spread_after,
+            switched.spread_after_reference,
+        ),
     ]
 
 
 def deviations(switched: Comparison) -> list[tuple[str, str]]:
     """How far the switched run moves off the reference after td."""
     error, displacement = switched.momentum_error, switched.displacement
-    off = [] if error is None else [("largest error of the momentum after td", f"{error:.2g} of its maximum")]
-    return off if displacement is None else [*off, ("largest displacement after td", f"{displacement:.3g}")]
+    off = (
+        []
+        if error is None
+        else [("largest error of the momentum after td", f"{error:.2g} of its maximum")]
+    )
+    return (
+        off
+        if displacement is None
+        else [*off, ("largest displacement after td", f"{displacement:.3g}")]
+    )
 
 
 def _comparison(switched: Comparison) -> list[str]:
@@ -125,5 +158,12 @@ def _comparison(switched: Comparison) -> list[str]:
 def _of_switched(answer: Verdict) -> dict[str, Any]:
     """Measures of the switched run under names of their own; empty where there is none."""
     found = SWITCHED.plain(answer.switched) if answer.switched else {}
-    found = {name: "; ".join(value) if name == "objections" else value for name, value in found.items()}
-    return {f"switched_{name}": value for name, value in found.items() if name not in ("source", "notes")}
+    found = {
+        name: "; ".join(value) if name == "objections" else value
+        for name, value in found.items()
+    }
+    return {
+        f"switched_{name}": value
+        for name, value in found.items()
+        if name not in ("source", "notes")
+    }

@@ -53,7 +53,9 @@ class Scale(NamedTuple):
     logarithmic: bool
 
 
-def merged(windows: Sequence[tuple[float, float]], gap: float) -> list[tuple[float, float]]:
+def merged(
+    windows: Sequence[tuple[float, float]], gap: float
+) -> list[tuple[float, float]]:
     """Join windows, ascending, that are less than ``gap`` apart [time]: noise makes hundreds that no eye tells apart.
 
     Examples
@@ -79,7 +81,9 @@ def scale_of(low: float, high: float, level: float) -> Scale:
     (Scale(low=0.92, high=2.08, logarithmic=False), True)
     """
     if level > 0 and high > LOGARITHMIC * level:
-        return Scale(max(low, level / BELOW_LEVEL), high * LOGARITHMIC**_ROOM, logarithmic=True)
+        return Scale(
+            max(low, level / BELOW_LEVEL), high * LOGARITHMIC**_ROOM, logarithmic=True
+        )
     room = _ROOM * (high - low or abs(high) or 1.0)
     return Scale(low - room, high + room, logarithmic=False)
 
@@ -87,7 +91,11 @@ def scale_of(low: float, high: float, level: float) -> Scale:
 def scale_in(situation: Situation, seen: View, levels: Sequence[float]) -> Scale:
     """Give the scale for a flight and its levels; where nothing vibrates, beside what the whole run has [energy]."""
     if situation.at_rest:
-        return scale_of(0.0, max(float(situation.history.energy.max()), round_off(situation.history)), 0.0)
+        return scale_of(
+            0.0,
+            max(float(situation.history.energy.max()), round_off(situation.history)),
+            0.0,
+        )
     return scale_of(min(seen.low, *levels), max(seen.high, *levels), median(levels))
 
 
@@ -98,7 +106,9 @@ def view_of(situation: Situation, *times: float) -> View:
     return view(situation.history, situation.flight, [situation.td, *times], known)
 
 
-def view(history: History, flight: Flight, times: list[float], known: float | None = None) -> View:
+def view(
+    history: History, flight: Flight, times: list[float], known: float | None = None
+) -> View:
     """Give what shows a flight and ``times`` [time]; a flight whose end was not seen lasts to ``known``, or the last.
 
     Where no flight is known, the whole record is shown.
@@ -107,7 +117,13 @@ def view(history: History, flight: Flight, times: list[float], known: float | No
     if flight.start is None:
         inner = first, last
     else:
-        end = flight.end if flight.end is not None else known if known is not None else last
+        end = (
+            flight.end
+            if flight.end is not None
+            else known
+            if known is not None
+            else last
+        )
         inner = max(first, min(flight.start, *times)), min(last, max(end, *times))
         inner = inner if inner[0] < inner[1] else (first, last)
     beyond = _BEYOND * (inner[1] - inner[0])
@@ -118,11 +134,22 @@ def view(history: History, flight: Flight, times: list[float], known: float | No
     low, high = float(flown.min()), float(flown.max())
     middle = min(max(start, (begin + stop) / 2), end)
     sides = (("load", start, middle), ("landing", middle, end))
-    highest = [(what, float(history.between(*side)[1].max(initial=high))) for what, *side in sides]
-    return View(start, end, low, high, tuple((what, energy) for what, energy in highest if energy > high))
+    highest = [
+        (what, float(history.between(*side)[1].max(initial=high)))
+        for what, *side in sides
+    ]
+    return View(
+        start,
+        end,
+        low,
+        high,
+        tuple((what, energy) for what, energy in highest if energy > high),
+    )
 
 
-def _flown(history: History, start: float, end: float, inner: tuple[float, float]) -> Samples:
+def _flown(
+    history: History, start: float, end: float, inner: tuple[float, float]
+) -> Samples:
     """Energies in the flight, but for its ends; where it has no state, those between which it lies."""
     off = _UNSURE * (end - start)
     flown = history.between(start + off, end - off)[1]
@@ -137,7 +164,9 @@ class Motion(NamedTuple):
     switched: Samples
 
 
-def replayed_motion(situation: Situation, tr: float, time: Samples | None = None) -> Motion | None:
+def replayed_motion(
+    situation: Situation, tr: float, time: Samples | None = None
+) -> Motion | None:
     """Replay a pair of switch times with the one oscillator that describes the record.
 
     Parameters
@@ -154,8 +183,14 @@ def replayed_motion(situation: Situation, tr: float, time: Samples | None = None
     Motion or None
         None where no single oscillator describes the record at tr.
     """
-    mode, span, td = situation.vibration.whole.mode, situation.evidence.span, situation.td
-    if not (isinstance(mode, Mode) and span and situation.vibration.whole.described(tr)):
+    mode, span, td = (
+        situation.vibration.whole.mode,
+        situation.evidence.span,
+        situation.td,
+    )
+    if not (
+        isinstance(mode, Mode) and span and situation.vibration.whole.described(tr)
+    ):
         return None
     if time is None:
         time = np.linspace(span.start, max(span.end, td), _POINTS)
@@ -165,7 +200,9 @@ def replayed_motion(situation: Situation, tr: float, time: Samples | None = None
     def deformation(state: State) -> Samples:
         return np.asarray(mode.preload + state.y - state.z)
 
-    return Motion(time, deformation(replay.reference(time)), deformation(replay.motion(time)))
+    return Motion(
+        time, deformation(replay.reference(time)), deformation(replay.motion(time))
+    )
 
 
 class Response(NamedTuple):
@@ -185,16 +222,33 @@ class Response(NamedTuple):
 
 def response(situation: Situation) -> Response | None:
     """Give the response of the one oscillator that describes the record; None where none does."""
-    mode, span, td = situation.vibration.whole.mode, situation.evidence.span, situation.td
+    mode, span, td = (
+        situation.vibration.whole.mode,
+        situation.evidence.span,
+        situation.td,
+    )
     if not (isinstance(mode, Mode) and span):
         return None
     time = np.linspace(span.start, max(span.end, td), _POINTS)
     oscillator, _ = from_mode(mode, span.start)
     unit = oscillator.free(State.of(-0.5, 0.5, 0.0, 0.0), time - span.start)
-    return Response(time, np.asarray(mode.deformation(time)), np.asarray(unit.y - unit.z), mode.preload)
+    return Response(
+        time,
+        np.asarray(mode.deformation(time)),
+        np.asarray(unit.y - unit.z),
+        mode.preload,
+    )
 
 
 def locked_in(situation: Situation, tr: float | None) -> float | None:
     """Deformation that tr locks in [square root of energy]; None where no single oscillator describes it."""
-    mode = None if tr is None or not situation.vibration.whole.described(tr) else situation.vibration.whole.mode
-    return float(mode.deformation(tr)) if tr is not None and isinstance(mode, Mode) else None
+    mode = (
+        None
+        if tr is None or not situation.vibration.whole.described(tr)
+        else situation.vibration.whole.mode
+    )
+    return (
+        float(mode.deformation(tr))
+        if tr is not None and isinstance(mode, Mode)
+        else None
+    )

@@ -30,7 +30,9 @@ if TYPE_CHECKING:
 
 
 _MODULES = (reading, sets, times, switched_parts, runs)
-_ALL = (one for module in _MODULES for one in vars(module).values() if isinstance(one, Rule))
+_ALL = (
+    one for module in _MODULES for one in vars(module).values() if isinstance(one, Rule)
+)
 _BY_HISTORY: Final = "D2R2"  # rules that an energy history alone can break
 _ALIKE: Final = 0.9  # of two ids, one of which has one sign more
 # What follows from one mistake of units is not reported beside it.
@@ -39,7 +41,9 @@ _FOLLOW: Final = {
     "D2R207": {"D2R205", "D2R206"},
     "D2R206": {"D2R205"},
 }
-RULES: Final[Mapping[str, Rule]] = {rule.id: rule for rule in sorted(_ALL, key=lambda rule: rule.id)}
+RULES: Final[Mapping[str, Rule]] = {
+    rule.id: rule for rule in sorted(_ALL, key=lambda rule: rule.id)
+}
 
 
 def find_rules(name: str) -> tuple[Rule, ...]:
@@ -50,7 +54,9 @@ def find_rules(name: str) -> tuple[Rule, ...]:
     >>> [rule.id for rule in find_rules("d2r30")]
     ['D2R301', 'D2R302', 'D2R303', 'D2R304', 'D2R305', 'D2R306', 'D2R307']
     """
-    found = tuple(rule for rule in RULES.values() if name and rule.id.startswith(name.upper()))
+    found = tuple(
+        rule for rule in RULES.values() if name and rule.id.startswith(name.upper())
+    )
     if not found:
         raise ConfigurationError(f"no rule {name!r}, {_expected_instead(name, RULES)}")
     return found
@@ -85,9 +91,13 @@ class Configuration(NamedTuple):
         where = f"{self.source}: " if self.source else ""
         for name in (*self.select, *self.ignore, *self.severity):
             exact = name in self.severity and name not in (*self.select, *self.ignore)
-            if name in known or (not exact and name and any(rule.startswith(name) for rule in known)):
+            if name in known or (
+                not exact and name and any(rule.startswith(name) for rule in known)
+            ):
                 continue
-            raise ConfigurationError(f"{where}no rule {name!r}, {_expected_instead(name, known)}")
+            raise ConfigurationError(
+                f"{where}no rule {name!r}, {_expected_instead(name, known)}"
+            )
 
 
 def _expected_instead(name: str, known: Collection[str]) -> str:
@@ -97,7 +107,9 @@ def _expected_instead(name: str, known: Collection[str]) -> str:
     asked = name.upper()
     near = [rule for rule in sorted(known) if _signs_apart(rule, asked) == 1]
     near = near or difflib.get_close_matches(asked, known, n=1, cutoff=_ALIKE)
-    return "an id like D2R101 or its beginning was expected" + (f"; did you mean {near[0]}?" if near else "")
+    return "an id like D2R101 or its beginning was expected" + (
+        f"; did you mean {near[0]}?" if near else ""
+    )
 
 
 def _signs_apart(one: str, other: str) -> int:
@@ -107,28 +119,43 @@ def _signs_apart(one: str, other: str) -> int:
     return sum(a != b for a, b in zip(one, other, strict=True))
 
 
-def read_configuration(table: Mapping[str, object], source: str = "", others: Collection[str] = ()) -> Configuration:
+def read_configuration(
+    table: Mapping[str, object], source: str = "", others: Collection[str] = ()
+) -> Configuration:
     """Configuration from a table of settings; ConfigurationError names what is wrong with it.
 
     ``others`` are keys that are about something else; tables, one for each command, are too.
     """
-    single = [key for key, value in table.items() if key in RULE_KEYS or not isinstance(value, Mapping)]
+    single = [
+        key
+        for key, value in table.items()
+        if key in RULE_KEYS or not isinstance(value, Mapping)
+    ]
     refuse_unknown(single, (*RULE_KEYS, *others), source)
     severity = table.get("severity", {})
     if not isinstance(severity, Mapping):
         found = f"{source}: severity is {toml_text(severity)}"
-        raise ConfigurationError(f"{found}, a table like {{D2R104 = 'warning'}} was expected")
+        raise ConfigurationError(
+            f"{found}, a table like {{D2R104 = 'warning'}} was expected"
+        )
     for rule, value in severity.items():
         if value not in [*Severity]:
             found = f"{source}: severity of {rule} is {toml_text(value)}"
             raise ConfigurationError(f"{found}, one of {', '.join(Severity)} expected")
-    return Configuration(_names(table, "select", source), _names(table, "ignore", source), dict(severity), source)
+    return Configuration(
+        _names(table, "select", source),
+        _names(table, "ignore", source),
+        dict(severity),
+        source,
+    )
 
 
 def _names(table: Mapping[str, object], key: str, source: str) -> tuple[str, ...]:
     value = table.get(key, [])
     if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
-        raise ConfigurationError(f"{source}: {key} is {toml_text(value)}, a list of rule ids was expected")
+        raise ConfigurationError(
+            f"{source}: {key} is {toml_text(value)}, a list of rule ids was expected"
+        )
     return tuple(value)
 
 
@@ -166,7 +193,9 @@ class Checked(NamedTuple):
     solver: str = LS_DYNA
 
 
-def configuration_for(deck: str, asked: Configuration, others: Collection[str] = ()) -> Configuration:
+def configuration_for(
+    deck: str, asked: Configuration, others: Collection[str] = ()
+) -> Configuration:
     """Take the configuration nearest to a deck; what was asked for overrules its keys, ``others`` are none of them.
 
     Raises
@@ -222,9 +251,24 @@ def check_deck(
     order = {path: 0}  # the deck itself first, its includes as they come
     for finding in findings:
         order.setdefault(finding.file, len(order))
-    findings.sort(key=lambda finding: (order[finding.file], finding.line, finding.column, finding.rule))
+    findings.sort(
+        key=lambda finding: (
+            order[finding.file],
+            finding.line,
+            finding.column,
+            finding.rule,
+        )
+    )
     windows, remarks = tuple(_told(case.windows.windows)), tuple(_remarks(case.deck))
-    return Checked(path, windows, tuple(findings), case.switching, tuple(case.deck.files), remarks, solver=case.solver)
+    return Checked(
+        path,
+        windows,
+        tuple(findings),
+        case.switching,
+        tuple(case.deck.files),
+        remarks,
+        solver=case.solver,
+    )
 
 
 def _without_what_follows(findings: list[Finding]) -> list[Finding]:
@@ -243,11 +287,17 @@ def _told(windows: Iterable[Window]) -> Iterator[CheckedWindow]:
 
 
 @cache
-def _rules_for(solver: str, select: tuple[str, ...], ignore: tuple[str, ...], judged: bool) -> tuple[Rule, ...]:
+def _rules_for(
+    solver: str, select: tuple[str, ...], ignore: tuple[str, ...], judged: bool
+) -> tuple[Rule, ...]:
     """Give the rules that count, and look at decks of a solver: there may be thousands of those."""
     asked = Configuration(select, ignore)
-    wanted = (rule for rule in RULES.values() if judged or not rule.id.startswith(_BY_HISTORY))
-    return tuple(rule for rule in wanted if solver in rule.solvers and asked.selects(rule.id))
+    wanted = (
+        rule for rule in RULES.values() if judged or not rule.id.startswith(_BY_HISTORY)
+    )
+    return tuple(
+        rule for rule in wanted if solver in rule.solvers and asked.selects(rule.id)
+    )
 
 
 def _findings(case: Case, configuration: Configuration) -> Iterator[Finding]:
@@ -258,10 +308,20 @@ def _findings(case: Case, configuration: Configuration) -> Iterator[Finding]:
             if silences(rule.id, place.file, place.line):
                 continue
             severity = Severity(configuration.severity.get(rule.id, rule.severity))
-            yield Finding(rule.id, severity, message, case.deck.path, place.file, place.line, place.column)
+            yield Finding(
+                rule.id,
+                severity,
+                message,
+                case.deck.path,
+                place.file,
+                place.line,
+                place.column,
+            )
 
 
-def _read(path: str, content: bytes | None, judge: Judge | None, restarts: Sequence[str]) -> Case:
+def _read(
+    path: str, content: bytes | None, judge: Judge | None, restarts: Sequence[str]
+) -> Case:
     """Read a deck by what it is: a run of Radioss, or an LS-DYNA deck with its restarts."""
     source = SourceFile(path, content)
     of_radioss = source.read(0, 1) != b"*" and recognises(source.read(0, HEAD))
@@ -282,6 +342,8 @@ def _remarks(deck: Deck) -> Iterator[str]:
     """Tell of comments that ignore rules that do not exist."""
     for card in deck.silencing:
         for name in card.block.silenced:
-            if not (name.startswith("D2R") and any(rule.startswith(name) for rule in RULES)):
+            if not (
+                name.startswith("D2R") and any(rule.startswith(name) for rule in RULES)
+            ):
                 where = f"{card.file}: the comment before line {card.line}"
                 yield f"{where} does not name a rule to ignore: {name!r} was found, {_expected_instead(name, RULES)}"

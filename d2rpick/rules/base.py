@@ -9,8 +9,22 @@ from typing import TYPE_CHECKING, TypeVar
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, one_line
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.deck.ls_dyna_parts import Constraint, Parts, read_constraints, read_parts, read_sections
-from d2rpick.deck.switching import Event, Header, SwitchSet, Window, Windows, find_windows, read_switching
+from d2rpick.deck.ls_dyna_parts import (
+    Constraint,
+    Parts,
+    read_constraints,
+    read_parts,
+    read_sections,
+)
+from d2rpick.deck.switching import (
+    Event,
+    Header,
+    SwitchSet,
+    Window,
+    Windows,
+    find_windows,
+    read_switching,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -84,7 +98,11 @@ class Unreadable(NamedTuple):
     @property
     def reason(self) -> str:
         """One line that names the deck."""
-        return f"{self.deck}: {one_line(self.error)}" if self.code == INTERNAL_ERROR else one_line(self.error)
+        return (
+            f"{self.deck}: {one_line(self.error)}"
+            if self.code == INTERNAL_ERROR
+            else one_line(self.error)
+        )
 
 
 @dataclass(eq=False, repr=False)
@@ -117,34 +135,52 @@ class Case:
     @cached_property
     def headers(self) -> tuple[tuple[SwitchSet, Header], ...]:
         """Switching cards that have a header, with it."""
-        return tuple((card, card.header) for card in self.sets if card.header is not None)
+        return tuple(
+            (card, card.header) for card in self.sets if card.header is not None
+        )
 
     @cached_property
     def windows(self) -> Windows:
         """The switching windows of every part, with those of switches by force that the history shows."""
         timed = find_windows(self.sets, self.parts)
         by_force = [window for one in self.forced for window in one.windows]
-        return timed._replace(windows=tuple(sorted((*timed.windows, *by_force), key=lambda one: (one.unit, one.tr))))
+        return timed._replace(
+            windows=tuple(
+                sorted((*timed.windows, *by_force), key=lambda one: (one.unit, one.tr))
+            )
+        )
 
     @cached_property
     def forced(self) -> tuple[Forced, ...]:
         """Switches by force, with what they do in the history; none without one."""
-        if self.judge is None or not any(header.code.value in _BY_FORCE for _, header in self.headers):
+        if self.judge is None or not any(
+            header.code.value in _BY_FORCE for _, header in self.headers
+        ):
             return ()
         from d2rpick.rules.by_force import follow_forced_switches  # not above: start-up
 
         end = min(self.judge.end, self.end or self.judge.end)
-        return tuple(follow_forced_switches(self.deck, find_windows(self.sets, self.parts).events, self.judge, end))
+        return tuple(
+            follow_forced_switches(
+                self.deck, find_windows(self.sets, self.parts).events, self.judge, end
+            )
+        )
 
     @cached_property
     def constraints(self) -> Sequence[Constraint]:
         """What holds nodes together, and may lie in a part that is switched."""
-        return [*read_constraints(self.deck, "nodal rigid body", "extra nodes", "joint")]
+        return [
+            *read_constraints(self.deck, "nodal rigid body", "extra nodes", "joint")
+        ]
 
     @cached_property
     def made_rigid(self) -> tuple[Event, ...]:
         """What makes a part rigid, where it is known which."""
-        return tuple(event for event in self.windows.events if event.line.to_rigid and not event.unit.is_set)
+        return tuple(
+            event
+            for event in self.windows.events
+            if event.line.to_rigid and not event.unit.is_set
+        )
 
     @property
     def whole(self) -> bool:
@@ -154,14 +190,27 @@ class Case:
     @cached_property
     def end_time(self) -> Value[float] | None:
         """ENDTIM as written; of several the last counts."""
-        return next((value for card, value in self.supporting if card.name == "CONTROL_TERMINATION"), None)
+        return next(
+            (
+                value
+                for card, value in self.supporting
+                if card.name == "CONTROL_TERMINATION"
+            ),
+            None,
+        )
 
     @cached_property
     def end(self) -> float | None:
         """The end of the run [time of the deck], where it is known and positive."""
-        if self.end_time is None or self.end_time.problem or not self.end_time.value > 0:
+        if (
+            self.end_time is None
+            or self.end_time.problem
+            or not self.end_time.value > 0
+        ):
             return None
-        factors = [card.transform.time for card in self.deck.named("CONTROL_TERMINATION")]  # none in Radioss
+        factors = [
+            card.transform.time for card in self.deck.named("CONTROL_TERMINATION")
+        ]  # none in Radioss
         return self.end_time.value * (factors[-1] if factors else 1.0)
 
     @property
@@ -178,13 +227,21 @@ class Case:
     def unturned(self) -> Mapping[int, str]:
         """Parts of solids whose stresses do not turn with a rigid body, and their formulation."""
         sections = read_sections(self.deck)
-        found = ((part, sections.get(number)) for part, number in self.parts.sections.items())
-        return {part: f"ELFORM {one.elform}, {one.unturned}" for part, one in found if one and one.unturned}
+        found = (
+            (part, sections.get(number)) for part, number in self.parts.sections.items()
+        )
+        return {
+            part: f"ELFORM {one.elform}, {one.unturned}"
+            for part, one in found
+            if one and one.unturned
+        }
 
     @cached_property
     def unswitchable(self) -> Mapping[int, Unswitchable]:
         """Parts that must not be switched."""
-        from d2rpick.deck.unswitchable import find_unswitchable_in_ls_dyna  # not above: start-up
+        from d2rpick.deck.unswitchable import (
+            find_unswitchable_in_ls_dyna,
+        )  # not above: start-up
 
         return find_unswitchable_in_ls_dyna(self.deck, self.parts)
 
@@ -192,7 +249,9 @@ class Case:
     def supporting(self) -> tuple[tuple[Card, Value[float]], ...]:
         """Numbers of other cards that the rules rely on: ENDTIM, and DT of the energy databases."""
         names = ("CONTROL_TERMINATION", "DATABASE_GLSTAT", "DATABASE_MATSUM")
-        cards = [card for name in names for card in self.deck.named(name)[-1:] if card.rows]
+        cards = [
+            card for name in names for card in self.deck.named(name)[-1:] if card.rows
+        ]
         return tuple((card, card.real(card.rows[0], 0)) for card in cards)
 
 
@@ -218,7 +277,9 @@ class RunCase(Case):
     def parts(self) -> Parts:
         """Parts of the starter deck by id."""
         lines = self.run.starter.parts if self.run.starter else {}
-        return Parts(dict.fromkeys(lines, ""), {part: line.title for part, line in lines.items()})
+        return Parts(
+            dict.fromkeys(lines, ""), {part: line.title for part, line in lines.items()}
+        )
 
     @cached_property
     def sets(self) -> tuple[SwitchSet, ...]:
@@ -240,10 +301,23 @@ class RunCase(Case):
         starter, found = self.run.starter, []
         for body in starter.bodies if starter and self.judge else ():
             parts = self.found.parts.get(body.node.value, set())
-            contacts = find_course(self.run, parts, self.judge.contacts if self.judge else None).contacts
-            own = tuple(one for one in self.windows.windows if one.opened.by.card is body.card)
-            if starter and contacts is not None and own and waits_for_force(starter, body.sensor):
-                found.append(Forced(body.card, (body.card,), own, contacts, "Tdelay of the sensor"))
+            contacts = find_course(
+                self.run, parts, self.judge.contacts if self.judge else None
+            ).contacts
+            own = tuple(
+                one for one in self.windows.windows if one.opened.by.card is body.card
+            )
+            if (
+                starter
+                and contacts is not None
+                and own
+                and waits_for_force(starter, body.sensor)
+            ):
+                found.append(
+                    Forced(
+                        body.card, (body.card,), own, contacts, "Tdelay of the sensor"
+                    )
+                )
         return tuple(found)
 
     @cached_property
@@ -263,15 +337,35 @@ class RunCase(Case):
         from d2rpick.deck.radioss_run import find_course  # not above: start-up
         from d2rpick.deck.radioss_sensors import active_spans
 
-        starter, legs = self.run.starter, [leg for leg in self.run.legs[:-1] if leg.sensor]
+        starter, legs = (
+            self.run.starter,
+            [leg for leg in self.run.legs[:-1] if leg.sensor],
+        )
         sensed = [body for body in starter.bodies if body.sensor] if starter else []
         contacts = self.judge.contacts if self.judge else None
         courses = [
-            (body, find_course(self.run, self.found.parts.get(body.node.value, ()), contacts)) for body in sensed
+            (
+                body,
+                find_course(
+                    self.run, self.found.parts.get(body.node.value, ()), contacts
+                ),
+            )
+            for body in sensed
         ]
-        spans = [(body, active_spans(starter, body.sensor, course)) for body, course in courses if starter]
-        told = [(body.node.field, f"{body.name} is switched by {why}") for body, why in spans if isinstance(why, str)]
-        return *told, *((leg.run.here, f"leg {leg.number} ends when sensor {leg.sensor} is active") for leg in legs)
+        spans = [
+            (body, active_spans(starter, body.sensor, course))
+            for body, course in courses
+            if starter
+        ]
+        told = [
+            (body.node.field, f"{body.name} is switched by {why}")
+            for body, why in spans
+            if isinstance(why, str)
+        ]
+        return *told, *(
+            (leg.run.here, f"leg {leg.number} ends when sensor {leg.sensor} is active")
+            for leg in legs
+        )
 
     @cached_property
     def unturned(self) -> Mapping[int, str]:
@@ -281,9 +375,13 @@ class RunCase(Case):
     @cached_property
     def unswitchable(self) -> Mapping[int, Unswitchable]:
         """Parts that must not be switched."""
-        from d2rpick.deck.unswitchable import find_unswitchable_in_radioss  # not above: start-up
+        from d2rpick.deck.unswitchable import (
+            find_unswitchable_in_radioss,
+        )  # not above: start-up
 
-        return find_unswitchable_in_radioss(self.run.starter) if self.run.starter else {}
+        return (
+            find_unswitchable_in_radioss(self.run.starter) if self.run.starter else {}
+        )
 
     @cached_property
     def flaws(self) -> tuple[Flaw, ...]:
@@ -300,7 +398,11 @@ class RunCase(Case):
         found, start = [], 0.0
         for index, leg in enumerate(self.run.legs):
             stop = leg.stop.value
-            held = [w for w in self.windows.windows if w.tr < stop and (w.td is None or w.td > start)]
+            held = [
+                w
+                for w in self.windows.windows
+                if w.tr < stop and (w.td is None or w.td > start)
+            ]
             if held and stop > start:
                 found.append((index, held))
             start = stop

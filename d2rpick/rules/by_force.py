@@ -23,7 +23,12 @@ if TYPE_CHECKING:
 
     Spans = tuple[tuple[float, float], ...]  # of time
 
-_CODES: Final = {1: False, 2: False, 3: True, 4: True}  # whether a set waits for a force
+_CODES: Final = {
+    1: False,
+    2: False,
+    3: True,
+    4: True,
+}  # whether a set waits for a force
 _NEVER: Final = 1e20
 # A window of so much of the longest one is none that anybody wants.
 _SHORT: Final = 0.1
@@ -45,7 +50,9 @@ class Forced(NamedTuple):
     @property
     def times(self) -> list[tuple[float, float | None]]:
         """Windows of its parts, each once, ascending."""
-        return sorted({(one.tr, one.td) for one in self.windows}, key=lambda pair: pair[0])
+        return sorted(
+            {(one.tr, one.td) for one in self.windows}, key=lambda pair: pair[0]
+        )
 
     @property
     def switches(self) -> int:
@@ -60,12 +67,18 @@ class Forced(NamedTuple):
         return [(tr, td) for tr, td in closed if td - tr >= _SHORT * longest]
 
 
-def follow_forced_switches(deck: Deck, events: Sequence[Event], judge: HistoryJudge, end: float) -> Iterator[Forced]:
+def follow_forced_switches(
+    deck: Deck, events: Sequence[Event], judge: HistoryJudge, end: float
+) -> Iterator[Forced]:
     """Follow the sets of a deck of LS-DYNA that switch by force; none where the history does not show contacts."""
     if not _has_one_force(deck):
         return
-    by_card = {event.by: [one for one in events if one.by is event.by] for event in events}
-    waiting = {card: made for card in by_card if (made := _read_waiting(card)) is not None}
+    by_card = {
+        event.by: [one for one in events if one.by is event.by] for event in events
+    }
+    waiting = {
+        card: made for card in by_card if (made := _read_waiting(card)) is not None
+    }
     for there, rigid in waiting.items():
         if not rigid.to_rigid:
             continue
@@ -73,7 +86,9 @@ def follow_forced_switches(deck: Deck, events: Sequence[Event], judge: HistoryJu
         windows: list[Window] = []
         contacts: Spans = ()
         for event in by_card[there]:
-            pushed = None if event.unit.part is None else judge.pushed([event.unit.part])
+            pushed = (
+                None if event.unit.part is None else judge.pushed([event.unit.part])
+            )
             if pushed is not None:
                 contacts = _shift_contacts(pushed, back)
                 windows += _follow_windows(event, back, by_card, waiting, contacts, end)
@@ -84,7 +99,11 @@ def follow_forced_switches(deck: Deck, events: Sequence[Event], judge: HistoryJu
 
 def _has_one_force(deck: Deck) -> bool:
     """Whether a deck has one contact or rigid wall at most; cards alone have none."""
-    return len(read_entities(deck, "CONTACT").found) + len(read_entities(deck, "RIGIDWALL").found) <= 1
+    return (
+        len(read_entities(deck, "CONTACT").found)
+        + len(read_entities(deck, "RIGIDWALL").found)
+        <= 1
+    )
 
 
 def _read_waiting(card: SwitchSet) -> ForceSwitch | None:
@@ -92,7 +111,16 @@ def _read_waiting(card: SwitchSet) -> ForceSwitch | None:
     header, factor = card.header, card.card.transform.time
     if header is None or header.code.value not in _CODES or not card.switched:
         return None
-    if any(value.problem for value in (header.code, header.time1, header.time2, header.time3, header.paired)):
+    if any(
+        value.problem
+        for value in (
+            header.code,
+            header.time1,
+            header.time2,
+            header.time3,
+            header.paired,
+        )
+    ):
         return None
     latest = header.time2.value * factor
     return ForceSwitch(
@@ -107,13 +135,19 @@ def _read_waiting(card: SwitchSet) -> ForceSwitch | None:
 
 def _shift_contacts(pushed: ContactTimes, back: SwitchSet | None) -> Spans:
     """Give the contacts as the set sees them that makes parts deformable: earlier by the time to fly its OFFSET."""
-    offset = back.header.offset.value if back and back.header and not back.header.offset.problem else 0.0
+    offset = (
+        back.header.offset.value
+        if back and back.header and not back.header.offset.problem
+        else 0.0
+    )
     lead = offset / pushed.speed if pushed.speed and offset > 0 else 0.0
     return tuple((start - lead, end) for start, end in pushed.spans)
 
 
 def _find_pair(
-    there: SwitchSet, by_card: dict[SwitchSet, list[Event]], waiting: dict[SwitchSet, ForceSwitch]
+    there: SwitchSet,
+    by_card: dict[SwitchSet, list[Event]],
+    waiting: dict[SwitchSet, ForceSwitch],
 ) -> SwitchSet | None:
     """Give the set that makes the parts of another deformable again: its pair, or one that names the same parts."""
     units = {event.unit for event in by_card[there]}

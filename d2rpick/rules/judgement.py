@@ -47,7 +47,9 @@ _KEPT: Final = (
     "few-states",
     WRONG_ENERGY,
 )
-_UNKNOWN: Final = "nothing in the history shows when the load is over; give that time as `after`"
+_UNKNOWN: Final = (
+    "nothing in the history shows when the load is over; give that time as `after`"
+)
 
 
 @dataclass
@@ -65,7 +67,9 @@ class HistoryJudge:
     settings: Settings
     done: tuple[Times, ...] = ()
     _references: dict[tuple[int, ...], Reference] = field(default_factory=dict)
-    _faults: dict[tuple[tuple[int, ...], float, float | None], tuple[Fault, ...]] = field(default_factory=dict)
+    _faults: dict[tuple[tuple[int, ...], float, float | None], tuple[Fault, ...]] = (
+        field(default_factory=dict)
+    )
     _cautions: dict[Caution, list[int]] = field(default_factory=dict)
 
     def beside(self, deck: str) -> None:
@@ -89,19 +93,29 @@ class HistoryJudge:
     def cautions(self) -> list[Caution]:
         """What to be aware of, by what was judged so far."""
         return [
-            caution._replace(message=f"{name_units(parts)}: {caution.message}") if parts else caution
+            caution._replace(message=f"{name_units(parts)}: {caution.message}")
+            if parts
+            else caution
             for caution, parts in self._cautions.items()
         ]
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What the readers left out or assumed, by what was judged so far."""
-        return tuple(dict.fromkeys(note for one in self._references.values() for note in one.history.notes))
+        return tuple(
+            dict.fromkeys(
+                note for one in self._references.values() for note in one.history.notes
+            )
+        )
 
     def _reference(self, parts: tuple[int, ...]) -> Reference:
         """Give the run with the energy of some parts, or of the whole model where there are none."""
         if parts not in self._references:
-            chosen = self.selection._replace(parts=tuple(map(str, parts))) if parts else self.selection
+            chosen = (
+                self.selection._replace(parts=tuple(map(str, parts)))
+                if parts
+                else self.selection
+            )
             self._references[parts] = Reference.of(self.run, chosen)
         return self._references[parts]
 
@@ -115,7 +129,11 @@ class HistoryJudge:
         if known and window.part is not None and window.part not in known:
             what = f"not in the history, which has {name_units(known)}; was it renumbered, or not written?"
             return (Fault("D2R205", False, what),)
-        parts = () if window.part is None else tuple(part for part in known if part in {*together})
+        parts = (
+            ()
+            if window.part is None
+            else tuple(part for part in known if part in {*together})
+        )
         key = parts, window.tr, td
         if key not in self._faults:
             if known and not parts:
@@ -134,9 +152,15 @@ class HistoryJudge:
         energies = if_written(lambda: self.run.part_energies(chosen))
         if energies is None:
             return None
-        return tuple(part.id for part, energy in zip(chosen, energies.T, strict=True) if energy.any())
+        return tuple(
+            part.id
+            for part, energy in zip(chosen, energies.T, strict=True)
+            if energy.any()
+        )
 
-    def contacts(self, parts: Collection[int]) -> tuple[tuple[float, float], ...] | None:
+    def contacts(
+        self, parts: Collection[int]
+    ) -> tuple[tuple[float, float], ...] | None:
         """When something pushes some parts [time], by their momenta; None where the history does not show it."""
         found = self.pushed(parts)
         return found and found.spans
@@ -144,22 +168,35 @@ class HistoryJudge:
     def pushed(self, parts: Collection[int]) -> ContactTimes | None:
         """As `contacts`, with how well the times are known."""
         chosen = [part for part in self.run.parts if part.id in parts]
-        momenta = next((one for one in self.run.momenta(chosen, None) if one.parts), None) if chosen else None
+        momenta = (
+            next((one for one in self.run.momenta(chosen, None) if one.parts), None)
+            if chosen
+            else None
+        )
         return find_contact_times(momenta) if momenta else None
 
     @property
     def _known(self) -> tuple[int, ...]:
-        return () if self.selection.energy else tuple(part.id for part in self.run.parts)
+        return (
+            () if self.selection.energy else tuple(part.id for part in self.run.parts)
+        )
 
-    def _judged(self, parts: tuple[int, ...], tr: float, td: float | None) -> Iterator[Fault]:
+    def _judged(
+        self, parts: tuple[int, ...], tr: float, td: float | None
+    ) -> Iterator[Fault]:
         reference = self._reference(parts)
         history = reference.history
         first, last = float(history.time[0]), float(history.time[-1])
         times = [("tr", tr)] if td is None else [("tr", tr), ("td", td)]
-        outside = [(name == "td", name, time) for name, time in times if not first <= time <= last]
+        outside = [
+            (name == "td", name, time)
+            for name, time in times
+            if not first <= time <= last
+        ]
         for at_td, name, time in outside:
             message = (
-                f"{name} = {time:.6g} lies outside the history, {first:.6g} to {last:.6g}; correct it or run longer"
+                f"{name} = {time:.6g} lies outside the history, {first:.6g} to {last:.6g}; "
+                f"correct it or run longer"
             )
             yield Fault("D2R205", at_td, message)
         if outside:
@@ -169,14 +206,22 @@ class HistoryJudge:
             return
         if meant := in_the_record(history.time, [td], history.time_unit):
             found = f"td = {td:.6g} lies within the first ten states of the history, {first:.6g} to {last:.6g}"
-            yield Fault("D2R205", True, f"{found}; is the deck in s and the history not? {meant[0]:.6g} lies in it too")
+            yield Fault(
+                "D2R205",
+                True,
+                f"{found}; is the deck in s and the history not? {meant[0]:.6g} lies in it too",
+            )
             return
         if (tr, td) in self.done:
             return
         verdict = verify_of(reference, tr, td, self.settings)
         if parts and not history.energy.any():
             # nothing to lock in, as the reader's note says; when it may be switched is known by momentum alone
-            yield from _of_flight(verdict) if verdict.situation.flight.start is not None else ()
+            yield from (
+                _of_flight(verdict)
+                if verdict.situation.flight.start is not None
+                else ()
+            )
             return
         for caution in verdict.cautions:
             if caution.code in _KEPT:
@@ -191,9 +236,16 @@ def faults_of(verdict: Verdict) -> Iterator[Fault]:
         found = [Fault("D2R201", False, "; ".join(verdict.reasons))]
     yield from found
     situation = verdict.situation
-    if situation.kinetic_share is not None and situation.kinetic_share > POOR_KINETIC_SHARE:
+    if (
+        situation.kinetic_share is not None
+        and situation.kinetic_share > POOR_KINETIC_SHARE
+    ):
         better = find_better_pair(situation)
-        way_out = f"better: td = {better.td:.6g} with tr = {better.tr:.6g}" if better else "no better td was found"
+        way_out = (
+            f"better: td = {better.td:.6g} with tr = {better.tr:.6g}"
+            if better
+            else "no better td was found"
+        )
         what = f"{situation.kinetic_share:.0%} of the vibration energy is kinetic at td = {situation.td:.6g}"
         yield Fault("D2R203", True, f"{what} and no tr can keep it; {way_out}")
 
@@ -206,7 +258,11 @@ def _of_load(history: History, tr: float, settings: Settings) -> Iterator[Fault]
         return
     around = examine(history, tr, settings)
     start = around.earliest_tr
-    if around.flight.source != "energy" and start is not None and start <= tr <= around.latest_td:
+    if (
+        around.flight.source != "energy"
+        and start is not None
+        and start <= tr <= around.latest_td
+    ):
         return
     if earliest is None:
         yield Fault("D2R204", False, _UNKNOWN)
@@ -225,7 +281,9 @@ def _of_flight(verdict: Verdict) -> Iterator[Fault]:
         yield Fault("D2R204", False, f"tr = {tr:.6g} lies {end}; {_way_out(verdict)}")
     if situation.td > situation.latest_td:
         end = f"after {end_of_flight(situation)}"
-        yield Fault("D2R204", True, f"td = {situation.td:.6g} lies {end}; switch back before it")
+        yield Fault(
+            "D2R204", True, f"td = {situation.td:.6g} lies {end}; switch back before it"
+        )
 
 
 def _of_error(verdict: Verdict) -> Iterator[Fault]:
@@ -245,9 +303,15 @@ def _of_error(verdict: Verdict) -> Iterator[Fault]:
         return
     if error > tolerance:
         parts = situation.history.parts or ()
-        of = f" of the {len(parts)} parts that are switched together" if len(parts) > 1 else ""
+        of = (
+            f" of the {len(parts)} parts that are switched together"
+            if len(parts) > 1
+            else ""
+        )
         levels = f"the energy{of} is {candidate.energy:.4g} at tr and {situation.energy_td:.4g} at td"
-        expected = f"{what} {above(error, tolerance)}, at most {tolerance:g} was expected"
+        expected = (
+            f"{what} {above(error, tolerance)}, at most {tolerance:g} was expected"
+        )
         yield Fault("D2R201", False, f"{levels}: {expected}; {_way_out(verdict)}")
 
 
@@ -257,5 +321,7 @@ def _way_out(verdict: Verdict) -> str:
     if other.recommended:
         return f"tr = {other.recommended.tr:.6g} suits this td"
     if better := find_better_pair(verdict.situation):
-        return f"no tr suits this td; td = {better.td:.6g} with tr = {better.tr:.6g} does"
+        return (
+            f"no tr suits this td; td = {better.td:.6g} with tr = {better.tr:.6g} does"
+        )
     return "no tr suits this td; see d2rpick suggest"

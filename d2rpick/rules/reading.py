@@ -10,14 +10,31 @@ from d2rpick.deck.ls_dyna_parts import element_cards
 from d2rpick.deck.reader import UNKNOWN_KIND, cure, cuts
 from d2rpick.deck.switching import SwitchSet, misspelt
 from d2rpick.rules.base import BOTH, ERROR, INFO, LS_DYNA, WARNING, Case, Objection
-from d2rpick.rules.rule import BACK, END, GOOD, HEAD, PARTS, PASS, THERE, Example, automatic, deck, fails, passes, rule
+from d2rpick.rules.rule import (
+    BACK,
+    END,
+    GOOD,
+    HEAD,
+    PARTS,
+    PASS,
+    THERE,
+    Example,
+    automatic,
+    deck,
+    fails,
+    passes,
+    rule,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from d2rpick.deck.card import Card
 
-_CURES: Final = {"no such file": "add the file or its *INCLUDE_PATH", UNKNOWN_KIND: "check that file separately"}
+_CURES: Final = {
+    "no such file": "add the file or its *INCLUDE_PATH",
+    UNKNOWN_KIND: "check that file separately",
+}
 _INNER = THERE + BACK + END
 
 
@@ -46,8 +63,12 @@ _INERTIA: Final = """\
 
 
 def _elements(keyword: str) -> Example:
-    cards = automatic(1, "0.02", rigid=["1", "2"]) + automatic(2, "0.09", deformable=["1", "2"])
-    return deck(keyword + "\n       1       1       1       2       3       4\n" + cards)
+    cards = automatic(1, "0.02", rigid=["1", "2"]) + automatic(
+        2, "0.09", deformable=["1", "2"]
+    )
+    return deck(
+        keyword + "\n       1       1       1       2       3       4\n" + cards
+    )
 
 
 @fails(
@@ -68,7 +89,11 @@ def _counts(case: Case) -> Iterator[Objection]:
     for card in case.sets:
         if card.count_problem:
             lost = "missing" in card.count_problem
-            rows = "all lines of the card" if lost else "a line per part, and their count on the second line"
+            rows = (
+                "all lines of the card"
+                if lost
+                else "a line per part, and their count on the second line"
+            )
             yield card.card.here, f"{card.count_problem}; write {rows}"
 
 
@@ -78,14 +103,26 @@ def _counts(case: Case) -> Iterator[Objection]:
     Example("*DEFORMABLE_TO_RIGID\n         ?\n"),
     deck(automatic(0, "0.02", rigid=["1"])),
     Example(GOOD.replace("      0.02       0.0", "    0.0135867    0.0")),
-    Example("*SET_PART\n         3\n     &door\n*DEFORMABLE_TO_RIGID\n         3         0      PSET\n"),
-    Example(GOOD.replace("         2         1         1", "       abc         1         1")),
-    Example(HEAD + "*INCLUDE_TRANSFORM\nall.k\n" + f"{'&off':>30s}\n", {"all.k": PARTS + THERE + BACK}),
+    Example(
+        "*SET_PART\n         3\n     &door\n*DEFORMABLE_TO_RIGID\n         3         0      PSET\n"
+    ),
+    Example(
+        GOOD.replace("         2         1         1", "       abc         1         1")
+    ),
+    Example(
+        HEAD + "*INCLUDE_TRANSFORM\nall.k\n" + f"{'&off':>30s}\n",
+        {"all.k": PARTS + THERE + BACK},
+    ),
     Example(GOOD.replace("_AUTOMATIC", "_AUTOMATC")),
     Example(GOOD.replace("*DEFORM", "* DEFORM")),
     Example("*DEFORMABLE_TO_RIGID\n         1         0      WALL\n"),
 )
-@rule("D2R002", ERROR, "a switching keyword, number or &parameter that cannot be read", BOTH)
+@rule(
+    "D2R002",
+    ERROR,
+    "a switching keyword, number or &parameter that cannot be read",
+    BOTH,
+)
 def _fields(case: Case) -> Iterator[Objection]:
     """Fields are 10 columns wide (20 in long format) unless the line has commas. A text in a number's columns, or an
     undefined parameter, stops the run or, worse, is read as something else. So is a keyword that begins like a
@@ -94,7 +131,10 @@ def _fields(case: Case) -> Iterator[Objection]:
     """
     for unknown, near in misspelt(case.deck):
         head = unknown.block.head.strip()
-        yield unknown.here, f"{head!r} is not a switching keyword, so its lines were not read; did you mean {near}?"
+        yield (
+            unknown.here,
+            f"{head!r} is not a switching keyword, so its lines were not read; did you mean {near}?",
+        )
     for card in case.sets:
         for field, problem in card.problems:
             yield field, f"{problem}; check its columns and its parameters"
@@ -103,18 +143,28 @@ def _fields(case: Case) -> Iterator[Objection]:
             yield field, f"{problem}; it is needed to know which parts are switched"
         for support, value in case.supporting:
             if value.problem:
-                yield value.field, f"{value.problem}; *{support.name} is needed to judge the switching times"
+                yield (
+                    value.field,
+                    f"{value.problem}; *{support.name} is needed to judge the switching times",
+                )
 
 
 def _unreadable_members(case: Case) -> Iterator[Problem]:
-    used = dict.fromkeys(line.part.value for card in case.sets for line in card.switched if line.by_set)
-    for set_id in dict.fromkeys(reached for one in used for reached in case.parts.reached(one)):
+    used = dict.fromkeys(
+        line.part.value for card in case.sets for line in card.switched if line.by_set
+    )
+    for set_id in dict.fromkeys(
+        reached for one in used for reached in case.parts.reached(one)
+    ):
         content = case.parts.sets.get(set_id)
         yield from content.problems if content else ()
 
 
 @passes(Example(HEAD + "*INCLUDE\nswitch.k\n" + END, {"switch.k": PARTS + _INNER}))
-@fails(Example(HEAD + "*INCLUDE\nnowhere.k\n" + END), Example(HEAD + "*INCLUDE_AUTO_OFFSET\nswitch.k\n" + END))
+@fails(
+    Example(HEAD + "*INCLUDE\nnowhere.k\n" + END),
+    Example(HEAD + "*INCLUDE_AUTO_OFFSET\nswitch.k\n" + END),
+)
 @rule("D2R003", ERROR, "an include file is missing or cannot be read", BOTH)
 def _includes(case: Case) -> Iterator[Objection]:
     """Looked for in the main deck's folder, in the *INCLUDE_PATH folders and in the including file's folder. A file
@@ -132,24 +182,40 @@ def _includes(case: Case) -> Iterator[Objection]:
 
 @passes(Example(HEAD + _PARAMETER + _PARAMETER + _BY_NAME))
 @fails(Example(HEAD + _PARAMETER + "*PARAMETER\nR tr           0.03\n" + _BY_NAME))
-@rule("D2R109", WARNING, "a parameter used by a card is defined twice with different values")
+@rule(
+    "D2R109",
+    WARNING,
+    "a parameter used by a card is defined twice with different values",
+)
 def _ambiguous(case: Case) -> Iterator[Objection]:
     """LS-DYNA by default warns and keeps the first definition; *PARAMETER_DUPLICATION and _MUTABLE change that, and
     other readers of decks keep the last. A switching time should not depend on it.
     """
-    uses = [(card.card, value) for card in case.sets for value in card.values if value.parameters]
+    uses = [
+        (card.card, value)
+        for card in case.sets
+        for value in card.values
+        if value.parameters
+    ]
     if case.sets:
         uses += [(card, value) for card, value in case.supporting if value.parameters]
     seen: set[tuple[Card, str]] = set()
     for card, value in uses:
         for name in card.scope.closure(value.parameters):
             first, *others = card.scope.definitions(name) or (None,)
-            differing = [other for other in others if other and first and other.value != first.value]
+            differing = [
+                other
+                for other in others
+                if other and first and other.value != first.value
+            ]
             if first and differing and (card, name) not in seen:
                 seen.add((card, name))
                 other, place = differing[0], first.place
                 found = f"parameter &{name} is {first.value} at {place.at} but {other.value} at {other.place.at}"
-                yield value.field, f"{found}; which one counts depends on the solver: keep one"
+                yield (
+                    value.field,
+                    f"{found}; which one counts depends on the solver: keep one",
+                )
 
 
 @passes(_transformed("1.0"), _transformed("0.0"))
@@ -167,7 +233,14 @@ def _scaled(case: Case) -> Iterator[Objection]:
             yield card.card.here, f"{found}; {why}: move the card to the main deck"
 
 
-@fails(Example(GOOD.replace(END, "-----BEGIN PGP MESSAGE-----\nhQEMA\n-----END PGP MESSAGE-----\n") + END))
+@fails(
+    Example(
+        GOOD.replace(
+            END, "-----BEGIN PGP MESSAGE-----\nhQEMA\n-----END PGP MESSAGE-----\n"
+        )
+        + END
+    )
+)
 @rule("D2R303", INFO, "encrypted block: cards may hide in it")
 def _encrypted(case: Case) -> Iterator[Objection]:
     """Vendor models hold blocks between BEGIN PGP MESSAGE and END PGP MESSAGE that only the solver can read."""
@@ -177,7 +250,10 @@ def _encrypted(case: Case) -> Iterator[Objection]:
 
 
 @passes(Example(GOOD.removesuffix(END)))
-@fails(Example(GOOD.removesuffix("      PART\n" + END)), Example(GOOD.removesuffix(END) + "*NODE\n       1\n"))
+@fails(
+    Example(GOOD.removesuffix("      PART\n" + END)),
+    Example(GOOD.removesuffix(END) + "*NODE\n       1\n"),
+)
 @rule("D2R011", WARNING, "a file of the deck seems to be cut", BOTH)
 def _cut(case: Case) -> Iterator[Objection]:
     """A file without *END (Radioss: /END) whose last line has no line end may have lost the end of a number, and all
@@ -185,7 +261,10 @@ def _cut(case: Case) -> Iterator[Objection]:
     parts or parameters may be missing. d2rpick parts computes no cost from a mesh that is cut.
     """
     for block, told in cuts(case.deck):
-        yield Field("", block, 0, 1), f"{told} What is missing was not checked: {cure(block)}"
+        yield (
+            Field("", block, 0, 1),
+            f"{told} What is missing was not checked: {cure(block)}",
+        )
 
 
 @fails(deck("*COMMENT c:" + THERE))
@@ -195,7 +274,10 @@ def _disabled(case: Case) -> Iterator[Objection]:
     switching card looks alive and is not.
     """
     for card in case.deck.disabled:
-        yield card.here, f"the keyword line {card.block.head.strip()!r} is a comment: this card does nothing"
+        yield (
+            card.here,
+            f"the keyword line {card.block.head.strip()!r} is a comment: this card does nothing",
+        )
 
 
 @fails(
@@ -203,7 +285,12 @@ def _disabled(case: Case) -> Iterator[Objection]:
     Example("*RIGID_DEFORMABLE_R2D\n         1\n"),
     Example("*DEFORMABLE_TO_RIGID\n         1\n"),
 )
-@rule("D2R302", INFO, "not judged by time: CODE 1-5, restart cards, plain *DEFORMABLE_TO_RIGID", BOTH)
+@rule(
+    "D2R302",
+    INFO,
+    "not judged by time: CODE 1-5, restart cards, plain *DEFORMABLE_TO_RIGID",
+    BOTH,
+)
 def _untimed(case: Case) -> Iterator[Objection]:
     """CODE 1 to 4 switch by a contact or wall force, CODE 5 by a sensor, restart cards when the restart begins, plain
     cards at the start, a Radioss body by a sensor other than /SENSOR/TIME: no time on the card can be compared with an
@@ -223,7 +310,11 @@ def _untimed(case: Case) -> Iterator[Objection]:
             yield card.card.here, f"*{card.card.name} {reason}; not judged by time"
 
 
-@passes(PASS, _elements("*ELEMENT_SHELL_COMPOSITE"), Example(GOOD.replace(END, "*ELEMENT_SHELL_DOF\n")))
+@passes(
+    PASS,
+    _elements("*ELEMENT_SHELL_COMPOSITE"),
+    Example(GOOD.replace(END, "*ELEMENT_SHELL_DOF\n")),
+)
 @fails(_elements("*ELEMENT_SHELL_DOF"), _elements("*ELEMENT_BEAM_PID"))
 @rule("D2R304", INFO, "elements of a kind that is not searched for shared nodes")
 def _unread(case: Case) -> Iterator[Objection]:
@@ -237,11 +328,16 @@ def _unread(case: Case) -> Iterator[Objection]:
     for card in element_cards(case.deck, searched=False):
         first.setdefault(card.name, card)
     for card in first.values():
-        yield card.here, f"nodes that parts share were not searched in *{card.name}, whose lines are not followed"
+        yield (
+            card.here,
+            f"nodes that parts share were not searched in *{card.name}, whose lines are not followed",
+        )
 
 
 @fails(deck(_INERTIA + THERE + BACK), deck(_INERTIA))
-@rule("D2R305", INFO, "*DEFORMABLE_TO_RIGID_INERTIA: mass and inertia given for a switch")
+@rule(
+    "D2R305", INFO, "*DEFORMABLE_TO_RIGID_INERTIA: mass and inertia given for a switch"
+)
 def _inertias(case: Case) -> Iterator[Objection]:
     """The card replaces the mass properties that the solver computes from the mesh when the part is made rigid; left
     over from another state of the model they are wrong without a word. Source: vendor keyword data.
@@ -252,18 +348,34 @@ def _inertias(case: Case) -> Iterator[Objection]:
         if card.kind != "inertia" or card.part is None:
             continue
         part = card.part.value
-        used = "" if part in made or unknown else f"; no card of this deck makes part {part} rigid"
-        yield card.card.here, f"gives mass and inertia of part {part} for when a switch makes it rigid{used}"
+        used = (
+            ""
+            if part in made or unknown
+            else f"; no card of this deck makes part {part} rigid"
+        )
+        yield (
+            card.card.here,
+            f"gives mass and inertia of part {part} for when a switch makes it rigid{used}",
+        )
 
 
 @passes(Example(THERE + BACK), Example(GOOD, stdin=True))
 @fails(Example(THERE + BACK, stdin=True))
-@rule("D2R306", INFO, "switching cards on standard input without parts: ids are not checked")
+@rule(
+    "D2R306",
+    INFO,
+    "switching cards on standard input without parts: ids are not checked",
+)
 def _without_parts(case: Case) -> Iterator[Objection]:
     """A file of cards alone is for another deck to include, which is checked with it. Cards on standard input, as in
     d2rpick card ... | d2rpick check -, have no deck around them: that their parts exist is not known.
     """
-    if case.deck.path == STDIN and case.sets and not case.parts.materials and case.parts.all_known:
+    if (
+        case.deck.path == STDIN
+        and case.sets
+        and not case.parts.materials
+        and case.parts.all_known
+    ):
         told = "the parts are unknown: no *PART came with the cards, so their ids were not checked"
         yield case.sets[0].card.here, told
 
@@ -277,6 +389,10 @@ def _reason(card: SwitchSet) -> str:
         return ""  # it only lets restarts switch
     if card.kind == "plain":
         return "acts at the start of the run"
-    if card.header is None or card.header.code.problem or card.header.code.value not in _CODES:
+    if (
+        card.header is None
+        or card.header.code.problem
+        or card.header.code.value not in _CODES
+    ):
         return ""
     return "switches " + _CODES[card.header.code.value].format(card.header.entno.value)

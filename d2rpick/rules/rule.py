@@ -40,7 +40,9 @@ class Rule(NamedTuple):
     severity: Severity
     summary: str
     explanation: str
-    check: Callable[[Any], Iterable[Objection]]  # of a Case; of a RunCase where it looks at Radioss alone
+    check: Callable[
+        [Any], Iterable[Objection]
+    ]  # of a Case; of a RunCase where it looks at Radioss alone
     passing: tuple[Example, ...]
     failing: tuple[Example, ...]
     solvers: tuple[str, ...] = (LS_DYNA,)  # whose decks it looks at
@@ -86,7 +88,10 @@ def automatic(
         f"{swset:10d}{code:10d}{time1:>10s}       0.0       0.0         0{relsw:10d}{paired:10d}",
         "$     nrbf      ncsf       rwf     dtmax       d2r       r2d    offset",
         f"         0         0         0       0.0{d2r:10d}{r2d:10d}       0.0",
-        *(f"{line:>10s}         0      PART" if len(line) <= 10 else line for line in rigid),
+        *(
+            f"{line:>10s}         0      PART" if len(line) <= 10 else line
+            for line in rigid
+        ),
         *(f"{line:>10s}      PART" for line in deformable),
     ]
     return "\n".join(lines) + "\n"
@@ -112,7 +117,9 @@ PASS = Example(GOOD)
 
 GROUP: Final = "/GRNOD/PART/7\nbox\n         1\n"
 _SHELL: Final = "/SHELL/1\n         1         1         2         3         4\n"
-_BODY: Final = "/RBODY/1\nbox\n{}         0         0         0                   0         7\n"
+_BODY: Final = (
+    "/RBODY/1\nbox\n{}         0         0         0                   0         7\n"
+)
 
 
 def starter_deck(group: str = GROUP, body: str = "      1808", more: str = "") -> str:
@@ -121,13 +128,17 @@ def starter_deck(group: str = GROUP, body: str = "      1808", more: str = "") -
     return f"{head}{_SHELL}{_BODY.format(body)}{group}{more}/END\n"
 
 
-def engine_files(*legs: tuple[str, str], cap: str = "1e-5 1e-5", node: str = "1808") -> dict[str, str]:
+def engine_files(
+    *legs: tuple[str, str], cap: str = "1e-5 1e-5", node: str = "1808"
+) -> dict[str, str]:
     """Write engine files: end and state of every leg."""
     files = {}
     for number, (stop, state) in enumerate(legs, start=1):
         limit = f"/DTIX\n{cap}\n" if state == "ON" and cap else ""
         switch = f"/RBODY/{state}\n{node}\n" if state else ""
-        files[f"box_{number:04d}.rad"] = f"/RUN/box/{number}\n{stop:>20}\n/VERS/2022\n{switch}{limit}"
+        files[f"box_{number:04d}.rad"] = (
+            f"/RUN/box/{number}\n{stop:>20}\n/VERS/2022\n{switch}{limit}"
+        )
     return files
 
 
@@ -146,7 +157,14 @@ def rule(
     """Make a rule of a function that finds what is wrong with a case; its docstring is the explanation."""
     passing = (PASS if LS_DYNA in solvers else GOOD_RUN,)
     return lambda check: Rule(
-        id_, severity, summary, " ".join((check.__doc__ or "").split()), check, passing, (), solvers
+        id_,
+        severity,
+        summary,
+        " ".join((check.__doc__ or "").split()),
+        check,
+        passing,
+        (),
+        solvers,
     )
 
 

@@ -10,7 +10,17 @@ from d2rpick.deck.force_switching import find_delay_without_chatter
 from d2rpick.deck.ls_dyna_parts import Entities, read_entities
 from d2rpick.deck.switching import BY_SENSOR, BY_TIME, Header, SwitchSet, Unit
 from d2rpick.rules.base import BOTH, ERROR, WARNING, Case, Objection
-from d2rpick.rules.rule import BACK, PASS, THERE, Example, automatic, deck, fails, passes, rule
+from d2rpick.rules.rule import (
+    BACK,
+    PASS,
+    THERE,
+    Example,
+    automatic,
+    deck,
+    fails,
+    passes,
+    rule,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -24,7 +34,9 @@ _FAMILIES: Final = (_OF_WALL, _OF_CONTACT)
 _WITHOUT_FORCE, _WITH_FORCE = {1, 2}, {3, 4}
 
 
-def _pair(codes: tuple[int, int], signs: tuple[int, int] = (1, -1), back: int = 1) -> Example:
+def _pair(
+    codes: tuple[int, int], signs: tuple[int, int] = (1, -1), back: int = 1
+) -> Example:
     there = automatic(1, "0.0", rigid=["1"], code=codes[0], pair=(2, signs[0]))
     again = automatic(2, "0.0", deformable=["1"], code=codes[1], pair=(back, signs[1]))
     return deck(there + again)
@@ -52,7 +64,8 @@ def _contact(name: str, number: int = 7) -> str:
 _FLOOR: Final = _contact("SURFACE_TO_SURFACE")
 _BY_ORDER: Final = "*CONTACT_NODES_TO_SURFACE\n" + 3 * ("         0" * 8 + "\n")
 _WALL: Final = (
-    "*RIGIDWALL_PLANAR_ID\n         3ground\n         0         0         0\n       0.0       0.0       0.0\n"
+    "*RIGIDWALL_PLANAR_ID\n         3ground\n         0         0         0\n       "
+    "0.0       0.0       0.0\n"
 )
 
 
@@ -69,13 +82,19 @@ def _unique(case: Case) -> Iterator[Objection]:
             continue
         known = first.setdefault(header.swset.value, header)
         if known is not header:
-            found = f"SWSET {header.swset.value} is already used at {known.swset.field.at}"
+            found = (
+                f"SWSET {header.swset.value} is already used at {known.swset.field.at}"
+            )
             yield header.swset.field, f"{found}; give every set its own id"
 
 
 @passes(_pair((2, 4)), _pair((1, 3)))
 @fails(_pair((2, 4), back=7), _pair((2, 4), signs=(1, 1)), _pair((1, 4)))
-@rule("D2R005", ERROR, "RELSW/PAIRED not mutual, not of opposite sign, or CODEs of different families")
+@rule(
+    "D2R005",
+    ERROR,
+    "RELSW/PAIRED not mutual, not of opposite sign, or CODEs of different families",
+)
 def _mutual(case: Case) -> Iterator[Objection]:
     """Paired sets alternate as a contact or wall force comes and goes: each names the other in RELSW, PAIRED is 1
     for the one that acts first and -1 for the other, and their CODEs are 1 and 3 (wall) or 2 and 4 (contact). Sets,
@@ -87,28 +106,48 @@ def _mutual(case: Case) -> Iterator[Objection]:
     for _, header in case.headers:
         problem = _alone(header)
         partner = by_id.get(header.relsw.value)
-        if not problem and header.relsw.value and partner is None and not case.deck.unread:
+        if (
+            not problem
+            and header.relsw.value
+            and partner is None
+            and not case.deck.unread
+        ):
             problem = f"RELSW names set {header.relsw.value}, which no card defines"
         if not problem and header.relsw.value and partner is not None:
-            first = header.swset.value < partner.swset.value  # what both share is said once, at one of them
+            first = (
+                header.swset.value < partner.swset.value
+            )  # what both share is said once, at one of them
             if partner.relsw.value != header.swset.value or partner is header:
                 problem = f"RELSW names set {header.relsw.value}, which names set {partner.relsw.value}"
             elif first:
                 problem = _mismatch(header, partner)
         if problem:
-            yield header.relsw.field, f"{problem}; check RELSW, PAIRED and CODE of both sets"
+            yield (
+                header.relsw.field,
+                f"{problem}; check RELSW, PAIRED and CODE of both sets",
+            )
     for header, problem in _swapped(case):
         yield header.code.field, f"{problem}; exchange the CODEs"
 
 
 def _swapped(case: Case) -> Iterator[tuple[Header, str]]:
     """Sets that make the same parts rigid under a force and deformable without one, paired or not."""
-    rigid = [(card, header) for card, header in case.headers if header.code.value in _WITH_FORCE]
-    back = [(card, header) for card, header in case.headers if header.code.value in _WITHOUT_FORCE]
+    rigid = [
+        (card, header)
+        for card, header in case.headers
+        if header.code.value in _WITH_FORCE
+    ]
+    back = [
+        (card, header)
+        for card, header in case.headers
+        if header.code.value in _WITHOUT_FORCE
+    ]
     for there, header in rigid:
         for again, other in back:
             family = {header.code.value, other.code.value} in _FAMILIES
-            if family and _units(case, there, to_rigid=True) & _units(case, again, to_rigid=False):
+            if family and _units(case, there, to_rigid=True) & _units(
+                case, again, to_rigid=False
+            ):
                 ids = f"sets {header.swset.value} and {other.swset.value}"
                 found = f"{ids} make parts rigid while there is a force and deformable while there is none"
                 why = "rigid in the impact and deformable in flight: the CODEs seem to be swapped"
@@ -117,7 +156,11 @@ def _swapped(case: Case) -> Iterator[tuple[Header, str]]:
 
 
 def _units(case: Case, card: SwitchSet, *, to_rigid: bool) -> set[Unit]:
-    return {event.unit for event in case.windows.events if event.by is card and event.line.to_rigid == to_rigid}
+    return {
+        event.unit
+        for event in case.windows.events
+        if event.by is card and event.line.to_rigid == to_rigid
+    }
 
 
 def _alone(header: Header) -> str:
@@ -146,19 +189,40 @@ def _mismatch(one: Header, other: Header) -> str:
 def _timed_pair(case: Case) -> Iterator[Objection]:
     """For one window by time two unpaired sets are enough."""
     for _, header in case.headers:
-        if header.paired.value and header.code.value == BY_TIME and not header.code.problem:
+        if (
+            header.paired.value
+            and header.code.value == BY_TIME
+            and not header.code.problem
+        ):
             found = f"PAIRED is {header.paired.value} with CODE 0; a pair alternates by force"
-            yield header.paired.field, f"{found}, a switch by time needs none: set PAIRED and RELSW to 0"
+            yield (
+                header.paired.field,
+                f"{found}, a switch by time needs none: set PAIRED and RELSW to 0",
+            )
 
 
 def _by_force(case: Case, codes: set[int]) -> Iterator[Header]:
     for _, header in case.headers:
-        if not header.code.problem and not header.entno.problem and header.code.value in codes:
+        if (
+            not header.code.problem
+            and not header.entno.problem
+            and header.code.value in codes
+        ):
             yield header
 
 
-@passes(_with_floor(4, 7), _force(4, 1, contact=_BY_ORDER), _force(3, 3, contact=_WALL), Example(THERE + BACK))
-@fails(_with_floor(4, 8), _force(4, 7), _force(3, 4, contact=_WALL), _force(2, 2, contact=_BY_ORDER))
+@passes(
+    _with_floor(4, 7),
+    _force(4, 1, contact=_BY_ORDER),
+    _force(3, 3, contact=_WALL),
+    Example(THERE + BACK),
+)
+@fails(
+    _with_floor(4, 8),
+    _force(4, 7),
+    _force(3, 4, contact=_WALL),
+    _force(2, 2, contact=_BY_ORDER),
+)
 @rule("D2R007", ERROR, "ENTNO names no contact or rigid wall of the deck")
 def _there(case: Case) -> Iterator[Objection]:
     """CODE 2 and 4 wait for the force of contact ENTNO, 1 and 3 for that of a rigid wall. One that does not exist
@@ -176,13 +240,26 @@ def _there(case: Case) -> Iterator[Objection]:
                 number = f"ENTNO is {header.entno.value}, but"
                 if entities.found:
                     found = f"{number} no {what} has this number: the deck has {_listed(entities)}"
-                    yield header.entno.field, f"{found}; the switch never comes: give the number of one of them"
+                    yield (
+                        header.entno.field,
+                        f"{found}; the switch never comes: give the number of one of them",
+                    )
                 else:
-                    yield header.entno.field, f"{number} the deck has no {what}, so the switch never comes; add one"
+                    yield (
+                        header.entno.field,
+                        f"{number} the deck has no {what}, so the switch never comes; add one",
+                    )
 
 
-@passes(_with_floor(4, 7), _force(2, 1, contact=_BY_ORDER), _force(3, 7, contact=_contact("GENERAL") + _WALL))
-@fails(_force(4, 7, contact=_contact("GENERAL")), _force(2, 7, contact=_contact("SINGLE_SURFACE")))
+@passes(
+    _with_floor(4, 7),
+    _force(2, 1, contact=_BY_ORDER),
+    _force(3, 7, contact=_contact("GENERAL") + _WALL),
+)
+@fails(
+    _force(4, 7, contact=_contact("GENERAL")),
+    _force(2, 7, contact=_contact("SINGLE_SURFACE")),
+)
 @rule("D2R008", ERROR, "ENTNO names a contact whose force cannot trigger a switch")
 def _able(case: Case) -> Iterator[Objection]:
     """Only surface-to-surface and nodes-to-surface contacts switch parts by their force; one of type GENERAL or
@@ -195,14 +272,22 @@ def _able(case: Case) -> Iterator[Objection]:
         named = entities.named(header.entno.value) if entities else None
         if named and entities and not named.triggers:
             others = [one for one in entities.found if one.triggers]
-            able = f" (here: {_listed(entities._replace(found=tuple(others)))})" if others else ""
+            able = (
+                f" (here: {_listed(entities._replace(found=tuple(others)))})"
+                if others
+                else ""
+            )
             found = f"ENTNO {header.entno.value} is *{named.keyword}, whose force triggers no switch"
-            yield header.entno.field, f"{found}; choose a surface-to-surface or nodes-to-surface contact{able}"
+            yield (
+                header.entno.field,
+                f"{found}; choose a surface-to-surface or nodes-to-surface contact{able}",
+            )
 
 
 def _listed(entities: Entities) -> str:
     texts = [
-        f"{one.id or one.number} (*{one.keyword}{f' {one.title!r}' if one.title else ''})" for one in entities.found
+        f"{one.id or one.number} (*{one.keyword}{f' {one.title!r}' if one.title else ''})"
+        for one in entities.found
     ]
     return listing(texts, most=_MOST_LISTED)
 
@@ -214,8 +299,16 @@ def _sensed(control: str) -> Example:
     return deck(control + automatic(20, "0.0", rigid=["1"], code=BY_SENSOR))
 
 
-@passes(PASS, _sensed(_CONTROL.format(20)), _sensed("*SENSOR_CONTROL_TITLE\nby force\n" + _CONTROL.format(20)[16:]))
-@fails(_sensed(""), _sensed(_CONTROL.format(21)), _sensed(_CONTROL.format(20).replace("DEF2RIG", " AIRBAG")))
+@passes(
+    PASS,
+    _sensed(_CONTROL.format(20)),
+    _sensed("*SENSOR_CONTROL_TITLE\nby force\n" + _CONTROL.format(20)[16:]),
+)
+@fails(
+    _sensed(""),
+    _sensed(_CONTROL.format(21)),
+    _sensed(_CONTROL.format(20).replace("DEF2RIG", " AIRBAG")),
+)
 @rule("D2R012", ERROR, "CODE 5 without a *SENSOR_CONTROL that switches the set")
 def _uncontrolled(case: Case) -> Iterator[Objection]:
     """A set with CODE 5 is switched by a *SENSOR_CONTROL with TYPE DEF2RIG whose TYPEID is its SWSET. Without one it
@@ -224,11 +317,22 @@ def _uncontrolled(case: Case) -> Iterator[Objection]:
     """
     if not case.whole:
         return
-    controlled = {number for card in case.deck.named("SENSOR_CONTROL") for number in _controlled(card)}
+    controlled = {
+        number
+        for card in case.deck.named("SENSOR_CONTROL")
+        for number in _controlled(card)
+    }
     for _, header in case.headers:
-        if header.code.value == BY_SENSOR and not header.code.problem and header.swset.value not in controlled:
+        if (
+            header.code.value == BY_SENSOR
+            and not header.code.problem
+            and header.swset.value not in controlled
+        ):
             found = f"no *SENSOR_CONTROL of type DEF2RIG has TYPEID {header.swset.value}, so set {header.swset.value}"
-            yield header.code.field, f"{found} never switches; add one, or choose another CODE"
+            yield (
+                header.code.field,
+                f"{found} never switches; add one, or choose another CODE",
+            )
 
 
 def _controlled(card: Card) -> Iterator[int]:
@@ -254,11 +358,20 @@ def _delay(case: Case) -> Iterator[Objection]:
     force of a contact is zero and not zero many times in one impact, and the parts chatter. Of a pair one set has to
     wait. Source: vendor keyword data for the meaning; a public drop tool reports the chatter.
     """
-    waiting = {header.swset.value for _, header in case.headers if header.time3.value > 0}
+    waiting = {
+        header.swset.value for _, header in case.headers if header.time3.value > 0
+    }
     for header in _by_force(case, _OF_CONTACT):
-        if not header.time3.problem and header.time3.value == 0 and header.relsw.value not in waiting:
+        if (
+            not header.time3.problem
+            and header.time3.value == 0
+            and header.relsw.value not in waiting
+        ):
             found = f"TIME3 is 0 with CODE {header.code.value}: the parts may switch back and forth in every contact"
-            yield header.time3.field, f"{found}; set it to a time in which the contact settles"
+            yield (
+                header.time3.field,
+                f"{found}; set it to a time in which the contact settles",
+            )
 
 
 @passes(PASS, _with_floor(4, 7))
@@ -297,6 +410,15 @@ def _chatters(case: Case) -> Iterator[Objection]:
         short = len(one.times) - len(one.lasting)
         if short:
             wait = find_delay_without_chatter(one.lasting, one.contacts)
-            cure = f"; {wait:.3g} or more as {one.wait} leaves {len(one.lasting)}" if wait else ""
-            found = f"{one.switches} switches by the history, in {len(one.times)} windows"
-            yield one.place.here, f"{found}, {short} of which are below a tenth of the longest{cure}"
+            cure = (
+                f"; {wait:.3g} or more as {one.wait} leaves {len(one.lasting)}"
+                if wait
+                else ""
+            )
+            found = (
+                f"{one.switches} switches by the history, in {len(one.times)} windows"
+            )
+            yield (
+                one.place.here,
+                f"{found}, {short} of which are below a tenth of the longest{cure}",
+            )

@@ -8,7 +8,17 @@ from d2rpick.base.errors import name_units
 from d2rpick.base.graph import reached
 from d2rpick.deck.ls_dyna_parts import Parts, element_cards
 from d2rpick.rules.base import BOTH, ERROR, INFO, WARNING, Case, Objection, grouped
-from d2rpick.rules.rule import BACK, PASS, THERE, Example, automatic, deck, fails, passes, rule
+from d2rpick.rules.rule import (
+    BACK,
+    PASS,
+    THERE,
+    Example,
+    automatic,
+    deck,
+    fails,
+    passes,
+    rule,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
@@ -35,8 +45,11 @@ def _both(*lines: str) -> Example:
 _LAYERS, _BEAMS = (
     Example(_both("1", "2").deck.replace(_TOUCHING, text))
     for text in (
-        _TOUCHING.replace("SHELL", "SHELL_COMPOSITE").replace("       4\n", "       4\n         1       0.5\n"),
-        "*ELEMENT_BEAM_ELFORM\n" + "".join(f"{one:8d}{one:8d}{one:8d}{one + 1:8d}\n{1:10d}\n" for one in (1, 2)),
+        _TOUCHING.replace("SHELL", "SHELL_COMPOSITE").replace(
+            "       4\n", "       4\n         1       0.5\n"
+        ),
+        "*ELEMENT_BEAM_ELFORM\n"
+        + "".join(f"{one:8d}{one:8d}{one:8d}{one + 1:8d}\n{1:10d}\n" for one in (1, 2)),
     )
 )
 
@@ -46,7 +59,11 @@ _MESH: Final = "*ELEMENT_SHELL\n       1       1       1       2       3       4
 _SET: Final = "*SET_NODE_LIST\n         5\n         3         4        99\n"
 _NODAL: Final = "*CONSTRAINED_NODAL_RIGID_BODY\n         9         0         5\n"
 _EXTRA: Final = "*CONSTRAINED_EXTRA_NODES_NODE\n         8         3\n"
-_JOINT: Final = "*CONSTRAINED_JOINT_REVOLUTE\n" + "".join(f"{node:10d}" for node in (3, 3, 50, 51, 52, 53)) + "\n"
+_JOINT: Final = (
+    "*CONSTRAINED_JOINT_REVOLUTE\n"
+    + "".join(f"{node:10d}" for node in (3, 3, 50, 51, 52, 53))
+    + "\n"
+)
 _COUNTS: Final = "         0         0         0       0.0         1         0"
 
 
@@ -64,13 +81,18 @@ def _by_card(events: Iterable[Event]) -> Iterator[tuple[SwitchSet, Field, str]]:
     """Each card with some events, where the first of them stands, and the names of all its units."""
     for card, those in grouped((event.by, event) for event in events).items():
         by_kind = grouped((event.unit.kind, event.unit.id) for event in those)
-        named = " and ".join(name_units(ids, kind) for kind, ids in sorted(by_kind.items()))
+        named = " and ".join(
+            name_units(ids, kind) for kind, ids in sorted(by_kind.items())
+        )
         yield card, those[0].line.part.field, named
 
 
 def _unknown_members(case: Case, *, to_rigid: bool) -> bool:
     """Whether a part set that cannot be resolved is switched: any part may be in it."""
-    return any(event.unit.is_set and event.line.to_rigid == to_rigid for event in case.windows.events)
+    return any(
+        event.unit.is_set and event.line.to_rigid == to_rigid
+        for event in case.windows.events
+    )
 
 
 @fails(deck(BACK), deck(THERE + BACK.replace("  1  ", "  2  ")))
@@ -84,10 +106,14 @@ def _never_rigid(case: Case) -> Iterator[Objection]:
     orphans = [
         event
         for event in case.windows.orphans
-        if event.unit not in case.windows.other_rigid and not case.parts.is_rigid(event.unit.id)
+        if event.unit not in case.windows.other_rigid
+        and not case.parts.is_rigid(event.unit.id)
     ]
     for _, place, named in _by_card(orphans):
-        yield place, f"{named} switched back, but no card makes it rigid before; add the D2R line or remove this"
+        yield (
+            place,
+            f"{named} switched back, but no card makes it rigid before; add the D2R line or remove this",
+        )
 
 
 _RESTART: Final = "*RIGID_DEFORMABLE_D2R\n{:10d}\n*RIGID_DEFORMABLE_R2D\n{:10d}\n"
@@ -101,9 +127,13 @@ def _both_ways(case: Case) -> Iterator[Objection]:
     for any time, or rigid to the end, and nobody knows which.
     """
     of_restarts = [event for event in case.windows.events if event.by.kind == "restart"]
-    for file, events in grouped((event.by.card.file, event) for event in of_restarts).items():
+    for file, events in grouped(
+        (event.by.card.file, event) for event in of_restarts
+    ).items():
         rigid = {event.unit for event in events if event.line.to_rigid}
-        both = [event for event in events if not event.line.to_rigid and event.unit in rigid]
+        both = [
+            event for event in events if not event.line.to_rigid and event.unit in rigid
+        ]
         for _, place, named in _by_card(both):
             found = f"{named} made rigid and deformable when the restart {file} begins"
             yield place, f"{found}; one of them belongs into another restart"
@@ -123,7 +153,10 @@ def _never_back(case: Case) -> Iterator[Objection]:
         if window.closed is None and window.unit not in case.windows.other_deformable
     ]
     for card, place, named in _by_card(opened):
-        yield place, f"{named} made rigid at {card.time:g} and never switched back in this deck"
+        yield (
+            place,
+            f"{named} made rigid at {card.time:g} and never switched back in this deck",
+        )
 
 
 @passes(PASS, Example(THERE + BACK), deck("*INCLUDE\nmore_parts.k\n" + BACK))
@@ -131,17 +164,27 @@ def _never_back(case: Case) -> Iterator[Objection]:
     deck(automatic(1, "0.02", rigid=["7"])),
     *(
         deck(text + "*DEFORMABLE_TO_RIGID\n         3         0      PSET\n")
-        for text in ("", "*SET_PART\n         3\n", "*SET_PART\n         3\n         1         7\n")
+        for text in (
+            "",
+            "*SET_PART\n         3\n",
+            "*SET_PART\n         3\n         1         7\n",
+        )
     ),
     deck(_LAYERED + automatic(1, "0.02", rigid=["8"])),
 )
-@rule("D2R106", ERROR, "part or part set not in the deck (only when every include was read)")
+@rule(
+    "D2R106",
+    ERROR,
+    "part or part set not in the deck (only when every include was read)",
+)
 def _exists(case: Case) -> Iterator[Objection]:
     """A switching card names a part, part set or lead part that no *PART or *SET_PART defines, or a set without
     parts. Judged only when all of the deck could be read and it has parts at all.
     """
     for card in case.sets if case.whole else ():
-        missing = grouped(absent for line in card.switched for absent in _absent(line, case.parts))
+        missing = grouped(
+            absent for line in card.switched for absent in _absent(line, case.parts)
+        )
         for kind in sorted(missing, key=["part set", "part", "lead part"].index):
             near = "" if kind == "part set" else _nearest(missing[kind][0], case.parts)
             what = f"{name_units(missing[kind], kind)} not in the deck{near}"
@@ -149,27 +192,45 @@ def _exists(case: Case) -> Iterator[Objection]:
         empty = [
             line.part.value
             for line in card.switched
-            if line.by_set and not line.part.problem and case.parts.members(line.part.value) == ()
+            if line.by_set
+            and not line.part.problem
+            and case.parts.members(line.part.value) == ()
         ]
         if empty:
-            yield card.card.here, f"{name_units(empty, 'part set')} without a part in the deck, so nothing is switched"
+            yield (
+                card.card.here,
+                f"{name_units(empty, 'part set')} without a part in the deck, so nothing is switched",
+            )
 
 
 def _nearest(number: int, parts: Parts) -> str:
     """List the nearest ids of the deck, with their titles."""
     from heapq import nsmallest  # not above: start-up
 
-    near = sorted(nsmallest(_NEAREST, parts.materials, key=lambda part: abs(part - number)))
-    listed = (f"{part} {parts.titles[part]!r}" if parts.titles[part] else str(part) for part in near)
+    near = sorted(
+        nsmallest(_NEAREST, parts.materials, key=lambda part: abs(part - number))
+    )
+    listed = (
+        f"{part} {parts.titles[part]!r}" if parts.titles[part] else str(part)
+        for part in near
+    )
     return f" (nearest to {number}: {', '.join(listed)})"
 
 
 def _absent(line: Switched, parts: Parts) -> Iterator[tuple[str, int]]:
     """Parts, part sets, their members and the lead part of a line that the deck does not have, by kind."""
     if line.by_set and not line.part.problem:
-        yield from (("part set", one) for one in parts.reached(line.part.value) if one not in parts.sets)
+        yield from (
+            ("part set", one)
+            for one in parts.reached(line.part.value)
+            if one not in parts.sets
+        )
     if not line.part.problem:
-        members = (parts.members(line.part.value) or ()) if line.by_set else (line.part.value,)
+        members = (
+            (parts.members(line.part.value) or ())
+            if line.by_set
+            else (line.part.value,)
+        )
         yield from (("part", part) for part in members if part not in parts.materials)
     if line.lead and line.lead.value and line.lead.value not in parts.materials:
         yield "lead part", line.lead.value
@@ -184,11 +245,16 @@ def _always_rigid(case: Case) -> Iterator[Objection]:
     back = [
         event
         for event in case.windows.events
-        if not event.line.to_rigid and not event.unit.is_set and case.parts.is_rigid(event.unit.id)
+        if not event.line.to_rigid
+        and not event.unit.is_set
+        and case.parts.is_rigid(event.unit.id)
     ]
     for _, place, named in _by_card(back):
         found = f"{named} has *MAT_RIGID and cannot become deformable"
-        yield place, f"{found}; give it its deformable material and let a D2R line make it rigid"
+        yield (
+            place,
+            f"{found}; give it its deformable material and let a D2R line make it rigid",
+        )
 
 
 @passes(_both("1", "         2         1      PART"))
@@ -201,9 +267,16 @@ def _torn(case: Case) -> Iterator[Objection]:
     first = {event.unit.id: event for event in reversed(case.made_rigid)}
     if len(first) < 2:
         return
-    leads = {part: event.line.lead.value for part, event in first.items() if event.line.lead}
+    leads = {
+        part: event.line.lead.value for part, event in first.items() if event.line.lead
+    }
     # each with the lead at the end of the LRB chain; a part that merges into nobody leads itself
-    bodies = {part: reached([part], lambda one: [lead] if (lead := leads.get(one)) else [])[-1] for part in first}
+    bodies = {
+        part: reached([part], lambda one: [lead] if (lead := leads.get(one)) else [])[
+            -1
+        ]
+        for part in first
+    }
     cards = element_cards(case.deck, searched=True)
     if len(set(bodies.values())) < 2 or not cards:
         return
@@ -213,7 +286,10 @@ def _torn(case: Case) -> Iterator[Objection]:
         if _together(case, first[low].unit, first[high].unit):
             place = (first[high].line.lead or first[high].line.part).field
             lines = ((part, first[part].line) for part in (low, high))
-            one, other = (f"part {part}" + f" (of part set {line.part.value})" * line.by_set for part, line in lines)
+            one, other = (
+                f"part {part}" + f" (of part set {line.part.value})" * line.by_set
+                for part, line in lines
+            )
             found = f"{one} and {other} share node {node} but become separate rigid bodies that both own it"
             yield place, f"{found}; merge them: LRB {low} on the line of {other}"
 
@@ -224,7 +300,11 @@ def _together(case: Case, one: Unit, other: Unit) -> bool:
         return True
     far = float("inf")
     spans = {
-        unit: [(w.tr, far if w.td is None else w.td) for w in case.windows.windows if w.unit == unit]
+        unit: [
+            (w.tr, far if w.td is None else w.td)
+            for w in case.windows.windows
+            if w.unit == unit
+        ]
         for unit in (one, other)
     }
     return any(a < d and c < b for a, b in spans[one] for c, d in spans[other])
@@ -233,17 +313,25 @@ def _together(case: Case, one: Unit, other: Unit) -> bool:
 def _held(case: Case, *, nodal: bool) -> Iterator[Objection]:
     """Constraints on parts that cards make rigid while leaving the constraints active."""
     switched = _left_active(case, nodal=nodal)
-    wanted = [one for one in (case.constraints if switched else ()) if (one.kind == "nodal rigid body") == nodal]
+    wanted = [
+        one
+        for one in (case.constraints if switched else ())
+        if (one.kind == "nodal rigid body") == nodal
+    ]
     owner = _owners(case, switched) if wanted else {}
     for constraint in wanted:
         own = (owner[node] for node in sorted(constraint.nodes) if node in owner)
         part = constraint.part if constraint.part in switched else next(own, None)
         if part is None:
             continue
-        name = f"{constraint.kind} {constraint.id}" if constraint.id else constraint.kind
+        name = (
+            f"{constraint.kind} {constraint.id}" if constraint.id else constraint.kind
+        )
         flag = f"{'NRBF' if nodal else 'NRBF and NCSF'} {switched[part].nrbf.value}"
         found_at = f"{name} on part {part}, which is made rigid at {switched[part].nrbf.field.at} with {flag}"
-        way_out = "it stays active; delete it there (1) and activate it on the way back (2)"
+        way_out = (
+            "it stays active; delete it there (1) and activate it on the way back (2)"
+        )
         yield constraint.place, f"{found_at}: {way_out}"
 
 
@@ -262,7 +350,11 @@ def _left_active(case: Case, *, nodal: bool) -> dict[int, Header]:
     found: dict[int, Header] = {}
     for event in case.made_rigid:
         header = event.by.header
-        if header and header.nrbf.value != _DELETED and (nodal or header.ncsf.value != _DELETED):
+        if (
+            header
+            and header.nrbf.value != _DELETED
+            and (nodal or header.ncsf.value != _DELETED)
+        ):
             found.setdefault(event.unit.id, header)
     return found
 
@@ -277,10 +369,20 @@ def _unturned(case: Case) -> Iterator[Objection]:
     without Iframe 2, tetrahedra, 16-node thick shells, 20-node bricks; not HEPH, HA8). For LS-DYNA it is concluded
     from the theory of the formulations; sources differ on what it does with their stresses.
     """
-    loaded = [window for window in case.windows.windows if window.td is not None and window.tr > 0]
+    loaded = [
+        window
+        for window in case.windows.windows
+        if window.td is not None and window.tr > 0
+    ]
     formulations = case.unturned if loaded else {}
-    held = ((window.part, window.opened.line.part.field) for window in loaded if window.part in formulations)
-    for form, those in grouped((formulations[part], (part, place)) for part, place in held if part is not None).items():
+    held = (
+        (window.part, window.opened.line.part.field)
+        for window in loaded
+        if window.part in formulations
+    )
+    for form, those in grouped(
+        (formulations[part], (part, place)) for part, place in held if part is not None
+    ).items():
         found = f"{name_units(part for part, _ in those)} of solids that do not co-rotate ({form})"
         why = "the stresses locked in do not turn with the rigid body"
         yield those[0][1], f"{found}: {why}; expect an error after a large rotation"
@@ -288,11 +390,26 @@ def _unturned(case: Case) -> Iterator[Objection]:
 
 def _unswitchable(case: Case, *, flows: bool) -> Iterator[Objection]:
     """Parts that are switched, by cards that act at any time, and must not be."""
-    kept = {part: why.reason for part, why in case.unswitchable.items() if why.flows == flows} if case.sets else {}
-    opened = [event for event in case.windows.events if event.line.to_rigid and event.unit.part in kept]
+    kept = (
+        {
+            part: why.reason
+            for part, why in case.unswitchable.items()
+            if why.flows == flows
+        }
+        if case.sets
+        else {}
+    )
+    opened = [
+        event
+        for event in case.windows.events
+        if event.line.to_rigid and event.unit.part in kept
+    ]
     first = {event.unit.id: event for event in reversed(opened)}
     for reason, parts in grouped((kept[part], part) for part in sorted(first)).items():
-        yield first[parts[0]].line.part.field, f"{name_units(parts)}: {reason}; do not switch it"
+        yield (
+            first[parts[0]].line.part.field,
+            f"{name_units(parts)}: {reason}; do not switch it",
+        )
 
 
 def _of_law(law: str) -> Example:
@@ -310,8 +427,14 @@ def _flows(case: Case) -> Iterator[Objection]:
 
 
 @passes(PASS, _of_law("*MAT_ELASTIC"))
-@fails(_of_law("*MAT_MOONEY-RIVLIN_RUBBER"), _of_law("*MAT_077_O"), _of_law("*MAT_ORTHOTROPIC_ELASTIC"))
-@rule("D2R119", WARNING, "a switched part whose law keeps a stress-free reference", BOTH)
+@fails(
+    _of_law("*MAT_MOONEY-RIVLIN_RUBBER"),
+    _of_law("*MAT_077_O"),
+    _of_law("*MAT_ORTHOTROPIC_ELASTIC"),
+)
+@rule(
+    "D2R119", WARNING, "a switched part whose law keeps a stress-free reference", BOTH
+)
 def _with_reference(case: Case) -> Iterator[Objection]:
     """Hyperelastic and total Lagrangian laws compute the stress from the deformation since the start, and not from
     what was stored when the part was made rigid: it may come back with a stress that it did not have. Source: the
@@ -321,7 +444,11 @@ def _with_reference(case: Case) -> Iterator[Objection]:
     return _unswitchable(case, flows=False)
 
 
-@passes(PASS, _constrained(_NODAL, "         1         0"), _constrained(_NODAL.replace("   5\n", "   6\n")))
+@passes(
+    PASS,
+    _constrained(_NODAL, "         1         0"),
+    _constrained(_NODAL.replace("   5\n", "   6\n")),
+)
 @fails(_constrained(_NODAL), _constrained(_NODAL, "         2         1"))
 @rule("D2R112", ERROR, "a nodal rigid body on a switched part stays active (NRBF)")
 def _d2r112(case: Case) -> Iterator[Objection]:
@@ -332,9 +459,21 @@ def _d2r112(case: Case) -> Iterator[Objection]:
     return _held(case, nodal=True)
 
 
-@passes(PASS, _constrained(_EXTRA, "         0         1"), _constrained(_JOINT, "         1         0"))
-@fails(_constrained(_EXTRA), _constrained(_JOINT), _constrained(_EXTRA.replace("  8  ", "  1  ")))
-@rule("D2R113", WARNING, "extra nodes or a joint on a switched part stay active (NRBF, NCSF)")
+@passes(
+    PASS,
+    _constrained(_EXTRA, "         0         1"),
+    _constrained(_JOINT, "         1         0"),
+)
+@fails(
+    _constrained(_EXTRA),
+    _constrained(_JOINT),
+    _constrained(_EXTRA.replace("  8  ", "  1  ")),
+)
+@rule(
+    "D2R113",
+    WARNING,
+    "extra nodes or a joint on a switched part stay active (NRBF, NCSF)",
+)
 def _d2r113(case: Case) -> Iterator[Objection]:
     """Extra nodes and joints tie nodes to a rigid body; on a part that a card makes rigid the nodes then belong to
     two. The vendor asks to delete what lies in switched parts (1) and to activate it on the way back (2); which of

@@ -29,20 +29,30 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
 
-_INTERVALS = 200  # output intervals per rigid window, for crossings to be found within 0.5 %
+_INTERVALS = (
+    200  # output intervals per rigid window, for crossings to be found within 0.5 %
+)
 _ROUNDING = 1e-9
 _DATABASES: Final = ("DATABASE_GLSTAT", "DATABASE_MATSUM")
 
 
 _THOUSAND = 1000.0
 _FEW = 2  # cards: D2R102 and D2R105 say it already
-_SECOND: Final = automatic(3, "0.1", rigid=["2"]) + automatic(4, "0.1", deformable=["2"])
+_SECOND: Final = automatic(3, "0.1", rigid=["2"]) + automatic(
+    4, "0.1", deformable=["2"]
+)
 
 
 @fails(
     window("0.02", "0.2"),
     window("-0.02", "0.09"),
-    Example(PARTS + automatic(1, "0.02", rigid=["1"], code=2).replace("       0.0", "      0.01", 1) + END),
+    Example(
+        PARTS
+        + automatic(1, "0.02", rigid=["1"], code=2).replace(
+            "       0.0", "      0.01", 1
+        )
+        + END
+    ),
 )
 @rule("D2R101", ERROR, "switch time outside [0, ENDTIM)")
 def _in_run(case: Case) -> Iterator[Objection]:
@@ -50,23 +60,41 @@ def _in_run(case: Case) -> Iterator[Objection]:
     *CONTROL_TERMINATION the switch never happens, and with CODE 1 to 4 not after TIME2 either.
     """
     for card, header in case.headers:
-        if header.code.problem or header.time1.problem or header.code.value == BY_SENSOR:
+        if (
+            header.code.problem
+            or header.time1.problem
+            or header.code.value == BY_SENSOR
+        ):
             continue
         time = header.time1.value * card.card.transform.time
         if time < 0:
-            yield header.time1.field, f"TIME1 is {time:g}, a time from 0 on was expected"
+            yield (
+                header.time1.field,
+                f"TIME1 is {time:g}, a time from 0 on was expected",
+            )
         elif case.end is not None and time >= case.end:
             found = f"TIME1 is {time:g} but the run ends at {case.end:g} (ENDTIM)"
-            yield header.time1.field, f"{found}, so nothing is ever switched; correct one of them"
+            yield (
+                header.time1.field,
+                f"{found}, so nothing is ever switched; correct one of them",
+            )
         latest = header.time2
-        if header.code.value != BY_TIME and not latest.problem and 0 < latest.value < header.time1.value:
+        if (
+            header.code.value != BY_TIME
+            and not latest.problem
+            and 0 < latest.value < header.time1.value
+        ):
             problem = f"TIME2 is {latest.value:g}, before TIME1 ({header.time1.value:g}), so nothing is ever switched"
             yield latest.field, f"{problem}; a later time was expected, or 0 for no end"
 
 
 def _closed(case: Case) -> dict[tuple[SwitchSet, SwitchSet], list[Window]]:
     """Windows with both ends, by the cards that open and close them."""
-    return grouped(((one.opened.by, one.closed.by), one) for one in case.windows.windows if one.closed is not None)
+    return grouped(
+        ((one.opened.by, one.closed.by), one)
+        for one in case.windows.windows
+        if one.closed is not None
+    )
 
 
 def _named(windows: Sequence[Window]) -> str:
@@ -83,8 +111,16 @@ def _order(case: Case) -> Iterator[Objection]:
     """The R2D switch of a part must come after its D2R switch; the solver does not sort them for you."""
     for (opening, closing), windows in _closed(case).items():
         first = windows[0]
-        together = opening.kind == closing.kind == "restart" and opening.card.file == closing.card.file  # D2R117
-        if first.td is not None and first.td <= first.tr and not _lost(first) and not together:
+        together = (
+            opening.kind == closing.kind == "restart"
+            and opening.card.file == closing.card.file
+        )  # D2R117
+        if (
+            first.td is not None
+            and first.td <= first.tr
+            and not _lost(first)
+            and not together
+        ):
             found = f"{_named(windows)} switched back at {first.td:g} but made rigid at {first.tr:g}"
             way_out = f"({opening.time_field.at}), an earlier time was expected there; are the two times swapped?"
             yield closing.time_field, f"{found} {way_out}"
@@ -100,12 +136,22 @@ def _zero(case: Case) -> Iterator[Objection]:
     for (opening, closing), windows in _closed(case).items():
         if _lost(windows[0]) and opening.kind == "automatic":
             found = f"both times of {_named(windows)} are 0 (the other at {opening.time_field.at})"
-            yield closing.time_field, f"{found}; print times below 0.05 with more than one decimal"
+            yield (
+                closing.time_field,
+                f"{found}; print times below 0.05 with more than one decimal",
+            )
 
 
 @passes(PASS, Example(THERE + BACK))
-@fails(Example(PARTS + THERE + BACK + END), Example(GOOD.replace("    0.0001", "      0.01")))
-@rule("D2R111", WARNING, "without --history: *DATABASE_GLSTAT/_MATSUM missing, or DT above (td-tr)/200")
+@fails(
+    Example(PARTS + THERE + BACK + END),
+    Example(GOOD.replace("    0.0001", "      0.01")),
+)
+@rule(
+    "D2R111",
+    WARNING,
+    "without --history: *DATABASE_GLSTAT/_MATSUM missing, or DT above (td-tr)/200",
+)
 def _sampling(case: Case) -> Iterator[Objection]:
     """Switching times are chosen by the internal energy of a reference run: glstat holds it for the whole run,
     matsum for every part. Written too rarely, the energy at tr and td is not known well enough. Decks that are only
@@ -142,11 +188,18 @@ def _sampling(case: Case) -> Iterator[Objection]:
 
 
 def _timed(case: Case) -> list[tuple[SwitchSet, Header]]:
-    return [(card, header) for card, header in case.headers if card.time is not None and header.code.value == BY_TIME]
+    return [
+        (card, header)
+        for card, header in case.headers
+        if card.time is not None and header.code.value == BY_TIME
+    ]
 
 
 @passes(PASS, deck(THERE + automatic(3, "0.02", rigid=["2"])))
-@fails(window("0.1", "0.1", _SECOND), deck(automatic(1, "0.0", rigid=["1"]) + automatic(2, "0.0", deformable=["2"])))
+@fails(
+    window("0.1", "0.1", _SECOND),
+    deck(automatic(1, "0.0", rigid=["1"]) + automatic(2, "0.0", deformable=["2"])),
+)
 @rule("D2R114", ERROR, "all switching times are equal (decimals lost in writing)")
 def _equal(case: Case) -> Iterator[Objection]:
     """Writers with one decimal make 0.0 of every time below 0.05, and 0.1 of 0.07 and 0.13. Cards that make parts
@@ -156,8 +209,15 @@ def _equal(case: Case) -> Iterator[Objection]:
     timed = _timed(case)
     times = {card.time for card, _ in timed}
     ways = {line.to_rigid for card, _ in timed for line in card.switched}
-    inverted = any(one.td is not None and one.td <= one.tr for one in case.windows.windows)
-    if len(times) != 1 or len(timed) < _FEW or len(ways) < 2 or (inverted and len(timed) == _FEW):
+    inverted = any(
+        one.td is not None and one.td <= one.tr for one in case.windows.windows
+    )
+    if (
+        len(times) != 1
+        or len(timed) < _FEW
+        or len(ways) < 2
+        or (inverted and len(timed) == _FEW)
+    ):
         return
     (time,) = times
     found = f"all {len(timed)} switching times of the deck are {time:g}, to rigid and back; were decimals lost?"
@@ -182,9 +242,19 @@ def _mixed(times: list[float], end: float, what: str) -> str | None:
     return f"the switching times reach {latest:g} but {what}, about 1000 times {way}? give both in the same unit"
 
 
-@passes(PASS, Example(THERE + BACK), window("-0.01", "0.07"), window("-0.02", "-0.01"), window("0.0", "0.07"))
+@passes(
+    PASS,
+    Example(THERE + BACK),
+    window("-0.01", "0.07"),
+    window("-0.02", "-0.01"),
+    window("0.0", "0.07"),
+)
 @fails(window("20.0", "90.0"), window("2.0e-5", "9.0e-5"))
-@rule("D2R115", ERROR, "the switching times are about 1000 times the termination time, or a thousandth of it")
+@rule(
+    "D2R115",
+    ERROR,
+    "the switching times are about 1000 times the termination time, or a thousandth of it",
+)
 def _thousand(case: Case) -> Iterator[Objection]:
     """Seconds and milliseconds are mixed: the times would lie in the run if they were divided, or multiplied, by
     1000, and do not, or only in its first 1/1000. D2R101 reports times after the end too. Files name no units, so
@@ -200,11 +270,15 @@ def _thousand(case: Case) -> Iterator[Objection]:
 _DECADES = 3.0  # of a factor of 1000
 _NEAR = math.log10(2)  # a reference run may have been stopped at half of its time
 
-_HISTORY: Final = "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.15 --dt 1e-4"
+_HISTORY: Final = (
+    "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.15 --dt 1e-4"
+)
 _GOOD_PAIR: Final = (".0135867", ".0687534")
 
 
-def _pair(tr: str, td: str, options: str = "", head: str = HEAD, history: str = _HISTORY) -> Example:
+def _pair(
+    tr: str, td: str, options: str = "", head: str = HEAD, history: str = _HISTORY
+) -> Example:
     there, back = automatic(1, tr, rigid=["1"]), automatic(2, td, deformable=["1"])
     return Example(head + PARTS + there + back + END, history=history, options=options)
 
@@ -216,12 +290,15 @@ def _faults(case: Case, rule_id: str) -> Iterator[Objection]:
     """Objections of one rule; those that parts of one card share are one."""
     assert case.judge is not None
     windows = case.windows.windows
-    together = grouped(((one.tr, one.td), one.part) for one in windows if one.part is not None)
+    together = grouped(
+        ((one.tr, one.td), one.part) for one in windows if one.part is not None
+    )
     found = grouped(
         ((event.by, one.unit.kind, fault.message), one.unit.id)
         for one in windows
         for fault in case.judge.faults(one, together.get((one.tr, one.td), ()))
-        if (event := one.closed if fault.at_td else one.opened) and fault.rule == rule_id
+        if (event := one.closed if fault.at_td else one.opened)
+        and fault.rule == rule_id
     )
     for (card, kind, message), ids in found.items():
         yield card.time_field, f"{name_units(ids, kind)}: {message}"
@@ -250,7 +327,10 @@ def _units(case: Case) -> Iterator[Objection]:
     if power and abs(decades - _DECADES * power) <= _NEAR:
         found = f"the deck ends at {case.end:g} but the history at {case.judge.end:g}, about 1e{abs(3 * power)} times"
         way = "earlier" if power > 0 else "later"
-        yield case.end_time.field, f"{found} {way}: different units of time? give both in the same"
+        yield (
+            case.end_time.field,
+            f"{found} {way}: different units of time? give both in the same",
+        )
 
 
 @passes(*_PASSING, PASS)
@@ -258,7 +338,12 @@ def _units(case: Case) -> Iterator[Objection]:
     _pair("13.5867", "68.7534", head=HEAD.replace("       0.2", "     150.0")),
     _pair("1.0e-5", "6.0e-5", head=_WITHOUT_END),
 )
-@rule("D2R207", ERROR, "the switching times are about 1000 times those of the history, or a thousandth of them", BOTH)
+@rule(
+    "D2R207",
+    ERROR,
+    "the switching times are about 1000 times those of the history, or a thousandth of them",
+    BOTH,
+)
 def _thousand_of_history(case: Case) -> Iterator[Objection]:
     """A deck in milliseconds and a history in seconds, or the other way round: the windows would lie in the history
     if their times were divided, or multiplied, by 1000. Files name no units, so this is a guess by size; D2R205
@@ -269,7 +354,9 @@ def _thousand_of_history(case: Case) -> Iterator[Objection]:
     assert case.judge is not None
     if not case.judge.end > 0:
         return
-    if found := _mixed(times, case.judge.end, f"the history ends at {case.judge.end:g}"):
+    if found := _mixed(
+        times, case.judge.end, f"the history ends at {case.judge.end:g}"
+    ):
         yield windows[0].opened.by.time_field, found
 
 
@@ -298,7 +385,12 @@ def _d2r202(case: Case) -> Iterator[Objection]:
 
 @passes(*_PASSING)
 @fails(_pair(".0128853", "0.064"))
-@rule("D2R203", WARNING, "poor td (kinetic share above one half): the better td, named", BOTH)
+@rule(
+    "D2R203",
+    WARNING,
+    "poor td (kinetic share above one half): the better td, named",
+    BOTH,
+)
 def _d2r203(case: Case) -> Iterator[Objection]:
     """The share of the vibration energy that is kinetic at td is lost whatever tr is, since a rigid part does not
     vibrate. Near a peak of the internal energy hardly any is kinetic.

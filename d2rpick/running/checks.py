@@ -26,22 +26,39 @@ NO_CONTACT: Final = "no contact and no rigid wall, so nothing would end a flight
 def refuse_held(path: str, inventory: Inventory, parts: Collection[int]) -> None:
     """Raise DeckError where a support holds the parts: its force is none of a contact."""
     if unknown := sorted(set(parts) - inventory.nodes_by_part.keys()):
-        raise DeckError(f"{path}: {name_units(unknown)}: no elements in the deck; name others")
+        raise DeckError(
+            f"{path}: {name_units(unknown)}: no elements in the deck; name others"
+        )
     held = supports_of(inventory)[0]
     for part in sorted(held.keys() & set(parts)):
-        raise DeckError(f"{path}: part {part} is held by {held[part][0].name}: it does not fly; leave it out")
+        raise DeckError(
+            f"{path}: part {part} is held by {held[part][0].name}: it does not fly; leave it out"
+        )
 
 
 def contacts_of(starter: Starter) -> Iterator[tuple[str, int]]:
     """Kind of sensor and id of each contact and rigid wall."""
     for card in starter.named("INTER"):
         if card.words[1:] and card.words[1] not in WITHOUT_FORCE:
-            yield "INTER", next(number for at in (2, 3) if (number := number_of(card, at)) or at == 3)
+            yield (
+                "INTER",
+                next(
+                    number
+                    for at in (2, 3)
+                    if (number := number_of(card, at)) or at == 3
+                ),
+            )
     for card in starter.named("RWALL"):
         yield "RWALL", number_of(card, -1)
 
 
-def check_driven(path: str, inventory: Inventory, parts: Collection[int], limits: Limits, wait: float | None) -> None:
+def check_driven(
+    path: str,
+    inventory: Inventory,
+    parts: Collection[int],
+    limits: Limits,
+    wait: float | None,
+) -> None:
     """Look whether a Radioss run can be driven.
 
     Raises
@@ -55,7 +72,11 @@ def check_driven(path: str, inventory: Inventory, parts: Collection[int], limits
     starter = read_run(path).starter
     if starter is None or not any(contacts_of(starter)):
         raise DeckError(f"{path}: {NO_CONTACT}")
-    _check_history(path, starter, {part for part in parts if not {*inventory.counts[part]} <= DISCRETE})
+    _check_history(
+        path,
+        starter,
+        {part for part in parts if not {*inventory.counts[part]} <= DISCRETE},
+    )
     least = FEWEST * limits.interval
     if wait is not None and not least <= wait < limits.end / 2:
         raise RangeError(
@@ -73,7 +94,9 @@ def _check_history(path: str, starter: Starter, parts: Collection[int]) -> None:
     cards = [card for card in starter.named("TH") if card.words[1:2] == ("PART",)]
     written: set[int] = set()
     for card in cards:
-        texts = [row.text.split() for row in card.rows[1:] if not row.text.startswith("#")]
+        texts = [
+            row.text.split() for row in card.rows[1:] if not row.text.startswith("#")
+        ]
         variables = {word for words in texts for word in words if not word.isdigit()}
         ids = {int(word) for words in texts for word in words if word.isdigit()}
         if variables & {"DEF", "XMOM"}:

@@ -14,7 +14,15 @@ from d2rpick.histories.names import Selection
 from d2rpick.running.evidence import Evidence
 from d2rpick.running.inner_motion import InnerMotion, Wait
 from d2rpick.running.looks import Looks
-from d2rpick.running.sequence import LOAD, Leg, Order, Seen, next_order, together, window_of
+from d2rpick.running.sequence import (
+    LOAD,
+    Leg,
+    Order,
+    Seen,
+    next_order,
+    together,
+    window_of,
+)
 from d2rpick.running.swing import swing_in
 
 if TYPE_CHECKING:
@@ -100,11 +108,17 @@ class Driver:
             (self.solver.folder / name).parent.mkdir(parents=True, exist_ok=True)
             write_whole(self.solver.folder / name, content)
         first = self.solver.file(1, ".rad")
-        write_whole(first, self.deck.leg(1, self.deck.end, None))  # the starter looks for /RBODY/OFF there
-        self.solver.start(self.commands.words("starter", self.solver.file(0, ".rad").name), 0)
+        write_whole(
+            first, self.deck.leg(1, self.deck.end, None)
+        )  # the starter looks for /RBODY/OFF there
+        self.solver.start(
+            self.commands.words("starter", self.solver.file(0, ".rad").name), 0
+        )
         self._wait_for_end()
         if not self.solver.started_well():
-            raise D2RPickError(f"{self.solver.file(0, '.out')}: the starter failed: {self.solver.last_words(0)}")
+            raise D2RPickError(
+                f"{self.solver.file(0, '.out')}: the starter failed: {self.solver.last_words(0)}"
+            )
         self.journal.add("prepared")
 
     def progress(self, seconds: float) -> str:
@@ -123,7 +137,9 @@ class Driver:
             If the solver fails, or the disk has no room; the run goes on from there when it is driven again.
         """
         if legs := self.legs:
-            self.told(f"resumed: legs that are over: {len(legs)}, the last at {legs[-1].order.until:.6g}")
+            self.told(
+                f"resumed: legs that are over: {len(legs)}, the last at {legs[-1].order.until:.6g}"
+            )
         while order := self._next():
             self.at = order
             if not self._under_way(order):
@@ -142,30 +158,49 @@ class Driver:
         if len(legs) < count:
             self.journal.add("back", legs=len(legs))
             at = 0.0 if order is None else order.start
-            self.told(f"the restart of the last leg is not whole: the run goes back to {at:.6g}")
+            self.told(
+                f"the restart of the last leg is not whole: the run goes back to {at:.6g}"
+            )
         return order
 
     def _under_way(self, order: Order) -> bool:
         """Whether this leg was begun, by an earlier driver, and came to its end."""
         last = self.journal.records[-1]
         begun = last["event"] == "started" and Order(*last["order"]) == order
-        return begun and self.solver.ended_well(order.number) and self.solver.whole(order.number)
+        return (
+            begun
+            and self.solver.ended_well(order.number)
+            and self.solver.whole(order.number)
+        )
 
     def _start(self, order: Order) -> None:
         number = order.number
         self.solver.check_room(number, 1 - order.start / self.limits.end)
         self.solver.clear(number)
         frozen = order.rigid and len(together(order, self.legs)) > 1
-        text = self.deck.leg(number, order.until, self._cap() if order.rigid else None, frozen=frozen)
+        text = self.deck.leg(
+            number, order.until, self._cap() if order.rigid else None, frozen=frozen
+        )
         write_whole(self.solver.file(number, ".rad"), text)
         self.journal.add("started", order=order)
-        self.solver.start(self.commands.words("engine", self.solver.file(number, ".rad").name), number)
-        self.told(f"leg {number}: {order.kind} from {order.start:.6g} to {order.until:.6g}")
+        self.solver.start(
+            self.commands.words("engine", self.solver.file(number, ".rad").name), number
+        )
+        self.told(
+            f"leg {number}: {order.kind} from {order.start:.6g} to {order.until:.6g}"
+        )
 
     def _cap(self) -> float:
         """Largest step of a rigid leg, by the smallest mean one of the deformable legs before [time]."""
-        known = [leg.length / leg.cycles for leg in self.legs if not leg.order.rigid and leg.cycles]
-        return min(self.deck.interval, _STEP_RATIO * float(f"{min([self.deck.interval, *known]):.3g}"))
+        known = [
+            leg.length / leg.cycles
+            for leg in self.legs
+            if not leg.order.rigid and leg.cycles
+        ]
+        return min(
+            self.deck.interval,
+            _STEP_RATIO * float(f"{min([self.deck.interval, *known]):.3g}"),
+        )
 
     def _wait_for_end(self) -> None:
         """Wait until no solver is at work; tell of silence, and end the solver where the driver is interrupted."""
@@ -176,9 +211,13 @@ class Driver:
                 silent = self.solver.silent_for()
                 if silent > said:
                     said = 2 * silent
-                    self.told(f"the solver has written nothing for {silent:.0f} s; Ctrl-C ends it, then --resume")
+                    self.told(
+                        f"the solver has written nothing for {silent:.0f} s; Ctrl-C ends it, then --resume"
+                    )
         except KeyboardInterrupt:
-            self.told("stopping: the leg that is being computed is begun again with --resume")
+            self.told(
+                "stopping: the leg that is being computed is begun again with --resume"
+            )
             self.solver.end()
             raise
 
@@ -197,22 +236,41 @@ class Driver:
         if not self.solver.whole(number) or not self.solver.came_to(number, last_state):
             if order in self._again:
                 where = self.solver.file(number, ".out")
-                raise D2RPickError(f"{where}: the leg left no whole restart; make room on the disk, then --resume")
+                raise D2RPickError(
+                    f"{where}: the leg left no whole restart; make room on the disk, then --resume"
+                )
             self._again.add(order)
-            self.told(f"leg {number}: it left no whole restart or history, and is begun again at {order.start:.6g}")
+            self.told(
+                f"leg {number}: it left no whole restart or history, and is begun again at {order.start:.6g}"
+            )
             self.journal.add("lost", order=order)
             return
         legs = self.legs
         record = together(order, legs)
-        before = [leg.seen for leg in legs if leg.order.until <= record[0].start and not leg.seen.idle]
+        before = [
+            leg.seen
+            for leg in legs
+            if leg.order.until <= record[0].start and not leg.seen.idle
+        ]
         known = max((seen.wait or 0.0 for seen in before), default=0.0)
-        seen = self.observer.look(order, [self.solver.history(one.number) for one in record], known)
+        seen = self.observer.look(
+            order, [self.solver.history(one.number) for one in record], known
+        )
         place = self._place([*legs, Leg(order, seen, cycles, cpu)], record[0])
         if place:
             self.told(f"warning: out-of-place: {place}")
-        self.journal.add("ended", order=order, seen=seen, cycles=cycles, cpu=cpu, place=place)
+        self.journal.add(
+            "ended", order=order, seen=seen, cycles=cycles, cpu=cpu, place=place
+        )
         # a window that is left out is computed from where it begins
-        self.solver.keep({number, number - 1, number - 2, *([record[0].number - 1] if order.rigid else [])})
+        self.solver.keep(
+            {
+                number,
+                number - 1,
+                number - 2,
+                *([record[0].number - 1] if order.rigid else []),
+            }
+        )
 
     def _fail(self, order: Order) -> None:
         """Raise D2RPickError with what the solver said; a leg that failed before begins with a restart that is damaged.
@@ -220,33 +278,57 @@ class Driver:
         Then the run goes back by the leg that has written it.
         """
         events = [one["event"] for one in self.journal.records]
-        latest = max((place for place, event in enumerate(events) if event in ("ended", "back")), default=0)
+        latest = max(
+            (place for place, event in enumerate(events) if event in ("ended", "back")),
+            default=0,
+        )
         self.journal.add("failed", order=order)
-        if "failed" not in events[latest:] or not self.legs or self.solver.came_to(order.number, order.start):
+        if (
+            "failed" not in events[latest:]
+            or not self.legs
+            or self.solver.came_to(order.number, order.start)
+        ):
             words = self.solver.last_words(order.number)
             path = self.solver.file(order.number, ".out")
             raise D2RPickError(f"{path}: the solver failed: {words}; --resume goes on")
         self.journal.add("back", legs=len(self.legs) - 1)
-        self.told(f"leg {order.number} failed again before its first state: the leg before it is computed again")
+        self.told(
+            f"leg {order.number} failed again before its first state: the leg before it is computed again"
+        )
 
     def _place(self, legs: Sequence[Leg], first: Order) -> str:
         """Say so where parts swing too much to be rigid in a window, from its ``first`` leg on, whose end is known."""
-        planned = window_of(legs, self.limits) if legs[-1].seen.contact is not None else None
+        planned = (
+            window_of(legs, self.limits) if legs[-1].seen.contact is not None else None
+        )
         if planned is None or planned.reason or first.number == 1:
             return ""
         numbers = [one.number for one in together(first._replace(kind=LOAD), legs)[:-1]]
-        return self.observer.swing([self.solver.history(number) for number in numbers], planned)
+        return self.observer.swing(
+            [self.solver.history(number) for number in numbers], planned
+        )
 
 
 class Observer:
     """Looks at the record of some ``parts`` of a deck, with the ``wait`` that was given or that the deck tells."""
 
     def __init__(
-        self, parts: Sequence[int], inventory: Inventory, wait: float | None = None, of_deck: Wait | None = None
+        self,
+        parts: Sequence[int],
+        inventory: Inventory,
+        wait: float | None = None,
+        of_deck: Wait | None = None,
     ) -> None:
-        springs = sorted(part for part, kinds in inventory.counts.items() if {*kinds} <= DISCRETE)
-        selection = Selection(parts=tuple(map(str, parts)), springs=tuple(map(str, springs)))
-        self._looks, self._whole = Looks(selection, inventory), Looks(selection, inventory)
+        springs = sorted(
+            part for part, kinds in inventory.counts.items() if {*kinds} <= DISCRETE
+        )
+        selection = Selection(
+            parts=tuple(map(str, parts)), springs=tuple(map(str, springs))
+        )
+        self._looks, self._whole = (
+            Looks(selection, inventory),
+            Looks(selection, inventory),
+        )
         self._given, self._of_deck = wait, of_deck
         self._evidence, self._motion = Evidence(), InnerMotion(None, of_deck)
 
@@ -258,7 +340,10 @@ class Observer:
         """
         states, follows = self._looks.new_states([str(path) for path in histories])
         if not follows:
-            self._evidence, self._motion = Evidence(), InnerMotion(None, self._of_deck, known)
+            self._evidence, self._motion = (
+                Evidence(),
+                InnerMotion(None, self._of_deck, known),
+            )
         if states is not None and states.time.size:
             self._evidence.take(states)
             self._motion.take(states, self._evidence)
@@ -271,13 +356,23 @@ class Observer:
         flights, now = self._evidence.flights(self._needed), float(history.time[-1])
         free = self._evidence.free_since(now)
         asked = self._motion.wait(free, now)
-        wait, idle = self._needed(free, now), asked is not None and asked.source == "at-rest"
+        wait, idle = (
+            self._needed(free, now),
+            asked is not None and asked.source == "at-rest",
+        )
         why = asked.reason if asked else ""
         if self._given is not None and not idle:
-            why = f"as given, but {why}" if asked and asked.time > self._given else "as given"
+            why = (
+                f"as given, but {why}"
+                if asked and asked.time > self._given
+                else "as given"
+            )
         least = _TOLD * (wait or 0.0)
         pauses = self._evidence.pauses(order.start)
-        energies = [history.energy_at(max(time, float(history.time[0]))) for time in (order.start, now)]
+        energies = [
+            history.energy_at(max(time, float(history.time[0])))
+            for time in (order.start, now)
+        ]
         earlier = energies[0] > energies[1] and order.start >= max(free, order.after)
         return Seen(
             free=free,
@@ -286,7 +381,11 @@ class Observer:
             flies=bool(flights) and flights[-1].end is None,
             tr=order.start if earlier else order.until,
             idle=idle,
-            short=tuple(one for one in pauses if wait and least <= one[1] - one[0] and one[0] >= order.after),
+            short=tuple(
+                one
+                for one in pauses
+                if wait and least <= one[1] - one[0] and one[0] >= order.after
+            ),
             swing=self._motion.longest_swing(now),
         )
 
@@ -300,7 +399,11 @@ class Observer:
         """Say so where parts swing too much to be rigid in a window, by the record before it."""
         history = self._whole.whole([str(path) for path in histories])
         found = swing_in(history, planned.free, planned.tr)
-        return f"tr = {planned.tr:.6g}: {found.told}" if found and found.flight > planned.td - planned.free else ""
+        return (
+            f"tr = {planned.tr:.6g}: {found.told}"
+            if found and found.flight > planned.td - planned.free
+            else ""
+        )
 
 
 class Journal:
@@ -312,7 +415,9 @@ class Journal:
     def __init__(self, path: Path) -> None:
         self.path = path
         content = path.read_bytes() if path.exists() else b""
-        self.records = [record for line in content.split(b"\n") if (record := record_of(line))]
+        self.records = [
+            record for line in content.split(b"\n") if (record := record_of(line))
+        ]
         self._end = b"\n" if content and not content.endswith(b"\n") else b""
 
     def add(self, event: str, **values: Any) -> dict[str, Any]:
@@ -322,7 +427,9 @@ class Journal:
         try:
             append_whole(self.path, self._end + line + b"\n", durable=True)
         except OSError as error:
-            raise D2RPickError(f"{self.path}: cannot be written ({error.strerror}); make room, then --resume") from None
+            raise D2RPickError(
+                f"{self.path}: cannot be written ({error.strerror}); make room, then --resume"
+            ) from None
         self._end = b""
         self.records.append(record)
         return record

@@ -24,7 +24,10 @@ if TYPE_CHECKING:
 
 # Where an installation has its programs, and how they are called.
 _PROGRAMS: Final = {
-    "starter": (("bin/starter_gf", "exec/starter_linux64_gf"), "-i {deck} -np 1 -nt {threads}"),
+    "starter": (
+        ("bin/starter_gf", "exec/starter_linux64_gf"),
+        "-i {deck} -np 1 -nt {threads}",
+    ),
     "engine": (("bin/engine_gf", "exec/engine_linux64_gf"), "-i {deck} -nt {threads}"),
 }
 _HOME: Final = "OPENRADIOSS_PATH"
@@ -57,14 +60,19 @@ class Commands(NamedTuple):
         try:
             split = _installed(program) if template is None else shlex.split(template)
         except ValueError as error:
-            raise ConfigurationError(f"--{program} {template!r}: cannot be split into words ({error})") from None
+            raise ConfigurationError(
+                f"--{program} {template!r}: cannot be split into words ({error})"
+            ) from None
         if not any("{deck}" in word for word in split):
             raise ConfigurationError(
                 f"--{program} {template!r}: {{deck}} was expected, where the name of the file goes"
             )
         return [
             _whole(split[0]),
-            *(word.replace("{deck}", deck).replace("{threads}", str(self.threads)) for word in split[1:]),
+            *(
+                word.replace("{deck}", deck).replace("{threads}", str(self.threads))
+                for word in split[1:]
+            ),
         ]
 
     def missing(self) -> str:
@@ -97,9 +105,22 @@ def _surroundings(threads: int) -> dict[str, str]:
     home = os.environ.get(_HOME)
     own = {"OMP_NUM_THREADS": str(threads), "OMP_STACKSIZE": "400m"}
     if home:
-        libraries = (f"{home}/exec", os.environ.get("LD_LIBRARY_PATH"), f"{home}/syslib")
-        own |= {"RAD_CFG_PATH": f"{home}/hm_cfg_files", "LD_LIBRARY_PATH": os.pathsep.join(filter(None, libraries))}
-    return {**own, **os.environ, "LD_LIBRARY_PATH": own.get("LD_LIBRARY_PATH", os.environ.get("LD_LIBRARY_PATH", ""))}
+        libraries = (
+            f"{home}/exec",
+            os.environ.get("LD_LIBRARY_PATH"),
+            f"{home}/syslib",
+        )
+        own |= {
+            "RAD_CFG_PATH": f"{home}/hm_cfg_files",
+            "LD_LIBRARY_PATH": os.pathsep.join(filter(None, libraries)),
+        }
+    return {
+        **own,
+        **os.environ,
+        "LD_LIBRARY_PATH": own.get(
+            "LD_LIBRARY_PATH", os.environ.get("LD_LIBRARY_PATH", "")
+        ),
+    }
 
 
 @contextmanager
@@ -107,7 +128,9 @@ def alone(folder: Path) -> Iterator[None]:
     """Keep every other driver out of a folder; D2RPickError where one is at work there."""
     lock = _locked(folder / ".drive.lock")
     if lock is None:
-        raise D2RPickError(f"{folder}: another d2rpick drives this run; wait for it, or choose another folder")
+        raise D2RPickError(
+            f"{folder}: another d2rpick drives this run; wait for it, or choose another folder"
+        )
     try:
         yield
     finally:
@@ -149,7 +172,10 @@ class Solver:
 
     def clear(self, number: int) -> None:
         """Remove what an earlier leg of this number left."""
-        for path in (self.history(number), *(self.file(number, one) for one in (".ctl", ".out", ".log"))):
+        for path in (
+            self.history(number),
+            *(self.file(number, one) for one in (".ctl", ".out", ".log")),
+        ):
             path.unlink(missing_ok=True)
         for path in self._restarts(number):
             path.unlink()
@@ -164,7 +190,9 @@ class Solver:
         """
         lock = _locked(self._lock)
         if lock is None:
-            raise D2RPickError(f"{self.folder}: a solver is at work there; wait for its end")
+            raise D2RPickError(
+                f"{self.folder}: a solver is at work there; wait for its end"
+            )
         try:
             _let_stack_grow()
             with self.file(number, ".log").open("wb") as log:
@@ -176,7 +204,9 @@ class Solver:
             os.ftruncate(lock, 0)
             os.pwrite(lock, str(self._process.pid).encode(), 0)
         except OSError as error:
-            raise D2RPickError(f"{command[0]}: cannot be started ({error.strerror}); check the command") from None
+            raise D2RPickError(
+                f"{command[0]}: cannot be started ({error.strerror}); check the command"
+            ) from None
         finally:
             os.close(lock)
 
@@ -208,7 +238,11 @@ class Solver:
 
     def silent_for(self) -> float:
         """For how long the solver has written nothing [s]."""
-        times = [one.stat().st_mtime for one in self.folder.glob(f"{self.name}*") if one.exists()]
+        times = [
+            one.stat().st_mtime
+            for one in self.folder.glob(f"{self.name}*")
+            if one.exists()
+        ]
         return max(0.0, time.time() - max(times, default=time.time()))
 
     def ended_well(self, number: int) -> bool:
@@ -218,8 +252,13 @@ class Solver:
     def took(self, number: int) -> tuple[int | None, float | None]:
         """Give cycles and processor time [s] of a leg; None where its listing does not say them."""
         listing = _tail(self.file(number, ".out"))
-        cycles, total = (found[-1] if (found := one.findall(listing)) else None for one in (_CYCLES, _TOTAL))
-        return None if cycles is None else int(cycles), None if total is None else float(total)
+        cycles, total = (
+            found[-1] if (found := one.findall(listing)) else None
+            for one in (_CYCLES, _TOTAL)
+        )
+        return None if cycles is None else int(
+            cycles
+        ), None if total is None else float(total)
 
     def whole(self, number: int) -> bool:
         """Whether the restarts of a leg are whole, 0 for the starter: those of all domains, as long as at first.
@@ -251,9 +290,15 @@ class Solver:
 
     def last_words(self, number: int) -> str:
         """Give what the solver said of its error, or the last lines that it printed, in one."""
-        listing = _tail(self.file(number, ".out"), _LISTING).decode("latin-1").splitlines()
+        listing = (
+            _tail(self.file(number, ".out"), _LISTING).decode("latin-1").splitlines()
+        )
         at = [place for place, line in enumerate(listing) if _ERROR in line]
-        text = (_tail(self.file(number, ".log")) or _tail(self.file(number, ".out"))).decode("latin-1").splitlines()
+        text = (
+            (_tail(self.file(number, ".log")) or _tail(self.file(number, ".out")))
+            .decode("latin-1")
+            .splitlines()
+        )
         errors = [line for place in at for line in listing[place : place + _OF_ERROR]]
         lines = [" ".join(line.split()) for line in errors or text if line.strip(" -*")]
         told = lines[:_LAST_LINES] if errors else lines[-_LAST_LINES:]
@@ -270,8 +315,14 @@ class Solver:
     def check_room(self, number: int, share: float) -> None:
         """Raise D2RPickError where the disk has no room for a leg that has this share of the run still before it."""
         files = list(self.folder.iterdir())
-        restart = max((one.stat().st_size for one in files if one.suffix == ".rst"), default=0)
-        histories = sum(self.history(one).stat().st_size for one in range(number) if self.history(one).exists())
+        restart = max(
+            (one.stat().st_size for one in files if one.suffix == ".rst"), default=0
+        )
+        histories = sum(
+            self.history(one).stat().st_size
+            for one in range(number)
+            if self.history(one).exists()
+        )
         needed = 2 * restart + round(histories * share / max(1 - share, 0.1))
         free = shutil.disk_usage(self.folder).free
         if free < needed:

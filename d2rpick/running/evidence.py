@@ -37,10 +37,18 @@ class Evidence:
 
     def __init__(self) -> None:
         self._record = GrowingRecord()
-        self._witnesses: dict[bool, list[Witness]] = {True: [], False: []}  # of parts; of the whole model
-        self._going_on: dict[tuple[int, ...], Witness] = {}  # by their members, of parts
+        self._witnesses: dict[bool, list[Witness]] = {
+            True: [],
+            False: [],
+        }  # of parts; of the whole model
+        self._going_on: dict[
+            tuple[int, ...], Witness
+        ] = {}  # by their members, of parts
         self._at_first: Samples | None = None
-        self._moved, self._complete = Column(), Column()  # by state: of each part; of all, as against the whole model
+        self._moved, self._complete = (
+            Column(),
+            Column(),
+        )  # by state: of each part; of all, as against the whole model
         self._largest = 0.0
 
     @property
@@ -63,14 +71,25 @@ class Evidence:
         self._add_whole(whole, states.balance)
         of_contact = states.balance.precision if states.balance else EXACT
         for witness in self.witnesses:
-            own = next((one for one in states.momenta if (one.parts is None) is (witness.parts is None)), None)
+            own = next(
+                (
+                    one
+                    for one in states.momenta
+                    if (one.parts is None) is (witness.parts is None)
+                ),
+                None,
+            )
             witness.follow(own.precision if own else EXACT, of_contact)
 
-    def _add_parts(self, momenta: Momenta, whole: Momenta | None, balance: Balance | None) -> None:
+    def _add_parts(
+        self, momenta: Momenta, whole: Momenta | None, balance: Balance | None
+    ) -> None:
         """Append momenta of parts to the witnesses of sets that may fly; those end where they are not believed."""
         believed = complete(momenta, whole, self._largest)
         if whole is not None:
-            self._largest = max(self._largest, float(np.abs(whole.values).max(initial=0.0)))
+            self._largest = max(
+                self._largest, float(np.abs(whole.values).max(initial=0.0))
+            )
         before, moved = self._complete.size, self._moving(momenta)
         self._complete.add(believed)
         assert momenta.parts is not None
@@ -80,7 +99,9 @@ class Evidence:
             for members in dict.fromkeys(_sets(momenta)):
                 if members not in self._going_on:
                     flying = tuple(momenta.parts[i] for i in members)
-                    self._going_on[members] = Witness(members, flying, before + stretch.start)
+                    self._going_on[members] = Witness(
+                        members, flying, before + stretch.start
+                    )
                     self._witnesses[True].append(self._going_on[members])
                 others = sorted({*range(len(momenta.parts))} - {*members})
                 self._going_on[members].add(
@@ -104,22 +125,41 @@ class Evidence:
 
     def alike(self, count: int) -> Iterator[tuple[slice, tuple[int, ...], bool]]:
         """Give the last so many states in pieces: in each the same parts have moved, and are believed or not."""
-        states = np.column_stack([self._moved.rows[-count:], self._complete.rows[-count:]])
+        states = np.column_stack(
+            [self._moved.rows[-count:], self._complete.rows[-count:]]
+        )
         changes = 1 + np.flatnonzero((states[1:] != states[:-1]).any(axis=1))
         for begin, end in pairwise([0, *changes.tolist(), count]):
             *moved, believed = states[begin].tolist()
-            yield slice(begin, end), tuple(i for i, one in enumerate(moved) if one), believed
+            yield (
+                slice(begin, end),
+                tuple(i for i, one in enumerate(moved) if one),
+                believed,
+            )
 
     def _add_whole(self, whole: Momenta | None, balance: Balance | None) -> None:
         """Append what is written of the whole model; the energy of its contacts alone where it has no momentum."""
         if whole is None and (balance is None or balance.sliding is None):
             return
         if not self._witnesses[False]:
-            self._witnesses[False].append(Witness(() if whole is None else (0,), None, 0))
+            self._witnesses[False].append(
+                Witness(() if whole is None else (0,), None, 0)
+            )
         (witness,) = self._witnesses[False]
-        time = balance.time if whole is None and balance else whole.time if whole else np.empty(0)
+        time = (
+            balance.time
+            if whole is None and balance
+            else whole.time
+            if whole
+            else np.empty(0)
+        )
         momentum = None if whole is None else whole.of((0,))
-        witness.add(time=time, momentum=momentum, contact=_contact(balance, time), alone=np.ones(time.size, np.bool_))
+        witness.add(
+            time=time,
+            momentum=momentum,
+            contact=_contact(balance, time),
+            alone=np.ones(time.size, np.bool_),
+        )
 
     def flights(self, needed: Needed) -> tuple[Quiet, ...]:
         """Give all times without force that lasted for a wait, ascending; what is ``needed`` is asked of each state.
@@ -128,7 +168,11 @@ class Evidence:
         """
         for witness in self.witnesses:
             witness.look(needed, self._gravity)
-        seen = [(one, float(witness.time[-1])) for witness in self.witnesses for one in witness.flights]
+        seen = [
+            (one, float(witness.time[-1]))
+            for witness in self.witnesses
+            for one in witness.flights
+        ]
         kept: list[Quiet] = []
         for one, reach in sorted(seen, key=lambda pair: pair[0].seen):
             if not kept or (kept[-1].end is not None and one.seen > kept[-1].end):
@@ -145,16 +189,24 @@ class Evidence:
             return None
         if not witness.members:
             return 0.0
-        momenta = next(one for one in history.momenta if (one.parts is None) is (witness.parts is None))
+        momenta = next(
+            one
+            for one in history.momenta
+            if (one.parts is None) is (witness.parts is None)
+        )
         states = np.zeros(momenta.time.size, np.bool_)
         for begin, end in ((0, first), (first, last)):
             count = min(end - begin + 1, _TOLD)
-            states[witness.origin + np.linspace(begin, end, count).round().astype(np.intp)] = True
+            states[
+                witness.origin + np.linspace(begin, end, count).round().astype(np.intp)
+            ] = True
         so_far = rows_of(momenta, states)
         if so_far.change(witness.members) <= so_far.noise(witness.members):
             return 0.0
         begin = int(np.searchsorted(so_far.time, witness.time[first]))
-        return laws_of(so_far, witness.members, history.balance).gravity(begin, so_far.time.size - 1)
+        return laws_of(so_far, witness.members, history.balance).gravity(
+            begin, so_far.time.size - 1
+        )
 
     def free_since(self, time: float) -> float:
         """Since when nothing had acted at a ``time``, by the states up to it; the time itself where no state tells."""
@@ -169,10 +221,18 @@ class Evidence:
         """Give from when to when nothing acted in what ended after a time, but for flights: too short for the wait."""
         if not self.witnesses:
             return ()
-        best = next((one for one in self.witnesses if one in self._going_on.values()), self.witnesses[-1])
+        best = next(
+            (one for one in self.witnesses if one in self._going_on.values()),
+            self.witnesses[-1],
+        )
         time, starts = best.time, best.time[np.array(best.free, np.intp)]
-        over = 1 + np.flatnonzero((starts[1:] - starts[:-1] > (time[1:] - starts[:-1]) / 2) & (time[1:] > since))
-        found = [(float(starts[state - 1]), float(time[state])) for state in over.tolist()]
+        over = 1 + np.flatnonzero(
+            (starts[1:] - starts[:-1] > (time[1:] - starts[:-1]) / 2)
+            & (time[1:] > since)
+        )
+        found = [
+            (float(starts[state - 1]), float(time[state])) for state in over.tolist()
+        ]
         seen = [one.end for one in best.flights]
         return tuple(one for one in found if one[1] not in seen)
 
@@ -194,9 +254,16 @@ class Evidence:
 
         Those that go on end with the record.
         """
-        time = next((one.time for one in self.history.momenta if one.parts is not None), np.empty(0))
+        time = next(
+            (one.time for one in self.history.momenta if one.parts is not None),
+            np.empty(0),
+        )
         return tuple(
-            (float(time[at.start]), float(time[at.start + FEWEST - 1]), float(time[min(at.stop, time.size - 1)]))
+            (
+                float(time[at.start]),
+                float(time[at.start + FEWEST - 1]),
+                float(time[min(at.stop, time.size - 1)]),
+            )
             for at in stretches(~self._complete.rows.astype(np.bool_), FEWEST)
         )
 
@@ -217,7 +284,9 @@ def highest_energy(history: History, start: float, end: float) -> float:
     return float(time[energy.size - 1 - int(np.argmax(energy[::-1]))])
 
 
-def range_of_energy(history: History, now: float, wait: float) -> tuple[float, float, float]:
+def range_of_energy(
+    history: History, now: float, wait: float
+) -> tuple[float, float, float]:
     """Give the lowest and the highest internal energy within the last wait, and from which one on tr is good."""
     energy = history.between(now - wait, now)[1]
     low, high = float(energy.min()), float(energy.max())
@@ -232,7 +301,9 @@ def _going_on(one: Quiet, reach: float, found: Sequence[Quiet]) -> Quiet:
     return one._replace(end=next(after, None))
 
 
-def _contact(balance: Balance | None, time: Samples, states: slice = slice(None)) -> Samples | None:
+def _contact(
+    balance: Balance | None, time: Samples, states: slice = slice(None)
+) -> Samples | None:
     """Energy of all contacts at these times; None where it is not written there."""
     if balance is None or balance.sliding is None or balance.time.size != time.size:
         return None
@@ -246,6 +317,8 @@ def _sets(momenta: Momenta) -> Iterator[tuple[int, ...]]:
     yield chosen
     number = {part.id: place for place, part in enumerate(momenta.parts)}
     own = {momenta.parts[i].id for i in chosen}
-    hung = {part for body in momenta.surroundings.bodies() if own & {*body} for part in body}
+    hung = {
+        part for body in momenta.surroundings.bodies() if own & {*body} for part in body
+    }
     yield tuple(sorted({*chosen, *(number[part] for part in hung if part in number)}))
     yield tuple(range(momenta.values.shape[1]))

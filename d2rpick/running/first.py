@@ -13,7 +13,14 @@ from d2rpick.deck import read_inventory
 from d2rpick.deck.engine_files import capped, listed, off
 from d2rpick.deck.ls_dyna_parts import read_entities
 from d2rpick.deck.pieces import inner_period
-from d2rpick.deck.printed_card import PHYSICS, PrintedCard, Printing, check_ids, comments, shortest
+from d2rpick.deck.printed_card import (
+    PHYSICS,
+    PrintedCard,
+    Printing,
+    check_ids,
+    comments,
+    shortest,
+)
 from d2rpick.deck.radioss_bodies import bodies_for
 from d2rpick.deck.radioss_deck import kept_off
 from d2rpick.deck.radioss_run import parts_off, read_run
@@ -72,7 +79,12 @@ class First(NamedTuple):
     notes: tuple[str, ...]
 
 
-def first_card(path: str, parts: Collection[int] = (), wait: float | None = None, after: float | None = None) -> First:
+def first_card(
+    path: str,
+    parts: Collection[int] = (),
+    wait: float | None = None,
+    after: float | None = None,
+) -> First:
     """Print the cards with which the first run of a deck switches itself.
 
     Parameters
@@ -100,7 +112,9 @@ def first_card(path: str, parts: Collection[int] = (), wait: float | None = None
     if inventory.solver == "radioss":
         chosen = chosen or parts_off(read_run(path))
     if not chosen:
-        raise ArgumentError(f"no parts were given, and {path} keeps no body off; name them with `parts`")
+        raise ArgumentError(
+            f"no parts were given, and {path} keeps no body off; name them with `parts`"
+        )
     refuse_held(path, inventory, chosen)
     known = _wait(path, inventory, wait)
     make = _radioss if inventory.solver == "radioss" else _ls_dyna
@@ -118,16 +132,28 @@ def _wait(path: str, inventory: Inventory, given: float | None) -> Wait:
             f"`wait` is not given, and {path} does not tell it: no masses on springs that are followed; give the time"
             " without force that counts as flight, above half of the longest inner period"
         )
-    return Wait(float(f"{known.time / 2:.3g}"), "deck", f"half of the period {known.time:.3g} of {known.reason}")
+    return Wait(
+        float(f"{known.time / 2:.3g}"),
+        "deck",
+        f"half of the period {known.time:.3g} of {known.reason}",
+    )
 
 
 # Radioss.
 
 
-def _radioss(path: str, inventory: Inventory, parts: Sequence[int], wait: Wait, after: float | None) -> First:
+def _radioss(
+    path: str,
+    inventory: Inventory,
+    parts: Sequence[int],
+    wait: Wait,
+    after: float | None,
+) -> First:
     run, bodies = read_run(path), bodies_for(path, parts)
     if run.starter is None or len(run.legs) != 1:
-        raise DeckError(f"{path}: the run has {len(run.legs)} engine files; its starter deck and one were expected")
+        raise DeckError(
+            f"{path}: the run has {len(run.legs)} engine files; its starter deck and one were expected"
+        )
     _refuse_loads(run.starter)
     (leg,) = run.legs
     forces = list(contacts_of(run.starter))
@@ -142,16 +168,32 @@ def _radioss(path: str, inventory: Inventory, parts: Sequence[int], wait: Wait, 
     for number in range(1, _MOST_LEGS + 1 - at_rest):
         rigid = number % 2 == at_rest
         last = number == _MOST_LEGS - at_rest
-        stop = () if last else ("/STOP/LSENSOR", str(contact if rigid else flight), "0 0 0 0 0 0")
+        stop = (
+            ()
+            if last
+            else ("/STOP/LSENSOR", str(contact if rigid else flight), "0 0 0 0 0 0")
+        )
         lines = [f"/RUN/{leg.name}/{number}", f"{leg.stop.value!r:>20}", *stop]
         switch = ("/RBODY/ON", *listed(bodies.nodes), *capped(cap), *off(others))
         lines += switch if rigid else off((*bodies.nodes, *others))
         files[f"{leg.name}_{number:04d}.rad"] = "\n".join(lines) + "\n"
-    how = f"at rest in free fall: rigid from 0; then {_waited(wait)}" if at_rest else _waited(wait)
+    how = (
+        f"at rest in free fall: rigid from 0; then {_waited(wait)}"
+        if at_rest
+        else _waited(wait)
+    )
     told = (note.format(cap=cap) for note in _OF_RADIOSS)
-    notes = (how, *bodies.notes, *_OF_ALL, *told, *((_OF_WALLS,) if run.starter.named("RWALL") else ()))
+    notes = (
+        how,
+        *bodies.notes,
+        *_OF_ALL,
+        *told,
+        *((_OF_WALLS,) if run.starter.named("RWALL") else ()),
+    )
     head = "".join(f"# {line}\n" for line in comments([*notes, *PHYSICS]))
-    return First(PrintedCard(head, (), files, starter=bodies.cards + sensors), wait, notes)
+    return First(
+        PrintedCard(head, (), files, starter=bodies.cards + sensors), wait, notes
+    )
 
 
 def _refuse_loads(starter: Starter) -> None:
@@ -162,18 +204,28 @@ def _refuse_loads(starter: Starter) -> None:
 def _falls(run: Run, inventory: Inventory, parts: Collection[int]) -> bool:
     """Whether the parts are at rest at first and gravity acts on them; nothing holds them."""
     starter = run.starter
-    still = starter is not None and not starter.named("INIVEL") and not any(leg.starts for leg in run.legs)
+    still = (
+        starter is not None
+        and not starter.named("INIVEL")
+        and not any(leg.starts for leg in run.legs)
+    )
     return still and bool(inventory.boundary.gravity) and bool(parts)
 
 
-def _sensors(forces: Sequence[tuple[str, int]], wait: float, start: float, first: int) -> tuple[str, int, int]:
+def _sensors(
+    forces: Sequence[tuple[str, int]], wait: float, start: float, first: int
+) -> tuple[str, int, int]:
     """Write sensors: of a force within the wait, and of a flight; their text and the ids of both."""
     texts, contact, free = list[str](), first, first + len(forces)
     for number, (kind, what) in enumerate(forces, start=first):
         row = f"{what:10d}{'NF':>10}{-1.0:20}{0.0:20}{0.0:20}"
-        texts.append(f"/SENSOR/{kind}/{number}\nforce, or shortly after\n{shortest(wait, 20):>20}\n{row}\n")
+        texts.append(
+            f"/SENSOR/{kind}/{number}\nforce, or shortly after\n{shortest(wait, 20):>20}\n{row}\n"
+        )
     for other in range(first + 1, first + len(forces)):
-        texts.append(f"/SENSOR/OR/{free}\nany force\n{0:20d}\n{contact:10d}{other:10d}\n")
+        texts.append(
+            f"/SENSOR/OR/{free}\nany force\n{0:20d}\n{contact:10d}{other:10d}\n"
+        )
         contact, free = free, free + 1
     texts.append(f"/SENSOR/NOT/{free}\nno force\n{0:20d}\n{contact:10d}\n")
     texts.append(f"/SENSOR/TIME/{free + 1}\nfrom then on\n{shortest(start, 20):>20}\n")
@@ -188,7 +240,13 @@ def _waited(wait: Wait) -> str:
 # LS-DYNA.
 
 
-def _ls_dyna(path: str, inventory: Inventory, parts: Sequence[int], wait: Wait, after: float | None) -> First:
+def _ls_dyna(
+    path: str,
+    inventory: Inventory,
+    parts: Sequence[int],
+    wait: Wait,
+    after: float | None,
+) -> First:
     deck = read_deck(path)
     entities = read_entities(deck, "CONTACT")
     able = [one for one in entities.found if one.triggers]
@@ -198,7 +256,11 @@ def _ls_dyna(path: str, inventory: Inventory, parts: Sequence[int], wait: Wait, 
                 f"{card.at}: *{card.name} pushes without a contact, so that a flight is not seen by contacts"
             )
     if not entities.all_known or len(able) != 1:
-        found = f"{len(able)} contacts" if entities.all_known else "contacts that are not all known"
+        found = (
+            f"{len(able)} contacts"
+            if entities.all_known
+            else "contacts that are not all known"
+        )
         raise DeckError(
             f"{path}: {found} between surfaces, or of nodes with a surface; one was expected: a switch waits for one,"
             " and single-surface contacts never trigger it"
@@ -207,15 +269,29 @@ def _ls_dyna(path: str, inventory: Inventory, parts: Sequence[int], wait: Wait, 
     printing = Printing(part=tuple(ids), bodies=inventory.bodies(ids))
     one, other = printing.swset
     falls = bool(inventory.boundary.gravity) and not deck.named("INITIAL_VELOCITY")
-    hint = ("TIME1 is 0: give the time of the last push (--after) where it is known.",) * (after is None and not falls)
+    hint = (
+        "TIME1 is 0: give the time of the last push (--after) where it is known.",
+    ) * (after is None and not falls)
     fall = ("At rest in free fall: rigid from 0, TIME1 0.",) * (after is None and falls)
     offset, where = _offset(inventory, able[0].keyword)
     notes = (_waited(wait), *fall, *_OF_ALL, *_OF_LS_DYNA, where, *hint)
     lines = [f"$ {line}" for line in comments([*notes, *PHYSICS])]
     short = wait.time / _SHORT
-    lines += header(one, shortest(after or 0.0), shortest(short), (len(ids), 0), Waiting(2, contact, short, other, 1))
+    lines += header(
+        one,
+        shortest(after or 0.0),
+        shortest(short),
+        (len(ids), 0),
+        Waiting(2, contact, short, other, 1),
+    )
     lines += to_rigid(ids, printing)
-    lines += header(other, "0.0", "0.0", (0, len(ids)), Waiting(4, contact, wait.time, one, -1, offset=offset))
+    lines += header(
+        other,
+        "0.0",
+        "0.0",
+        (0, len(ids)),
+        Waiting(4, contact, wait.time, one, -1, offset=offset),
+    )
     lines += to_deformable(ids)
     text = "\n".join(lines) + "\n"
     return First(PrintedCard(text, (), {"switches.k": text}), wait, notes)
@@ -231,4 +307,7 @@ def _offset(inventory: Inventory, keyword: str) -> tuple[float, str]:
             offset,
             f"OFFSET {offset:g}: the parts are deformable before the contact, {_CLEAR} shell thicknesses from it.",
         )
-    return 0.0, "OFFSET 0: the parts become deformable in the contact; only automatic contacts of shells have a margin."
+    return (
+        0.0,
+        "OFFSET 0: the parts become deformable in the contact; only automatic contacts of shells have a margin.",
+    )

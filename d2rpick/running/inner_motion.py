@@ -87,7 +87,9 @@ class _Motion:
         self.swings: list[_HalfPeriod] = []
         self._columns = {what: Column() for what in ("time", "values", "room")}
         self._lowest, self._highest = np.inf, -np.inf
-        self._turn: int | None = None  # state of the last turn; None before anything moves
+        self._turn: int | None = (
+            None  # state of the last turn; None before anything moves
+        )
         self._far, self._rising = 0, False
         self._sets_out: float | None = None
 
@@ -101,7 +103,9 @@ class _Motion:
         """Time of the last state [time]."""
         return float(self._columns["time"].rows[-1])
 
-    def add(self, time: Samples, values: Samples, least: Samples) -> Iterator[_HalfPeriod]:
+    def add(
+        self, time: Samples, values: Samples, least: Samples
+    ) -> Iterator[_HalfPeriod]:
         """Append states (k,), whose least change that is a swing is at least ``least`` (k,); give the swings seen."""
         lows = np.minimum(np.minimum.accumulate(values), self._lowest)
         highs = np.maximum(np.maximum.accumulate(values), self._highest)
@@ -120,28 +124,41 @@ class _Motion:
             self._turn = _last_extreme(every[: state + 1])
             self._far, self._rising = state, bool(every[state] > every[self._turn])
             begin, limits = state, limits[int(moved[0]) :]
-        for state, (value, limit) in enumerate(zip(every[begin:].tolist(), limits, strict=True), start=begin):
+        for state, (value, limit) in enumerate(
+            zip(every[begin:].tolist(), limits, strict=True), start=begin
+        ):
             yield from self._turned(state, value, limit, every)
 
-    def _turned(self, state: int, value: float, room: float, every: Samples) -> Iterator[_HalfPeriod]:
+    def _turned(
+        self, state: int, value: float, room: float, every: Samples
+    ) -> Iterator[_HalfPeriod]:
         """Follow the swing by a state; give it where the next one has gone back by its room."""
         if (value >= every[self._far]) if self._rising else (value <= every[self._far]):
             self._far = state
         elif abs(every[self._far] - value) > room:
             assert self._turn is not None
             if self._far - self._turn >= _RESOLVED:
-                self.swings.append(self._half_period(self._turn, self._far, state, room))
+                self.swings.append(
+                    self._half_period(self._turn, self._far, state, room)
+                )
                 yield self.swings[-1]
             self._turn, self._far, self._rising = self._far, state, not self._rising
 
-    def _half_period(self, begin: int, end: int, state: int, room: float) -> _HalfPeriod:
-        time, values = self._columns["time"].rows, self._columns["values"].rows[begin : end + 1]
+    def _half_period(
+        self, begin: int, end: int, state: int, room: float
+    ) -> _HalfPeriod:
+        time, values = (
+            self._columns["time"].rows,
+            self._columns["values"].rows[begin : end + 1],
+        )
         way = np.abs(values - values[0])
         begun = int(np.flatnonzero(way <= _INNER * way[-1])[-1])
         ended = begun + int(np.argmax(way[begun:] >= (1 - _INNER) * way[-1]))
         half = self._times * float(time[begin + ended] - time[begin + begun]) / _SHARE
         strength = float(way[-1]) / half if way[-1] > room else 0.0
-        return _HalfPeriod(float(time[begin]), float(time[end]), float(time[state]), half, strength)
+        return _HalfPeriod(
+            float(time[begin]), float(time[end]), float(time[state]), half, strength
+        )
 
     def going_on(self, now: float) -> tuple[float, float, float] | None:
         """Tell what swings ``now``: its mean change by time, how long it has, and the longest half period before."""
@@ -153,7 +170,10 @@ class _Motion:
         turned = before[-1].end if before else self._sets_out
         begin = int(np.searchsorted(time, turned))
         room = float(self._columns["room"].rows[state])
-        change, lately = (abs(float(values[state] - values[one])) for one in (begin, (begin + state) // 2))
+        change, lately = (
+            abs(float(values[state] - values[one]))
+            for one in (begin, (begin + state) // 2)
+        )
         if change <= room or lately <= room / 2:
             return None  # it has come to rest, or turns with the body
         took = self._times * (now - turned)
@@ -180,21 +200,33 @@ class InnerMotion:
     ``given`` is asked for by the user, ``before`` by the record of flights before [time], ``of_deck`` by the deck.
     """
 
-    def __init__(self, given: float | None = None, of_deck: Wait | None = None, before: float = 0.0) -> None:
+    def __init__(
+        self,
+        given: float | None = None,
+        of_deck: Wait | None = None,
+        before: float = 0.0,
+    ) -> None:
         self._given, self._floor = given, of_deck
         self._springs = of_deck.time if of_deck else np.inf
         if before > (of_deck.time if of_deck else 0.0):
             self._floor = Wait(before, "record", "as in the flight before")
         self._evidence = Evidence()
         self._motions: list[_Motion] = []  # of parts along axes
-        self._going_on: dict[tuple[int, int], _Motion] = {}  # of these, as long as the same parts move
+        self._going_on: dict[
+            tuple[int, int], _Motion
+        ] = {}  # of these, as long as the same parts move
         self._energy = _Motion("the internal energy", times=2.0)
         self._heavy: tuple[int, ...] = ()
         self._largest = self._highest = 0.0  # speed of the centre of mass, and energy
-        self._known: dict[bool, list[_Known]] = {True: [], False: []}  # by motions of parts; by the energy
+        self._known: dict[bool, list[_Known]] = {
+            True: [],
+            False: [],
+        }  # by motions of parts; by the energy
 
     @classmethod
-    def of(cls, history: History, given: float | None = None, of_deck: Wait | None = None) -> InnerMotion:
+    def of(
+        cls, history: History, given: float | None = None, of_deck: Wait | None = None
+    ) -> InnerMotion:
         """Give that of a whole record."""
         evidence, motion = Evidence(), cls(given, of_deck)
         evidence.take(history)
@@ -204,8 +236,17 @@ class InnerMotion:
     def take(self, states: History, evidence: Evidence) -> None:
         """Append states, which the ``evidence`` has taken already."""
         self._evidence = evidence
-        momenta = next((one for one in states.momenta if one.parts is not None and one.masses is not None), None)
-        for swing, motion in sorted(self._of_parts(momenta) if momenta else (), key=lambda pair: pair[0].known):
+        momenta = next(
+            (
+                one
+                for one in states.momenta
+                if one.parts is not None and one.masses is not None
+            ),
+            None,
+        )
+        for swing, motion in sorted(
+            self._of_parts(momenta) if momenta else (), key=lambda pair: pair[0].known
+        ):
             self._learn(swing, motion)
         for swing in self._of_energy(states):
             self._learn(swing, self._energy)
@@ -225,7 +266,9 @@ class InnerMotion:
             if not heavy or not believed:
                 continue
             centre = momenta.values[states][:, members].sum(axis=1) / whole
-            fastest = np.maximum(np.maximum.accumulate(np.abs(centre).max(axis=1)), self._largest)
+            fastest = np.maximum(
+                np.maximum.accumulate(np.abs(centre).max(axis=1)), self._largest
+            )
             self._largest = float(fastest[-1])
             for i in heavy:
                 against = momenta.values[states, i] - masses[i] * centre
@@ -234,14 +277,18 @@ class InnerMotion:
                         self._going_on[i, axis] = _Motion(momenta.parts[i].name)
                         self._motions.append(self._going_on[i, axis])
                     motion = self._going_on[i, axis]
-                    for swing in motion.add(momenta.time[states], values, masses[i] * _SLOWEST * fastest):
+                    for swing in motion.add(
+                        momenta.time[states], values, masses[i] * _SLOWEST * fastest
+                    ):
                         yield swing, motion
 
     def _of_energy(self, states: History) -> Iterator[_HalfPeriod]:
         """Follow the internal energy, which swings twice as often as what deforms."""
         if not states.time.size:
             return
-        highest = np.maximum(np.maximum.accumulate(np.abs(states.energy)), self._highest)
+        highest = np.maximum(
+            np.maximum.accumulate(np.abs(states.energy)), self._highest
+        )
         self._highest = float(highest[-1])
         yield from self._energy.add(states.time, states.energy, _SLOWEST * highest)
 
@@ -253,15 +300,27 @@ class InnerMotion:
         if swing.strength <= 0:
             return
         so_far = self._known[motion is not self._energy]
-        longest = so_far[-1] if so_far else _Known(swing.known, 0.0, 0.0, motion.name, swing.known, 0.0)
+        longest = (
+            so_far[-1]
+            if so_far
+            else _Known(swing.known, 0.0, 0.0, motion.name, swing.known, 0.0)
+        )
         strongest = max(longest.strength, swing.strength)
         own = self._evidence.free_since(swing.end) <= swing.begin
         motion.has_own |= own
-        inner = swing.strength >= _SLOW * strongest and not (own and swing.half > _TURNS * self._springs)
+        inner = swing.strength >= _SLOW * strongest and not (
+            own and swing.half > _TURNS * self._springs
+        )
         counts = inner and (own or not (motion.has_own or self._floor))
-        half, who = (swing.half, motion.name) if counts and swing.half > longest.half else (longest.half, longest.name)
+        half, who = (
+            (swing.half, motion.name)
+            if counts and swing.half > longest.half
+            else (longest.half, longest.name)
+        )
         over = swing.known if half > longest.half else longest.over
-        longest_swing = max(longest.swing, min(swing.half, _BEYOND * self._springs) if inner else 0.0)
+        longest_swing = max(
+            longest.swing, min(swing.half, _BEYOND * self._springs) if inner else 0.0
+        )
         so_far.append(_Known(swing.known, half, strongest, who, over, longest_swing))
 
     def needed(self, start: float, now: float) -> float | None:
@@ -277,7 +336,11 @@ class InnerMotion:
         at_rest = self._at_rest(start, now)
         if self._given is None and at_rest:
             time = self._evidence.history.time
-            return Wait(float(time[FEWEST - 1] - time[0]), "at-rest", f"nothing vibrates: {FEWEST} states are enough")
+            return Wait(
+                float(time[FEWEST - 1] - time[0]),
+                "at-rest",
+                f"nothing vibrates: {FEWEST} states are enough",
+            )
         known = self.longest(now)
         if self._given is None:
             return None if self._floor is None and self._swings_on(now) else known
@@ -296,7 +359,9 @@ class InnerMotion:
     def longest_swing(self, now: float) -> float:
         """Longest half of a swing that is known ``now``, though a push may have made it longer [time]."""
         known = self._so_far(now)
-        return max(known.swing if known else 0.0, self._floor.time if self._floor else 0.0)
+        return max(
+            known.swing if known else 0.0, self._floor.time if self._floor else 0.0
+        )
 
     def _so_far(self, now: float) -> _Known | None:
         known = self._known[any(one.begins <= now for one in self._motions)]
@@ -309,9 +374,17 @@ class InnerMotion:
         if history.time.size < FEWEST or start > history.time[FEWEST - 1]:
             return False
         balance = history.balance
-        terms = (balance.internal, balance.kinetic, balance.external_work) if balance else ()
+        terms = (
+            (balance.internal, balance.kinetic, balance.external_work)
+            if balance
+            else ()
+        )
         inside = window(history.time, start, now)
-        energies = [float(np.abs(one[inside]).max()) for one in (history.energy, *terms) if one is not None]
+        energies = [
+            float(np.abs(one[inside]).max())
+            for one in (history.energy, *terms)
+            if one is not None
+        ]
         return energies[0] <= _ROUND_OFF * max(energies)
 
     def _swings_on(self, now: float) -> bool:
@@ -320,7 +393,10 @@ class InnerMotion:
         strongest = known.strength if known else 0.0
         of_parts = [one for one in self._motions if one.begins <= now <= one.ends]
         going = (one.going_on(now) for one in of_parts or [self._energy])
-        return any(s >= _SLOW * strongest and took > _LONGER * before for s, took, before in filter(None, going))
+        return any(
+            s >= _SLOW * strongest and took > _LONGER * before
+            for s, took, before in filter(None, going)
+        )
 
 
 def wait_of_deck(inventory: Inventory) -> Wait | None:
@@ -328,7 +404,12 @@ def wait_of_deck(inventory: Inventory) -> Wait | None:
     found = inner_period(inventory)
     if found is None:
         return None
-    return Wait(found.time / 2, "deck", f"half of the period {found.time:.3g} of {found.reason}", found.least / 2)
+    return Wait(
+        found.time / 2,
+        "deck",
+        f"half of the period {found.time:.3g} of {found.reason}",
+        found.least / 2,
+    )
 
 
 def check_wait(given: float, known: Wait | None, name: str) -> None:

@@ -33,7 +33,9 @@ class _Taken(NamedTuple):
 class Looks:
     """Looks at the same run again and again, with the same ``selection`` and what its deck tells."""
 
-    def __init__(self, selection: Selection, inventory: Inventory | None = None) -> None:
+    def __init__(
+        self, selection: Selection, inventory: Inventory | None = None
+    ) -> None:
         self._selection, self._inventory = selection, inventory
         self._taken: dict[str, _Taken] = {}
         self._time = float("-inf")
@@ -57,7 +59,11 @@ class Looks:
         """
         added = self._added(names)
         history = None if added is None else self._history_of(added)
-        follows = history is None or not history.time.size or float(history.time[0]) > self._time
+        follows = (
+            history is None
+            or not history.time.size
+            or float(history.time[0]) > self._time
+        )
         if added is None or not follows:
             self._taken.clear()
             follows, history = False, self.whole(names)
@@ -90,7 +96,10 @@ class Looks:
                         return None
                 else:
                     stream.seek(taken.end - len(taken.last))
-                    if inode != taken.inode or stream.read(len(taken.last)) != taken.last:
+                    if (
+                        inode != taken.inode
+                        or stream.read(len(taken.last)) != taken.last
+                    ):
                         return None
                     data = taken.head + stream.read()
             if self._note(name, data, taken.end - len(taken.head) if taken else 0):
@@ -104,11 +113,15 @@ class Looks:
         if end > begin:
             size = (end - begin) // history.time.size
             last = data[end - size : end]
-            self._taken[name] = _Taken(data[:begin], last, before + end, Path(name).stat().st_ino)
+            self._taken[name] = _Taken(
+                data[:begin], last, before + end, Path(name).stat().st_ino
+            )
         return end > begin
 
     def _history_of(self, sources: Sequence[Source]) -> History | None:
-        return self._read_open(open_sources(sources, self._selection)) if sources else None
+        return (
+            self._read_open(open_sources(sources, self._selection)) if sources else None
+        )
 
     def _read_open(self, run: Run) -> History:
         return Reference.of(in_deck(run, self._inventory), self._selection).history

@@ -31,7 +31,9 @@ class Column:
         """Append ``rows`` of shape (k, ...)."""
         size = self.size + len(rows)
         if size > len(self._held):
-            longer = np.empty((max(2 * size, _FEWEST_ROWS), *rows.shape[1:]), rows.dtype)
+            longer = np.empty(
+                (max(2 * size, _FEWEST_ROWS), *rows.shape[1:]), rows.dtype
+            )
             longer[: self.size] = self.rows if self.size else 0
             self._held = longer
         self._held[self.size : size] = rows
@@ -53,13 +55,21 @@ class GrowingRecord:
 
     def add(self, states: History) -> None:
         """Append states that follow those so far; HistoryError where they hold other quantities."""
-        bare = replace(states, part_energies=None, part_names=())  # many numbers, of which none is needed
-        self._latest = [bare, *states.momenta, *([states.balance] if states.balance else [])]
+        bare = replace(
+            states, part_energies=None, part_names=()
+        )  # many numbers, of which none is needed
+        self._latest = [
+            bare,
+            *states.momenta,
+            *([states.balance] if states.balance else []),
+        ]
         arrays = [_arrays(table) for table in self._latest]
         if not self._columns:
             self._columns = [{name: Column() for name in one} for one in arrays]
         if [one.keys() for one in arrays] != [one.keys() for one in self._columns]:
-            raise HistoryError("the states that were added hold other quantities than those before them")
+            raise HistoryError(
+                "the states that were added hold other quantities than those before them"
+            )
         for columns, one in zip(self._columns, arrays, strict=True):
             for name, rows in one.items():
                 columns[name].add(rows)
@@ -71,17 +81,29 @@ class GrowingRecord:
         if self._history is None:
             tables: list[Any] = []
             for table, columns in zip(self._latest, self._columns, strict=True):
-                rows: dict[str, Any] = {name: column.rows for name, column in columns.items()}
+                rows: dict[str, Any] = {
+                    name: column.rows for name, column in columns.items()
+                }
                 tables.append(replace(table, **rows))
             history, *others = tables
             count = len(history.momenta)
-            given = Given(tuple(others[:count]), next(iter(others[count:]), None), history.masses)
+            given = Given(
+                tuple(others[:count]), next(iter(others[count:]), None), history.masses
+            )
             self._history = replace(history, evidence=given)
         return self._history
 
 
 def _arrays(table: Table) -> dict[str, NDArray[Any]]:
     """Give those arrays of a table that have a row for each of its times."""
-    values = {one.name: getattr(table, one.name) for one in fields(table) if one.init and one.name != "masses"}
+    values = {
+        one.name: getattr(table, one.name)
+        for one in fields(table)
+        if one.init and one.name != "masses"
+    }
     size = table.time.size
-    return {name: one for name, one in values.items() if isinstance(one, np.ndarray) and len(one) == size}
+    return {
+        name: one
+        for name, one in values.items()
+        if isinstance(one, np.ndarray) and len(one) == size
+    }

@@ -57,7 +57,11 @@ class Limits(NamedTuple):
             return self.margin
         # the share held in eight windows of two structures; where nothing vibrates the rigid body flies as the
         # deformable one would, and the least margin is enough
-        return self.shortest if idle and self.shortest else max(self.shortest, SHARE * flight)
+        return (
+            self.shortest
+            if idle and self.shortest
+            else max(self.shortest, SHARE * flight)
+        )
 
     @property
     def same(self) -> float:
@@ -150,13 +154,19 @@ def next_order(legs: Sequence[Leg], limits: Limits) -> Order | None:
     elif last.until >= limits.end:
         order = None
     elif last.kind == PROBE:
-        order = _following(last, PROBE, _probed(legs, _became_rigid(legs).start, limits))
+        order = _following(
+            last, PROBE, _probed(legs, _became_rigid(legs).start, limits)
+        )
     elif last.kind == RIGID:
-        order = _following(last, LOAD, _loaded(legs[-1], limits))._replace(after=last.until)
+        order = _following(last, LOAD, _loaded(legs[-1], limits))._replace(
+            after=last.until
+        )
     else:
         order = _after_load(legs, limits)
     if order and order.number > _MOST_LEGS:
-        raise D2RPickError(f"the run needs more than {_MOST_LEGS} legs, which the solver cannot number; raise `wait`")
+        raise D2RPickError(
+            f"the run needs more than {_MOST_LEGS} legs, which the solver cannot number; raise `wait`"
+        )
     return order
 
 
@@ -166,29 +176,50 @@ def _following(last: Order, kind: str, until: float) -> Order:
 
 def _after_load(legs: Sequence[Leg], limits: Limits) -> Order:
     last, seen = legs[-1].order, legs[-1].seen
-    switches = seen.flies and seen.free >= last.after and limits.end - last.until > _WORTH * limits.end
+    switches = (
+        seen.flies
+        and seen.free >= last.after
+        and limits.end - last.until > _WORTH * limits.end
+    )
     if not switches or last.number > _MOST_LEGS - _KEPT_BACK:
         return _following(last, LOAD, _loaded(legs[-1], limits))
     if seen.idle or seen.tr > last.start:
         return _following(last, PROBE, _probed(legs, last.until, limits))
-    return last._replace(kind=PROBE, until=_probed(legs, last.start, limits, now=last.start))
+    return last._replace(
+        kind=PROBE, until=_probed(legs, last.start, limits, now=last.start)
+    )
 
 
 def _loaded(leg: Leg, limits: Limits) -> float:
     """When a deformable leg after this one ends: when a flight that has begun, or may begin now, lasts for the wait."""
-    now, seen, numbers = leg.order.until, leg.seen, _MOST_LEGS - _KEPT_BACK - leg.order.number
+    now, seen, numbers = (
+        leg.order.until,
+        leg.seen,
+        _MOST_LEGS - _KEPT_BACK - leg.order.number,
+    )
     if numbers <= 0:
         return limits.end
-    free = seen.free if not leg.order.rigid and seen.free >= leg.order.after and not seen.flies else now
+    free = (
+        seen.free
+        if not leg.order.rigid and seen.free >= leg.order.after and not seen.flies
+        else now
+    )
     wait = seen.wait or _UNKNOWN * limits.end
     until = max(free + wait, now + _LEAST * wait, now + (limits.end - now) / numbers)
     return until if until < limits.end - limits.same else limits.end
 
 
-def _probed(legs: Sequence[Leg], tr: float, limits: Limits, now: float | None = None) -> float:
+def _probed(
+    legs: Sequence[Leg], tr: float, limits: Limits, now: float | None = None
+) -> float:
     """When the next leg of a probe that began at ``tr`` ends."""
     now = legs[-1].order.until if now is None else now
-    until = now + max(_flown(legs).wait or 0.0, _OF_FLOWN * (now - tr), _OF_RUN * limits.end, FEWEST * limits.interval)
+    until = now + max(
+        _flown(legs).wait or 0.0,
+        _OF_FLOWN * (now - tr),
+        _OF_RUN * limits.end,
+        FEWEST * limits.interval,
+    )
     return until if until < limits.end - limits.same else limits.end
 
 
@@ -217,7 +248,11 @@ def window_of(legs: Sequence[Leg], limits: Limits) -> Window:
         return Window(before.free, tr, legs[-1].order.until, None, wait)
     flight = contact - before.free
     td = contact - limits.margin_of(flight, idle=before.idle)
-    ends = [one.until for one in together(legs[-1].order, legs) if 0 <= td - one.until <= limits.same]
+    ends = [
+        one.until
+        for one in together(legs[-1].order, legs)
+        if 0 <= td - one.until <= limits.same
+    ]
     td = max(ends, default=td)  # a leg that ended there need not go on by a state
     reason = _why_left_out(legs, td - tr, limits)
     if not before.idle and flight < _SWINGS * before.swing:
@@ -230,16 +265,26 @@ def _why_left_out(legs: Sequence[Leg], rigid_time: float, limits: Limits) -> str
     if rigid_time <= 0:
         return "its margin begins before tr"
     frozen = _became_rigid(legs)
-    probed = [leg for leg in legs if leg.order.rigid and leg.order.start >= frozen.start]
+    probed = [
+        leg for leg in legs if leg.order.rigid and leg.order.start >= frozen.start
+    ]
     took = sum((leg.cycles or 0) * limits.rigid_cycle + _RESTART for leg in probed)
     saved = (rigid_time - took / _cycles(legs)) / limits.end
-    return None if saved >= _WORTH else f"saves {max(saved, 0.0):.1%} of the run, less than {_WORTH:.0%}"
+    return (
+        None
+        if saved >= _WORTH
+        else f"saves {max(saved, 0.0):.1%} of the run, less than {_WORTH:.0%}"
+    )
 
 
 def _cycles(legs: Sequence[Leg]) -> float:
     """Deformable cycles by time, so far [1/time]."""
     loaded = [leg for leg in legs if not leg.order.rigid and leg.cycles]
-    return sum(leg.cycles or 0 for leg in loaded) / sum(leg.length for leg in loaded) if loaded else float("inf")
+    return (
+        sum(leg.cycles or 0 for leg in loaded) / sum(leg.length for leg in loaded)
+        if loaded
+        else float("inf")
+    )
 
 
 def together(order: Order, legs: Sequence[Leg]) -> list[Order]:
@@ -267,7 +312,9 @@ def windows(legs: Sequence[Leg], limits: Limits) -> list[Window]:
         for start, end in leg.seen.short:
             told = "over before the wait"
             found[start] = Window(start, start, end, end, leg.seen.wait or 0.0, told)
-        if leg.order.rigid and (leg.seen.contact is not None or leg.order.until >= limits.end):
+        if leg.order.rigid and (
+            leg.seen.contact is not None or leg.order.until >= limits.end
+        ):
             window = window_of(legs[:count], limits)
             found[window.free] = window
     return [found[start] for start in sorted(found)]

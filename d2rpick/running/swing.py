@@ -52,9 +52,18 @@ def swing_in(history: History, start: float, tr: float) -> Swing | None:
     if drift is None:
         name, error, path = _of_two(momenta, start, tr)
     else:
-        name, error, path = drift.part.name, np.max(drift.errors(drift.time, float(drift.time[-1]))), drift.path[-1]
+        name, error, path = (
+            drift.part.name,
+            np.max(drift.errors(drift.time, float(drift.time[-1]))),
+            drift.path[-1],
+        )
     return (
-        Swing(name, float(error), float(error / path) / MOST_OF_PATH * (tr - start), drift is None)
+        Swing(
+            name,
+            float(error),
+            float(error / path) / MOST_OF_PATH * (tr - start),
+            drift is None,
+        )
         if path > 0
         else None
     )
@@ -64,11 +73,18 @@ def _of_two(momenta: Momenta, start: float, tr: float) -> tuple[str, float, floa
     """Name the lighter of two parts, how far off the other is at most, and the path; 0 for others."""
     inside = window(momenta.time, start, tr)
     time, masses = momenta.time[inside], momenta.masses
-    pair = [] if masses is None else [i for i in momenta.moving if i in momenta.chosen and masses[i] > 0]
+    pair = (
+        []
+        if masses is None
+        else [i for i in momenta.moving if i in momenta.chosen and masses[i] > 0]
+    )
     if momenta.parts is None or masses is None or len(pair) != 2 or time.size < 2:
         return "", 0.0, 0.0
     light, heavy = sorted(pair, key=lambda i: float(masses[i]))
     centre = momenta.values[inside][:, pair].sum(axis=1) / masses[pair].sum()
     away = integral(time, momenta.values[inside][:, heavy] / masses[heavy] - centre)
-    off, path = np.linalg.norm(away - away[-1], axis=1).max(), integral(time, np.linalg.norm(centre, axis=1))[-1]
+    off, path = (
+        np.linalg.norm(away - away[-1], axis=1).max(),
+        integral(time, np.linalg.norm(centre, axis=1))[-1],
+    )
     return momenta.parts[light].name, float(off), float(path)

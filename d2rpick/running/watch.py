@@ -47,17 +47,27 @@ class Event(NamedTuple):
 
 
 def events_of(
-    evidence: Evidence, motion: InnerMotion, decided: dict[tuple[float, float], tuple[Event, ...]] | None = None
+    evidence: Evidence,
+    motion: InnerMotion,
+    decided: dict[tuple[float, float], tuple[Event, ...]] | None = None,
 ) -> tuple[Event, ...]:
     """Give all that has happened, in the order in which it was seen; RangeError where a wait is too short.
 
     The events of a run so far are the first of those of the whole run.  What is ``decided`` of flights, by their start
     and when they were seen, is not looked for again.
     """
-    quiet, rigid, history = evidence.flights(motion.needed), evidence.rigid_times(), evidence.history
+    quiet, rigid, history = (
+        evidence.flights(motion.needed),
+        evidence.rigid_times(),
+        evidence.history,
+    )
     decided = {} if decided is None else decided
     found = [event for one in quiet for event in _flight(history, motion, one, decided)]
-    found = [one for one in found if one.tr is None or not any(start <= one.tr <= end for start, _, end in rigid)]
+    found = [
+        one
+        for one in found
+        if one.tr is None or not any(start <= one.tr <= end for start, _, end in rigid)
+    ]
     if history.time.size and not (quiet and quiet[0].start <= history.time[0]):
         begun = evidence.contact_after(float(history.time[0]), 1)
         found += [] if begun is None else [Event("load", begun, begun, "a force acts")]
@@ -72,9 +82,15 @@ def events_of(
 
 
 def _flight(
-    history: History, motion: InnerMotion, one: Quiet, decided: dict[tuple[float, float], tuple[Event, ...]]
+    history: History,
+    motion: InnerMotion,
+    one: Quiet,
+    decided: dict[tuple[float, float], tuple[Event, ...]],
 ) -> Iterator[Event]:
-    advice = decided.get(one[:2]) or (_begins(motion, one), *_advice(history, motion, one))
+    advice = decided.get(one[:2]) or (
+        _begins(motion, one),
+        *_advice(history, motion, one),
+    )
     if one.end is not None or any(event.tr is not None for event in advice):
         decided[one[:2]] = advice
     yield from advice
@@ -85,12 +101,18 @@ def _flight(
 
 def _begins(motion: InnerMotion, one: Quiet) -> Event:
     """Tell that a flight is seen, by what evidence, and why not before."""
-    what = "momentum less gravity" if one.source == "momentum" else "the energy of the contacts"
+    what = (
+        "momentum less gravity"
+        if one.source == "momentum"
+        else "the energy of the contacts"
+    )
     wait = motion.wait(one.start, one.seen)
     why = f"the wait is {one.wait:.4g}: {wait.reason}" if wait else ""
     told = f"{what} is constant within {one.left:.1e} of its largest value for {one.seen - one.start:.4g}; {why}"
     told += (
-        "; nothing tells when it lands" if one.level is None else f"; on level ground it lands about {one.level:.4g}"
+        "; nothing tells when it lands"
+        if one.level is None
+        else f"; on level ground it lands about {one.level:.4g}"
     )
     return Event("flight", one.start, one.seen, told, one.wait, one.left)
 
@@ -108,20 +130,36 @@ def _advice(history: History, motion: InnerMotion, one: Quiet) -> Iterator[Event
 def _switch(history: History, one: Quiet) -> Iterator[Event]:
     """Advise a switch where the internal energy is high, within one more wait; else where it was highest in it."""
     last = one.seen + one.wait
-    for now, energy in zip(*(values.tolist() for values in history.between(one.seen, last)), strict=True):
+    for now, energy in zip(
+        *(values.tolist() for values in history.between(one.seen, last)), strict=True
+    ):
         low, high, enough = range_of_energy(history, now, one.wait)
         where = f"the internal energy is {energy:.4g}, of {low:.4g} to {high:.4g} within one wait"
         if one.end is not None and now >= one.end:
             return
         if energy >= enough:
-            yield Event("switch", now, now, f"switch now: {where}{_swings(history, one, now)}", one.wait, tr=now)
+            yield Event(
+                "switch",
+                now,
+                now,
+                f"switch now: {where}{_swings(history, one, now)}",
+                one.wait,
+                tr=now,
+            )
             return
         if now == one.seen:
             yield Event(
-                "later", last, now, f"not yet: {where}; its highest value is waited for until {last:.6g}", one.wait
+                "later",
+                last,
+                now,
+                f"not yet: {where}; its highest value is waited for until {last:.6g}",
+                one.wait,
             )
     if history.time[-1] > last and not (one.end is not None and one.end <= last):
-        tr, now = highest_energy(history, one.seen, last), float(history.between(last, history.time[-1])[0][0])
+        tr, now = (
+            highest_energy(history, one.seen, last),
+            float(history.between(last, history.time[-1])[0][0]),
+        )
         told = f"the internal energy was highest at {tr:.6g}: a restart from before can switch there"
         told += _swings(history, one, tr)
         yield Event("switch", tr, now, told, one.wait, tr=tr)
@@ -152,9 +190,18 @@ class Watch:
     """
 
     def __init__(
-        self, names: Sequence[str], selection: Selection, wait: float | None = None, inventory: Inventory | None = None
+        self,
+        names: Sequence[str],
+        selection: Selection,
+        wait: float | None = None,
+        inventory: Inventory | None = None,
     ) -> None:
-        self._names, self._selection, self._wait, self._inventory = names, selection, wait, inventory
+        self._names, self._selection, self._wait, self._inventory = (
+            names,
+            selection,
+            wait,
+            inventory,
+        )
         self._of_deck = wait_of_deck(inventory) if inventory else None
         self._looks = Looks(selection, inventory)
         self._begin_again()
@@ -165,7 +212,10 @@ class Watch:
         self.ended: str | None = None
 
     def _begin_again(self) -> None:
-        self._evidence, self._motion = Evidence(), InnerMotion(self._wait, self._of_deck)
+        self._evidence, self._motion = (
+            Evidence(),
+            InnerMotion(self._wait, self._of_deck),
+        )
         self._decided: dict[tuple[float, float], tuple[Event, ...]] = {}
 
     def news(self) -> Iterator[Event]:
@@ -181,7 +231,9 @@ class Watch:
         if [_stamp(*one) for one in files] != [_stamp(*one) for one in before]:
             self._files, self._silent = files, _SILENT
             try:
-                yield from self._read([name for name, _ in files], replaced=_replaced(before, files))
+                yield from self._read(
+                    [name for name, _ in files], replaced=_replaced(before, files)
+                )
                 self._error = None
             except (FormatError, HistoryError) as error:
                 self._error = error  # it may be about to be written
@@ -203,12 +255,23 @@ class Watch:
     def state(self) -> Event:
         """Tell how it stands, with the time since which it flies, if it does."""
         if not self._told and self._now == float("-inf"):
-            return self._event("state", f"cannot be read yet: {self._error}" if self._error else "has not begun")
+            return self._event(
+                "state",
+                f"cannot be read yet: {self._error}"
+                if self._error
+                else "has not begun",
+            )
         last = next((one for one in reversed(self._told) if one.event in _FLYING), None)
         if last and last.event == "flight":
-            return self._event("state", f"flies since {last.time:.6g}")._replace(time=last.time)
+            return self._event("state", f"flies since {last.time:.6g}")._replace(
+                time=last.time
+            )
         told = f"no flight since {last.time:.6g}" if last else "no flight yet"
-        more = "; nothing tells how long no force must act to count as flight: give `wait`" if self._undecided else ""
+        more = (
+            "; nothing tells how long no force must act to count as flight: give `wait`"
+            if self._undecided
+            else ""
+        )
         return self._event("state", told + more)
 
     def _read(self, names: Sequence[str], *, replaced: bool) -> Iterator[Event]:
@@ -217,18 +280,28 @@ class Watch:
         states, follows = self._looks.new_states(names)
         if states is None or not states.time.size:
             return
-        if not states.momenta and (states.balance is None or states.balance.sliding is None):
+        if not states.momenta and (
+            states.balance is None or states.balance.sliding is None
+        ):
             raise RangeError(f"{', '.join(names)}: {_WRITTEN}")
         if not follows:
             self._begin_again()
         self._evidence.take(states)
         self._motion.take(states, self._evidence)
         history, motion = self._evidence.history, self._motion
-        events, told, now = events_of(self._evidence, motion, self._decided), self._told, float(history.time[-1])
+        events, told, now = (
+            events_of(self._evidence, motion, self._decided),
+            self._told,
+            float(history.time[-1]),
+        )
         if self._now == float("-inf"):
-            yield Event("begun", float(history.time[0]), now, f"the run has come to {now:.6g}")
+            yield Event(
+                "begun", float(history.time[0]), now, f"the run has come to {now:.6g}"
+            )
         elif replaced or now < self._now:
-            told = tuple(one for one, other in zip(told, events, strict=False) if one == other)
+            told = tuple(
+                one for one, other in zip(told, events, strict=False) if one == other
+            )
             yield from self._restarted(told, now)
         self._now, self._told = now, events
         self._undecided = self._wait is None and motion.longest(now) is None
@@ -238,14 +311,30 @@ class Watch:
         """Tell that the run has ended, once, where the listing beside its last file says so."""
         self.ended = _PACKED if name.endswith(".gz") else ending(name)
         if self.ended:
-            yield self._event("failed" if self.ended == WITH_AN_ERROR else "ended", f"the run has ended {self.ended}")
+            yield self._event(
+                "failed" if self.ended == WITH_AN_ERROR else "ended",
+                f"the run has ended {self.ended}",
+            )
 
     def _restarted(self, kept: Sequence[Event], now: float) -> Iterator[Event]:
         """Tell that a run went back to before what was seen of it, and when that had a contact."""
-        yield Event("restart", now, now, f"the run was restarted: it was at {self._now:.6g}, and is at {now:.6g}")
-        contact = next((one.time for one in self._told[len(kept) :] if one.event == "contact"), None)
+        yield Event(
+            "restart",
+            now,
+            now,
+            f"the run was restarted: it was at {self._now:.6g}, and is at {now:.6g}",
+        )
+        contact = next(
+            (one.time for one in self._told[len(kept) :] if one.event == "contact"),
+            None,
+        )
         if contact is not None and contact > now:
-            yield Event("expected", contact, now, "a contact is expected there: before the restart it came there")
+            yield Event(
+                "expected",
+                contact,
+                now,
+                "a contact is expected there: before the restart it came there",
+            )
 
     def _event(self, event: str, message: str) -> Event:
         now = None if self._now == float("-inf") else self._now
@@ -253,7 +342,11 @@ class Watch:
 
     def _age(self) -> float:
         """How long ago the files were written to last [s]."""
-        return max(0.0, time.time() - max((found.st_mtime for _, found in self._files), default=time.time()))
+        return max(
+            0.0,
+            time.time()
+            - max((found.st_mtime for _, found in self._files), default=time.time()),
+        )
 
 
 def follow(
@@ -267,7 +360,9 @@ def follow(
         begun = time.process_time()
         yield from watch.news()
         pause = max(_SHORTEST, (time.process_time() - begun) / _SHARE)
-        pause = min(pause, _LONGEST) if watch.reads_what_is_new else pause  # the first look costs more than others
+        pause = (
+            min(pause, _LONGEST) if watch.reads_what_is_new else pause
+        )  # the first look costs more than others
         left = end - time.monotonic()
         if left <= 0 or (watch.ended and lasting is None):
             yield watch.state()
@@ -294,7 +389,12 @@ def _stamp(name: str, found: os.stat_result) -> tuple[str, int, int, int]:
     return name, found.st_ino, found.st_size, found.st_mtime_ns
 
 
-def _replaced(before: Sequence[tuple[str, os.stat_result]], now: Sequence[tuple[str, os.stat_result]]) -> bool:
+def _replaced(
+    before: Sequence[tuple[str, os.stat_result]],
+    now: Sequence[tuple[str, os.stat_result]],
+) -> bool:
     """Whether a file was written anew, or is gone."""
     there = dict(now)
-    return any(name not in there or there[name].st_size < one.st_size for name, one in before)
+    return any(
+        name not in there or there[name].st_size < one.st_size for name, one in before
+    )

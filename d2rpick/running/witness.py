@@ -66,7 +66,11 @@ class _Fall(FreeFall):
             return super()._fitted(first, last)
         states = np.linspace(first, last, _HELD).round().astype(np.intp)
         thinned = FreeFall.__new__(FreeFall)
-        thinned.time, thinned.momentum, thinned._both = self.time[states], self.momentum[states], self._both[states]
+        thinned.time, thinned.momentum, thinned._both = (
+            self.time[states],
+            self.momentum[states],
+            self._both[states],
+        )
         return thinned._fitted(0, _HELD - 1)
 
 
@@ -77,12 +81,20 @@ class Witness:
     place of its first state among those of the record.
     """
 
-    def __init__(self, members: tuple[int, ...], parts: tuple[Part, ...] | None, origin: int) -> None:
+    def __init__(
+        self, members: tuple[int, ...], parts: tuple[Part, ...] | None, origin: int
+    ) -> None:
         self.members, self.parts, self.origin = members, parts, origin
-        self.free: list[int] = []  # by state: the first of those from which on no force shows up to it
+        self.free: list[
+            int
+        ] = []  # by state: the first of those from which on no force shows up to it
         self.flights: list[Quiet] = []
-        self.tells = np.empty(0, np.bool_)  # whether digits let a momentum, or contact energy, show a force
-        self._columns = {name: Column() for name in ("time", "momentum", "contact", "alone")}
+        self.tells = np.empty(
+            0, np.bool_
+        )  # whether digits let a momentum, or contact energy, show a force
+        self._columns = {
+            name: Column() for name in ("time", "momentum", "contact", "alone")
+        }
         self._looked = self._again = 0
 
     @property
@@ -99,14 +111,24 @@ class Witness:
     def follow(self, of_momentum: Precision, of_contact: Precision) -> None:
         """Ask of each new state since when nothing has acted, with the precisions of what is written."""
         self._laws: list[tuple[Law, Samples]] = []
-        contact, momentum = self._columns["contact"].rows, self._columns["momentum"].rows
+        contact, momentum = (
+            self._columns["contact"].rows,
+            self._columns["momentum"].rows,
+        )
         if contact.size == self.time.size:
             room, self.tells = _room(np.abs(contact), of_contact)
             # two bodies that hit each other keep their momentum; what is not among the members may do as it likes
             alone = self._columns["alone"].rows
-            self._laws.append((Constant(self.time, contact[:, np.newaxis]), np.where(alone, room, np.inf)))
+            self._laws.append(
+                (
+                    Constant(self.time, contact[:, np.newaxis]),
+                    np.where(alone, room, np.inf),
+                )
+            )
         if self.members:
-            room, self.tells = _room(np.abs(momentum).max(axis=1), of_momentum, len(self.members))
+            room, self.tells = _room(
+                np.abs(momentum).max(axis=1), of_momentum, len(self.members)
+            )
             self._laws.append((_Fall(self.time, momentum), room))
         first = self.free[-1] if self.free else 0
         for state in range(len(self.free), self.time.size):
@@ -115,11 +137,15 @@ class Witness:
 
     def left(self, first: int, last: int) -> float:
         """What is left between two states, as a share of what may be."""
-        return max(law.misfit(first, last) / float(room[last]) for law, room in self._laws)
+        return max(
+            law.misfit(first, last) / float(room[last]) for law, room in self._laws
+        )
 
     def last_without(self, first: int) -> int:
         """Last state up to which, from ``first`` on, no force shows."""
-        return farthest(first, self.time.size - 1, lambda last: self.left(first, last) <= 1)
+        return farthest(
+            first, self.time.size - 1, lambda last: self.left(first, last) <= 1
+        )
 
     def _first_without(self, last: int, first: int) -> int:
         """First state from ``first`` on from which no force shows up to ``last``: near by, then farther and farther."""
@@ -137,7 +163,9 @@ class Witness:
                 acts = middle
         return good
 
-    def look(self, needed: Needed, flies: Callable[[Witness, int, int], float | None]) -> None:
+    def look(
+        self, needed: Needed, flies: Callable[[Witness, int, int], float | None]
+    ) -> None:
         """Find what flights began and ended in the states that are new.
 
         ``flies`` gives the gravity between two states, None where what acts there is no gravity or something holds.
@@ -150,7 +178,11 @@ class Witness:
                 if now - start < max(last.wait, now - last.start) / 2:
                     self.flights[-1] = last._replace(end=now)
                     self._again = state
-            elif first + FEWEST <= state + 1 and self._again <= state and self.tells[state]:
+            elif (
+                first + FEWEST <= state + 1
+                and self._again <= state
+                and self.tells[state]
+            ):
                 wait = needed(start, now)
                 if wait is not None and now - start >= wait:
                     self._see(first, state, wait, flies(self, first, state))
@@ -164,7 +196,9 @@ class Witness:
         source = "momentum" if self.members else "contact-energy"
         level = self._level(first, state) if gravity else None
         left = CONSTANT * self.left(first, state)
-        self.flights.append(Quiet(start, now, None, wait, source, left, gravity, self.parts, level))
+        self.flights.append(
+            Quiet(start, now, None, wait, source, left, gravity, self.parts, level)
+        )
 
     def _level(self, first: int, last: int) -> float | None:
         """When the centre of mass is as high again as at the first of two states [time]; None where it was before."""
@@ -174,7 +208,9 @@ class Witness:
         return float(self.time[first]) + risen if risen > lasted else None
 
 
-def _room(sizes: Samples, precision: Precision, number: int = 1) -> tuple[Samples, NDArray[np.bool_]]:
+def _room(
+    sizes: Samples, precision: Precision, number: int = 1
+) -> tuple[Samples, NDArray[np.bool_]]:
     """What may be left at each state of a sum of so many values of some ``sizes`` (n,), and whether that tells any."""
     largest = np.maximum.accumulate(sizes)
     noise = number * precision.quanta(largest) / 2

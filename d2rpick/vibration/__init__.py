@@ -47,7 +47,9 @@ def _parts(history: History, within: Span, _: Together) -> SignedModel | None:
     from d2rpick.histories.samples import window
     from d2rpick.vibration.part_signs import SignedParts
 
-    return SignedParts(time, history.part_energies[window(history.time, *within)], history.part_names)
+    return SignedParts(
+        time, history.part_energies[window(history.time, *within)], history.part_names
+    )
 
 
 def _modal(history: History, within: Span, together: Together) -> SignedModel | None:
@@ -57,7 +59,9 @@ def _modal(history: History, within: Span, together: Together) -> SignedModel | 
     from d2rpick.vibration.modal import confirm, identify_modal
 
     internal, kinetic = identify_modal(*history.between(*within)), together.kinetic
-    return confirm(internal, identify_modal(*kinetic, kinetic=True) if kinetic else None)
+    return confirm(
+        internal, identify_modal(*kinetic, kinetic=True) if kinetic else None
+    )
 
 
 def _swings(history: History, within: Span, _: Together) -> SignedModel | None:
@@ -100,7 +104,11 @@ def find_models(
             within = flight
         if basis == "swings" and settled is not None:
             within = settled
-        if find and (model := memory.once((basis, *within), partial(find, history, within, together))):
+        if find and (
+            model := memory.once(
+                (basis, *within), partial(find, history, within, together)
+            )
+        ):
             found[basis] = model
             if model.signed and not _is_vague(model):
                 break

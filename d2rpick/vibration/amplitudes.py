@@ -23,7 +23,9 @@ class SignedAmplitudes:
 
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
         """Sum over q(tr) q(td), of the shape of ``tr``; ``td`` is one for all, or one for each [energy]."""
-        return np.asarray(np.einsum("k...,k...->...", self.amplitudes(td), self.amplitudes(tr)))
+        return np.asarray(
+            np.einsum("k...,k...->...", self.amplitudes(td), self.amplitudes(tr))
+        )
 
     def separation(self, tr: Samples | float, td: Samples | float) -> Samples:
         """Sum over the squares of q(tr) - q(td), of the shape of ``tr`` [energy]."""

@@ -33,19 +33,29 @@ if TYPE_CHECKING:
 VIBRATION, WITH_PLASTIC, WITH_PRELOAD = 4, 5, 6  # free parameters of the three models
 
 # Of the matrix pencil:
-_ORDERS: Final = (3, 4, 6)  # exponentials in q**2: of a vibration, with plastic work, and with a preload
+_ORDERS: Final = (
+    3,
+    4,
+    6,
+)  # exponentials in q**2: of a vibration, with plastic work, and with a preload
 _LAGS: Final = 64  # a third of the fewest cells, its optimum against noise
 _MIN_CELLS: Final = 192
 _MAX_CELLS: Final = 8192  # bounds memory at 5 MB; enough for 1000 periods of the energy
-_CELLS_PER_PERIOD: Final = 24  # of the strongest vibration in E, which a preload makes the slower of two
+_CELLS_PER_PERIOD: Final = (
+    24  # of the strongest vibration in E, which a preload makes the slower of two
+)
 
 # Of the least squares:
 COARSE: Final = 400  # samples on which starts are compared and first refined
 _MEDIUM: Final = 2048  # samples on which a fit is refused before it is refined on more
 _NEAR: Final = 1e-6  # of the sum of squares still to be gained where a fit is refused: nothing beside the structure
 MAX_MISFIT: Final = 0.4  # beyond, more than 16 % of the variance is unexplained and can hide another mode
-_FAR_TOO_MUCH: Final = 1.2  # times that: the variance of two thousand samples is known to a thirtieth
-STARTS: Final = 3  # refined at most: with noise the first in rank may not be the one that ends best
+_FAR_TOO_MUCH: Final = (
+    1.2  # times that: the variance of two thousand samples is known to a thirtieth
+)
+STARTS: Final = (
+    3  # refined at most: with noise the first in rank may not be the one that ends best
+)
 CERTAIN: Final = 0.01  # of the variance unexplained: no second start need be tried
 _MAX_STEPS: Final = 40
 _USUAL: Final = 10  # a good start needs 4 to 8
@@ -53,16 +63,25 @@ _USUAL: Final = 10  # a good start needs 4 to 8
 _DRIFT: Final = 0.02 * 2 * np.pi
 
 
-def fit_few(poles: NDArray[np.complex128], s: Samples, e: Samples, size: int, worst: float) -> Samples | None:
+def fit_few(
+    poles: NDArray[np.complex128], s: Samples, e: Samples, size: int, worst: float
+) -> Samples | None:
     """Return the least-squares parameters for a few of the samples, the first ``size`` of them free, the others zero.
 
     None where the fit leaves more than ``worst`` of their variance.
     """
     few = _few(s, e)
-    return refine(_starts(poles, *few, size=size), partial(energy_and_jacobian, size=size), *few, worst)
+    return refine(
+        _starts(poles, *few, size=size),
+        partial(energy_and_jacobian, size=size),
+        *few,
+        worst,
+    )
 
 
-def fit(few: Samples | None, s: Samples, e: Samples, size: int, worst: float = np.inf) -> Samples | None:
+def fit(
+    few: Samples | None, s: Samples, e: Samples, size: int, worst: float = np.inf
+) -> Samples | None:
     """Return the parameters for all samples from those of `fit_few`; None without, and as for `fit_all`."""
     best = fit_all(few, partial(energy_and_jacobian, size=size), s, e, worst, slice(1))
     if best is None:
@@ -74,7 +93,14 @@ def fit(few: Samples | None, s: Samples, e: Samples, size: int, worst: float = n
     return best
 
 
-def fit_all(best: Samples | None, model: Model, s: Samples, e: Samples, worst: float, rates: slice) -> Samples | None:
+def fit_all(
+    best: Samples | None,
+    model: Model,
+    s: Samples,
+    e: Samples,
+    worst: float,
+    rates: slice,
+) -> Samples | None:
     """Return the best fit to all samples from the ``best`` one to a few of them; ``rates`` are where it has those.
 
     None without that, or where ``worst`` is finite and these or some more of the samples are left with a structure that
@@ -109,7 +135,9 @@ def _few(s: Samples, e: Samples, most: int = COARSE) -> tuple[Samples, Samples]:
     return s[::stride], e[::stride]
 
 
-def refine(starts: Sequence[Samples], model: Model, s: Samples, e: Samples, worst: float) -> Samples | None:
+def refine(
+    starts: Sequence[Samples], model: Model, s: Samples, e: Samples, worst: float
+) -> Samples | None:
     """Return the best end of the starts; None without one that leaves no more than ``worst`` of the variance."""
     variance = float(np.sum((e - np.mean(e)) ** 2))
     best, least = None, worst * variance
@@ -145,10 +173,16 @@ class Pencil(NamedTuple):
         running = integral(s, e)
         fine = cell_means(s, running, min(s.size - 1, _MAX_CELLS))
         power = np.abs(np.fft.rfft(fine - np.mean(fine))) ** 2
-        periods = int(np.argmax(power * np.arange(power.size)))  # per octave: decay alone must not win
-        count = min(max(_CELLS_PER_PERIOD * periods, _MIN_CELLS), s.size - 1, _MAX_CELLS)
+        periods = int(
+            np.argmax(power * np.arange(power.size))
+        )  # per octave: decay alone must not win
+        count = min(
+            max(_CELLS_PER_PERIOD * periods, _MIN_CELLS), s.size - 1, _MAX_CELLS
+        )
         cells = cell_means(s, running, count)
-        hankel = np.lib.stride_tricks.sliding_window_view(cells, min(_LAGS, count // 2) + 1)
+        hankel = np.lib.stride_tricks.sliding_window_view(
+            cells, min(_LAGS, count // 2) + 1
+        )
         return cls(np.linalg.eigh(hankel.T @ hankel)[1][:, ::-1], count)
 
     def rates(self, orders: tuple[int, ...] = _ORDERS) -> NDArray[np.complex128]:
@@ -171,10 +205,14 @@ def factors_of(vectors: Samples) -> NDArray[np.complex128]:
 
 def cell_means(s: Samples, running: Samples, count: int) -> Samples:
     """Means over equal cells of [0, 1] of what has this ``running`` integral over s."""
-    return np.asarray(np.diff(np.interp(np.linspace(0, 1, count + 1), s, running)) * count)
+    return np.asarray(
+        np.diff(np.interp(np.linspace(0, 1, count + 1), s, running)) * count
+    )
 
 
-def _starts(poles: NDArray[np.complex128], s: Samples, e: Samples, *, size: int) -> list[Samples]:
+def _starts(
+    poles: NDArray[np.complex128], s: Samples, e: Samples, *, size: int
+) -> list[Samples]:
     """Return the best parameter vectors to start from, for a model with ``size`` free parameters.
 
     A rate p is that of q**2 (alpha = -Re p, omega = Im p / 2) or, with a preload, that of q (alpha = -2 Re p,
@@ -183,16 +221,32 @@ def _starts(poles: NDArray[np.complex128], s: Samples, e: Samples, *, size: int)
     """
     omega, alpha = poles.imag / 2, -poles.real
     if size == WITH_PRELOAD:
-        omega, alpha = np.concatenate((omega, 2 * omega)), np.concatenate((alpha, 2 * alpha))
-    alpha = np.maximum(alpha, -1.0)  # growth is refused anyway; keep exp from overflowing
+        omega, alpha = (
+            np.concatenate((omega, 2 * omega)),
+            np.concatenate((alpha, 2 * alpha)),
+        )
+    alpha = np.maximum(
+        alpha, -1.0
+    )  # growth is refused anyway; keep exp from overflowing
     vibration = np.exp(s * (1j * omega - alpha / 2)[:, None])
     square = vibration * vibration
-    rows = [np.abs(square), square.real, square.imag, np.ones(square.shape), vibration.real, vibration.imag]
-    basis = np.stack(rows[: {VIBRATION: 3, WITH_PLASTIC: 4, WITH_PRELOAD: 6}[size]], axis=1)
+    rows = [
+        np.abs(square),
+        square.real,
+        square.imag,
+        np.ones(square.shape),
+        vibration.real,
+        vibration.imag,
+    ]
+    basis = np.stack(
+        rows[: {VIBRATION: 3, WITH_PLASTIC: 4, WITH_PRELOAD: 6}[size]], axis=1
+    )
     norm = np.linalg.norm(basis, axis=2)
     normal = basis @ basis.transpose(0, 2, 1) / (norm[:, :, None] * norm[:, None, :])
     right = (basis @ e / norm)[..., None]
-    linear = np.linalg.solve(normal + 1e-10 * np.eye(norm.shape[1]), right)[..., 0] / norm
+    linear = (
+        np.linalg.solve(normal + 1e-10 * np.eye(norm.shape[1]), right)[..., 0] / norm
+    )
     misfit = np.sum((e - (linear[:, None] @ basis)[:, 0]) ** 2, axis=1)
     linear = np.pad(linear, ((0, 0), (0, 6 - linear.shape[1])))
     phasor = np.sqrt(2 * (linear[:, 1] + 1j * linear[:, 2]))  # (cosine + i sine)**2 / 2
@@ -203,7 +257,10 @@ def _starts(poles: NDArray[np.complex128], s: Samples, e: Samples, *, size: int)
     best: list[Samples] = []
     for start in table[np.argsort(misfit)]:
         # within half a radian over the record two starts lie in the same valley
-        if all(abs(start[0] - other[0]) > 0.5 or abs(start[1] - other[1]) > 0.5 for other in best):
+        if all(
+            abs(start[0] - other[0]) > 0.5 or abs(start[1] - other[1]) > 0.5
+            for other in best
+        ):
             best.append(start)
     return best[:STARTS]
 
@@ -243,19 +300,27 @@ def minimise(
                 break
         else:
             damping *= 10
-        if expected <= near * cost + 1e-31 * e.size or (left == _MAX_STEPS - _USUAL and doomed(parameters)):
+        if expected <= near * cost + 1e-31 * e.size or (
+            left == _MAX_STEPS - _USUAL and doomed(parameters)
+        ):
             break
     return parameters, cost
 
 
-def _normal_equations(parameters: Samples, model: Model, s: Samples, e: Samples) -> tuple[float, Samples, Samples]:
+def _normal_equations(
+    parameters: Samples, model: Model, s: Samples, e: Samples
+) -> tuple[float, Samples, Samples]:
     """Sum of squares of the rest, J J^T and J rest, block by block."""
     cost, normal, gradient = 0.0, np.zeros(()), np.zeros(())
     for first in range(0, s.size, BLOCK):
         block = slice(first, first + BLOCK)
         energy, jacobian = model(parameters, s[block])
         rest = e[block] - energy
-        cost, normal, gradient = cost + float(rest @ rest), normal + jacobian @ jacobian.T, gradient + jacobian @ rest
+        cost, normal, gradient = (
+            cost + float(rest @ rest),
+            normal + jacobian @ jacobian.T,
+            gradient + jacobian @ rest,
+        )
     return cost, normal, gradient
 
 
@@ -282,7 +347,9 @@ def covariance(normal: Samples, rest: Samples) -> Samples:
     return np.asarray(variance * np.linalg.pinv(normal / scale, hermitian=True) / scale)
 
 
-MAX_STRUCTURE: Final = 0.02  # of std(E): thirty times what one real solver leaves with one mode
+MAX_STRUCTURE: Final = (
+    0.02  # of std(E): thirty times what one real solver leaves with one mode
+)
 
 # Of the covariance of white noise's neighbours: what exceeds three standard deviations is taken for structure; six
 # are beyond all doubt.
@@ -299,7 +366,9 @@ def structure_of(rest: Samples, deviations: float = _DEVIATIONS) -> float:
     """
 
     def excess(products: Samples) -> float:
-        return abs(float(np.sum(products))) - deviations * float(np.linalg.norm(products))
+        return abs(float(np.sum(products))) - deviations * float(
+            np.linalg.norm(products)
+        )
 
     most = max(0.0, *(excess(rest[:-lag] * rest[lag:]) for lag in (1, 2)))
     return float(np.sqrt(most / rest.size))
@@ -310,4 +379,6 @@ def surely_structured(rest: Samples, spread: float) -> bool:
 
     ``spread`` is the standard deviation of the energy there.
     """
-    return structure_of(rest, _BEYOND_DOUBT) > _BEYOND_STRUCTURE * MAX_STRUCTURE * spread
+    return (
+        structure_of(rest, _BEYOND_DOUBT) > _BEYOND_STRUCTURE * MAX_STRUCTURE * spread
+    )

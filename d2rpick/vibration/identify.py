@@ -20,20 +20,34 @@ if TYPE_CHECKING:
 
 # Thresholds of acceptance.  White noise may be large; what a true model must not leave over is structure, the
 # part of the misfit that neighbouring samples share.
-HOPELESS: Final = 0.5**2  # of the variance, unexplained on 400 samples: six standard deviations beyond MAX_MISFIT
-MAX_LOCAL_STRUCTURE: Final = 0.1  # of the fit's energy at that time: a second mode that outlives the first
+HOPELESS: Final = (
+    0.5**2
+)  # of the variance, unexplained on 400 samples: six standard deviations beyond MAX_MISFIT
+MAX_LOCAL_STRUCTURE: Final = (
+    0.1  # of the fit's energy at that time: a second mode that outlives the first
+)
 MIN_SAMPLES: Final = 24  # four for each parameter of the richest model
-MIN_SAMPLES_PER_PERIOD: Final = 10  # of the energy, pi / omega: below, an aliased fast mode passes for a slow one
+MIN_SAMPLES_PER_PERIOD: Final = (
+    10  # of the energy, pi / omega: below, an aliased fast mode passes for a slow one
+)
 MAX_GROWTH: Final = 0.3  # -alpha x record length: a free vibration only decays, noise hides no more than this
-MIN_PLASTIC: Final = -0.05  # of the energy range: plastic work is positive but for the scatter of its fit
-MAX_OF_SPRING: Final = 0.1  # misfit that a spring which stiffens leaves to a vibration through zero
+MIN_PLASTIC: Final = (
+    -0.05
+)  # of the energy range: plastic work is positive but for the scatter of its fit
+MAX_OF_SPRING: Final = (
+    0.1  # misfit that a spring which stiffens leaves to a vibration through zero
+)
 _OF_A_PRELOAD: Final = 0.03  # of the vibration energy: lifts a residual of 0.2, near the limit of a good one, to 0.4
 
 # The energy below which a rest is not held against a mode: a solver errs by 1e-5 of the maximum anywhere.
 _FLOOR: Final = 1e-4  # of the highest vibration energy
 
 # Free parameters of the models, simplest first, and the vibration periods it takes to tell them apart.
-_MODELS: Final = ((fitting.VIBRATION, 1.25), (fitting.WITH_PLASTIC, 1.5), (fitting.WITH_PRELOAD, 2.0))
+_MODELS: Final = (
+    (fitting.VIBRATION, 1.25),
+    (fitting.WITH_PLASTIC, 1.5),
+    (fitting.WITH_PRELOAD, 2.0),
+)
 
 
 class Identification(NamedTuple):
@@ -94,7 +108,9 @@ class Identification(NamedTuple):
         return np.sqrt(np.maximum(variance, 0.0))
 
 
-def identify(time: Samples, energy: Samples, *, quick: bool = False, memory: Memory | None = None) -> Identification:
+def identify(
+    time: Samples, energy: Samples, *, quick: bool = False, memory: Memory | None = None
+) -> Identification:
     """Fit one vibration to E(t), else one over plastic work, else one about a preload, and judge the fit.
 
     Parameters
@@ -133,17 +149,30 @@ def identify(time: Samples, energy: Samples, *, quick: bool = False, memory: Mem
     record = _Record.scaled(time, energy)
     poles = record.pencil(memory).rates()
     if poles.size == 0:
-        return _nothing(time, "the energy does not oscillate: nothing vibrates, or it is overdamped")
+        return _nothing(
+            time, "the energy does not oscillate: nothing vibrates, or it is overdamped"
+        )
     worst = HOPELESS if quick else np.inf
     few = cache(lambda size: fitting.fit_few(poles, record.s, record.e, size, worst))
-    if quick and few(fitting.WITH_PRELOAD) is None:  # others leave more than the richest model
+    if (
+        quick and few(fitting.WITH_PRELOAD) is None
+    ):  # others leave more than the richest model
         return _out_of_reach(time)
-    fits = ((fitting.fit(few(size), record.s, record.e, size, worst), size, periods) for size, periods in _MODELS)
-    attempts = ((_attempt(found, size, record), most) for found, size, most in fits if found is not None)
+    fits = (
+        (fitting.fit(few(size), record.s, record.e, size, worst), size, periods)
+        for size, periods in _MODELS
+    )
+    attempts = (
+        (_attempt(found, size, record), most)
+        for found, size, most in fits
+        if found is not None
+    )
     return _first_to_follow(attempts, record)
 
 
-def _first_to_follow(attempts: Iterable[tuple[_Attempt, float]], record: _Record) -> Identification:
+def _first_to_follow(
+    attempts: Iterable[tuple[_Attempt, float]], record: _Record
+) -> Identification:
     """Judge fits with the least periods for each, the simplest first; else give the refused one that is nearest.
 
     Where one follows the samples, a richer one would follow as well, and be no more plausible.
@@ -154,28 +183,52 @@ def _first_to_follow(attempts: Iterable[tuple[_Attempt, float]], record: _Record
         if found.follows:
             return _through_zero(found, [one for one in refused if one.plausible])
         refused.append(found)
-    return min(refused, key=lambda one: one.rms) if refused else _out_of_reach(np.array([record.start, record.end]))
+    return (
+        min(refused, key=lambda one: one.rms)
+        if refused
+        else _out_of_reach(np.array([record.start, record.end]))
+    )
 
 
-def _through_zero(found: Identification, simple: list[Identification]) -> Identification:
+def _through_zero(
+    found: Identification, simple: list[Identification]
+) -> Identification:
     """Give for a vibration that a preload keeps off zero the one of half its rate that passes zero, if it is near.
 
     The energy swings once in a period of the one, twice in that of the other: from one swing to the next their signs
     differ.  What tells them apart is then as small as what a spring that stiffens adds.  If it is a preload after all,
     residuals are twice as large, which counts like a hidden mode.
     """
-    mode, near = found.mode, [one for one in simple if one.misfit is not None and one.misfit < MAX_OF_SPRING]
-    if not near or mode is None or mode.preload**2 <= float(mode.vibration_energy(found.start)):
+    mode, near = (
+        found.mode,
+        [
+            one
+            for one in simple
+            if one.misfit is not None and one.misfit < MAX_OF_SPRING
+        ],
+    )
+    if (
+        not near
+        or mode is None
+        or mode.preload**2 <= float(mode.vibration_energy(found.start))
+    ):
         return found
     best = min(near, key=lambda one: one.rms)
-    return best._replace(describes_record=True, follows=True, reason=None, hidden_share=_OF_A_PRELOAD)
+    return best._replace(
+        describes_record=True, follows=True, reason=None, hidden_share=_OF_A_PRELOAD
+    )
 
 
 def _out_of_reach(time: Samples) -> Identification:
-    return _nothing(time, f"no vibration comes near the energy: a few samples miss it by more than {MAX_MISFIT}")
+    return _nothing(
+        time,
+        f"no vibration comes near the energy: a few samples miss it by more than {MAX_MISFIT}",
+    )
 
 
-def judge_given(mode: Mode, time: Samples, energy: Samples, *, quick: bool = False) -> Identification:
+def judge_given(
+    mode: Mode, time: Samples, energy: Samples, *, quick: bool = False
+) -> Identification:
     """Hold a mode that is known, not fitted, against a record: it must follow the samples as a fit must.
 
     Parameters and result as for ``identify``; the mode stays as it is and has no scatter.
@@ -183,16 +236,27 @@ def judge_given(mode: Mode, time: Samples, energy: Samples, *, quick: bool = Fal
     if lacking := _lacking(time, energy):
         return lacking
     few = slice(None, None, -(-time.size // fitting.COARSE))
-    if quick and np.var(energy[few] - mode.energy(time[few])) > HOPELESS * np.var(energy[few]):
+    if quick and np.var(energy[few] - mode.energy(time[few])) > HOPELESS * np.var(
+        energy[few]
+    ):
         return _out_of_reach(time)
     record = _Record.scaled(time, energy)
     start = record.start
     cosine = mode.deformation(start) - mode.preload
     sine = (mode.velocity(start) + mode.alpha / 2 * cosine) / mode.omega
-    parameters = np.array([mode.omega, mode.alpha, cosine, sine, mode.energy_plastic, mode.preload])
-    held = _judged(_attempt(parameters / record.units, fitting.WITH_PRELOAD, record), 0.0, record)
+    parameters = np.array(
+        [mode.omega, mode.alpha, cosine, sine, mode.energy_plastic, mode.preload]
+    )
+    held = _judged(
+        _attempt(parameters / record.units, fitting.WITH_PRELOAD, record), 0.0, record
+    )
     reason = None if held.follows else held.reason
-    return held._replace(mode=mode, describes_record=held.follows, reason=reason, covariance=np.zeros((6, 6)))
+    return held._replace(
+        mode=mode,
+        describes_record=held.follows,
+        reason=reason,
+        covariance=np.zeros((6, 6)),
+    )
 
 
 class _Record(NamedTuple):
@@ -211,7 +275,9 @@ class _Record(NamedTuple):
 
     def pencil(self, memory: Memory | None) -> fitting.Pencil:
         """What exponentials E may consist of, found once for all fits that share a memory."""
-        return (memory or Memory()).once(("pencil", self.start, self.end), lambda: fitting.Pencil.of(self.s, self.e))
+        return (memory or Memory()).once(
+            ("pencil", self.start, self.end), lambda: fitting.Pencil.of(self.s, self.e)
+        )
 
     @property
     def units(self) -> Samples:
@@ -224,9 +290,15 @@ def _lacking(time: Samples, energy: Samples) -> Identification | None:
     """Refuse a record that lacks what any judgement needs."""
     if time.size < MIN_SAMPLES:
         found = "1 state" if time.size == 1 else f"{time.size} states"
-        return _nothing(time, f"there are only {found} to fit, at least {MIN_SAMPLES} are needed")
-    if float(np.ptp(energy)) <= 1e-12 * float(np.max(np.abs(energy))):  # the rounding of a constant
-        return _nothing(time, f"the energy is constant, {energy[0]:g}: nothing vibrates")
+        return _nothing(
+            time, f"there are only {found} to fit, at least {MIN_SAMPLES} are needed"
+        )
+    if float(np.ptp(energy)) <= 1e-12 * float(
+        np.max(np.abs(energy))
+    ):  # the rounding of a constant
+        return _nothing(
+            time, f"the energy is constant, {energy[0]:g}: nothing vibrates"
+        )
     return None
 
 
@@ -242,24 +314,37 @@ class _Attempt(NamedTuple):
 
 def _attempt(parameters: Samples, size: int, record: _Record) -> _Attempt:
     """Give the fit of one mode with its first ``size`` parameters free."""
-    fitted, normal = fitting.evaluated(parameters, partial(energy_and_jacobian, size=size), record.s)
-    scaled, mode = _mode(parameters, 0.0), _mode(parameters * record.units, record.start)
+    fitted, normal = fitting.evaluated(
+        parameters, partial(energy_and_jacobian, size=size), record.s
+    )
+    scaled, mode = (
+        _mode(parameters, 0.0),
+        _mode(parameters * record.units, record.start),
+    )
     return _Attempt(scaled, mode, fitted, normal, record.units[:size])
 
 
 def _judged(attempt: _Attempt, least_periods: float, record: _Record) -> Identification:
     """Return a fit with its verdict."""
     s, e = record.s, record.e
-    density = samples_per_period(s, attempt.scaled)  # first: it takes as much memory as all that follows
+    density = samples_per_period(
+        s, attempt.scaled
+    )  # first: it takes as much memory as all that follows
     rest = e - attempt.energy
-    rms, spread, structure = float(np.sqrt(np.mean(rest**2))), float(np.std(e)), fitting.structure_of(rest)
+    rms, spread, structure = (
+        float(np.sqrt(np.mean(rest**2))),
+        float(np.std(e)),
+        fitting.structure_of(rest),
+    )
     local = attempt.scaled.vibration_energy(s)
     vibration = float(np.hypot.reduce(local) / np.sqrt(s.size))  # squares may overflow
     # where noise exceeds the vibration, a rest says nothing about a further mode
     np.maximum(local, max(rms, _FLOOR * np.max(local)), out=local)
     local_structure = fitting.structure_of(np.divide(rest, local, out=local))
     loose = _loose(rms / spread, structure / spread, local_structure)
-    wrong = _implausible(attempt.scaled, density, least_periods, record.end - record.start)
+    wrong = _implausible(
+        attempt.scaled, density, least_periods, record.end - record.start
+    )
     reason = loose or wrong
     return Identification(
         mode=attempt.mode,
@@ -270,7 +355,9 @@ def _judged(attempt: _Attempt, least_periods: float, record: _Record) -> Identif
         structure=structure * record.scale,
         start=record.start,
         end=record.end,
-        covariance=fitting.covariance(attempt.normal, rest) * attempt.units * attempt.units[:, None],
+        covariance=fitting.covariance(attempt.normal, rest)
+        * attempt.units
+        * attempt.units[:, None],
         vibration=vibration * record.scale,
         follows=loose is None,
         plausible=wrong is None,
@@ -301,7 +388,9 @@ def samples_per_period(time: Samples, mode: Mode) -> float:
     return float(f"{np.pi / mode.omega / interval:.4g}")
 
 
-def _implausible(mode: Mode, density: float, least_periods: float, span: float) -> str | None:
+def _implausible(
+    mode: Mode, density: float, least_periods: float, span: float
+) -> str | None:
     """Say why a scaled fit that follows the samples is still no evidence of one free vibration."""
     periods = mode.omega / (2 * np.pi)
     if periods < least_periods:
@@ -329,4 +418,6 @@ def _mode(parameters: Samples, origin: float) -> Mode:
 def _nothing(time: Samples, reason: str) -> Identification:
     """Refuse a record to which nothing was fitted."""
     start, end = (float(time[0]), float(time[-1])) if time.size else (np.nan, np.nan)
-    return Identification(None, False, reason, None, np.nan, np.nan, start, end, np.zeros((0, 0)))
+    return Identification(
+        None, False, reason, None, np.nan, np.nan, start, end, np.zeros((0, 0))
+    )

@@ -104,12 +104,23 @@ def even_grid(time: Samples, energy: Samples) -> Grid:
     # white noise holds as much at the highest rates as anywhere
     noise = _ABOVE_NOISE * float(median(power[power.size // 2 :]))
     running = np.cumsum(np.maximum(power - noise, 0.0))
-    fastest, strongest = np.searchsorted(running, np.array([_ALL_POWER, _STRONG_POWER]) * running[-1]).tolist()
+    fastest, strongest = np.searchsorted(
+        running, np.array([_ALL_POWER, _STRONG_POWER]) * running[-1]
+    ).tolist()
     wanted = np.clip(_STATES_PER_PERIOD * fastest, _FEWEST_STATES, _MOST_STATES)
     size = max(1, int(time.size // wanted))
     count = time.size // size
-    middles, means = (column[: count * size].reshape(count, size).mean(axis=1) for column in (even, values))
-    return Grid(middles, means, spacing=float(even[1] - even[0]), size=size, strong=count / max(strongest, 1))
+    middles, means = (
+        column[: count * size].reshape(count, size).mean(axis=1)
+        for column in (even, values)
+    )
+    return Grid(
+        middles,
+        means,
+        spacing=float(even[1] - even[0]),
+        size=size,
+        strong=count / max(strongest, 1),
+    )
 
 
 class Exponentials(NamedTuple):
@@ -131,7 +142,9 @@ class Exponentials(NamedTuple):
 
     def waves(self, t: Samples | float) -> Complex:
         """Each wave without its weight, of the shape of ``t`` with an axis for waves behind it [-]."""
-        return np.exp(np.multiply.outer(np.asarray(t, dtype=np.float64) - self.origin, self.poles))
+        return np.exp(
+            np.multiply.outer(np.asarray(t, dtype=np.float64) - self.origin, self.poles)
+        )
 
     def some(self, which: NDArray[np.bool_]) -> Exponentials:
         """Give the waves where a mask holds."""
@@ -157,7 +170,11 @@ class Spectrum(NamedTuple):
         """
         damping = -self.lines.poles.real / np.abs(self.lines.poles)
         turn = (np.sqrt(1 - damping**2) + 1j * damping) ** 2
-        return Spectrum(self.lines._replace(weights=-self.lines.weights / turn), self.mean, -self.rest)
+        return Spectrum(
+            self.lines._replace(weights=-self.lines.weights / turn),
+            self.mean,
+            -self.rest,
+        )
 
     def at(self, t: Samples | float) -> Samples:
         """Energy at each time, of the shape of ``t`` [energy]."""
@@ -187,7 +204,9 @@ def predict(grid: Grid) -> Prediction | None:
     reach = grid.time - grid.time[0]
     if grid.time.size < _FEWEST_STATES // 2:
         return None
-    swing = float(np.std(grid.energy - np.polyval(np.polyfit(reach, grid.energy, 2), reach)))
+    swing = float(
+        np.std(grid.energy - np.polyval(np.polyfit(reach, grid.energy, 2), reach))
+    )
     if not swing > 0:
         return None
     first = grid.first(int(FIRST_PART * grid.time.size))
@@ -232,7 +251,9 @@ class _SignalSpace:
     def poles(self, order: int) -> Complex:
         """Poles of so many exponentials [1/time]: shifting a window by a state multiplies each by exp(p step)."""
         leading = self.vectors[:, :order]
-        factors = np.linalg.eigvals(np.linalg.lstsq(leading[:-1], leading[1:], rcond=None)[0])
+        factors = np.linalg.eigvals(
+            np.linalg.lstsq(leading[:-1], leading[1:], rcond=None)[0]
+        )
         kept = np.isfinite(factors) & (np.abs(factors) > 1e-6)
         return np.asarray(np.log(factors[kept].astype(np.complex128)) / self.step)
 
@@ -241,7 +262,9 @@ def fit_spectrum(grid: Grid, poles: Complex, span: float) -> Spectrum:
     """Fit lines and mean with these poles to a grid; poles are told apart by what they do within ``span`` [time]."""
     lines, mean = _split(poles, span)
     every = np.concatenate([lines, mean])
-    waves = np.exp(np.multiply.outer(grid.time - grid.time[0], every)) * grid.gain(every)
+    waves = np.exp(np.multiply.outer(grid.time - grid.time[0], every)) * grid.gain(
+        every
+    )
     swinging = every.imag > 0
     design = np.hstack([waves.real, -waves.imag[:, swinging]])
     found = np.linalg.lstsq(design, grid.energy, rcond=1e-9)[0]
@@ -249,13 +272,19 @@ def fit_spectrum(grid: Grid, poles: Complex, span: float) -> Spectrum:
     weights[swinging] += 1j * found[every.size :]
     origin, count = float(grid.time[0]), lines.size
     rest = grid.energy - design @ found
-    return Spectrum(Exponentials(lines, weights[:count], origin), Exponentials(mean, weights[count:], origin), rest)
+    return Spectrum(
+        Exponentials(lines, weights[:count], origin),
+        Exponentials(mean, weights[count:], origin),
+        rest,
+    )
 
 
 def _block_means(spectrum: Spectrum, time: Samples, grid: Grid) -> Samples:
     """Means of a spectrum over blocks with their middles at some times [energy]."""
     both = (spectrum.lines, spectrum.mean)
-    means = [(one.waves(time) @ (one.weights * grid.gain(one.poles))).real for one in both]
+    means = [
+        (one.waves(time) @ (one.weights * grid.gain(one.poles))).real for one in both
+    ]
     return np.asarray(means[0] + means[1])
 
 
@@ -270,7 +299,9 @@ def _split(poles: Complex, span: float) -> tuple[Complex, Complex]:
     every = np.round(np.concatenate([decay[is_line], decay[is_slow]]) * span, 1)
     decays = np.array(sorted({one for one in every.tolist() if abs(one) > _SAME_DECAY}))
     if decays.size > _MOST_DECAYS:
-        decays = decays[np.linspace(0, decays.size - 1, _MOST_DECAYS).round().astype(int)]
+        decays = decays[
+            np.linspace(0, decays.size - 1, _MOST_DECAYS).round().astype(int)
+        ]
     slow = rate[is_slow & (rate * span > 0.5)]
     mean = np.concatenate([[0.0], -decays / span, 1j * slow])
     return -decay[is_line] + 1j * rate[is_line], mean.astype(np.complex128)

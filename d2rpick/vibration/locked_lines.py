@@ -30,7 +30,9 @@ class Stretch(NamedTuple):
     energy: float
 
 
-def find_stretches(lines: Exponentials, span: float, scatter: float) -> tuple[Stretch, ...]:
+def find_stretches(
+    lines: Exponentials, span: float, scatter: float
+) -> tuple[Stretch, ...]:
     """Find the lines of modes that vibrate about a stretch, as in a body that spins.
 
     A mode q about q0 has the energy q0^2 + 2 q0 q + q^2: a further line at half the rate and phase of its own.  In free
@@ -45,13 +47,20 @@ def find_stretches(lines: Exponentials, span: float, scatter: float) -> tuple[St
         if size[line] < max(NOTABLE * strongest, _ABOVE_SCATTER * scatter):
             continue
         for own in order:
-            if own == line or size[own] < max(_NOTABLE_PARTNER * strongest, _ABOVE_SCATTER * scatter):
+            if own == line or size[own] < max(
+                _NOTABLE_PARTNER * strongest, _ABOVE_SCATTER * scatter
+            ):
                 continue
             if abs(rate[own] - 2 * rate[line]) * span > 2 * np.pi * _SAME_RATE:
                 continue
             unsure = 3 * min(scatter / size[own] + 2 * scatter / size[line], 0.1)
-            if abs(_wrap(phase[own] - 2 * phase[line], 2 * np.pi)) < _SAME_PHASE + unsure:
-                found.append(Stretch(line, own, float(size[line] ** 2 / (8 * size[own]))))
+            if (
+                abs(_wrap(phase[own] - 2 * phase[line], 2 * np.pi))
+                < _SAME_PHASE + unsure
+            ):
+                found.append(
+                    Stretch(line, own, float(size[line] ** 2 / (8 * size[own])))
+                )
                 break
     return tuple(found)
 
@@ -66,11 +75,19 @@ def measure_harmonics(lines: Exponentials, span: float, scatter: float) -> float
     if size.size < 3:
         return 0.0
     return max(
-        _measure_locked_to(int(first), size, rate, phase, span, scatter) for first in np.argsort(-size)[:_STRONGEST]
+        _measure_locked_to(int(first), size, rate, phase, span, scatter)
+        for first in np.argsort(-size)[:_STRONGEST]
     )
 
 
-def _measure_locked_to(first: int, size: Samples, rate: Samples, phase: Samples, span: float, scatter: float) -> float:
+def _measure_locked_to(
+    first: int,
+    size: Samples,
+    rate: Samples,
+    phase: Samples,
+    span: float,
+    scatter: float,
+) -> float:
     """Size of the harmonics of a line beyond its second, over it [-]; the row ends at the first that is not locked."""
     total = 0.0
     for times in _HARMONICS:
@@ -79,10 +96,15 @@ def _measure_locked_to(first: int, size: Samples, rate: Samples, phase: Samples,
         if line == first or apart or size[line] < _ABOVE_SCATTER * scatter:
             break
         # a spring that stiffens and one that softens have them with opposite signs
-        if abs(_wrap(phase[line] - times * phase[first], np.pi)) > _SAME_PHASE_OF_HARMONICS:
+        if (
+            abs(_wrap(phase[line] - times * phase[first], np.pi))
+            > _SAME_PHASE_OF_HARMONICS
+        ):
             break
         if times > 2:
-            if size[line] > size[first]:  # no harmonic is stronger than what it belongs to: these are modes
+            if (
+                size[line] > size[first]
+            ):  # no harmonic is stronger than what it belongs to: these are modes
                 return 0.0
             total += float(size[line] / size[first])
     return total

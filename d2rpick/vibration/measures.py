@@ -67,14 +67,22 @@ class Measured(Record):
 
 
 def measured(
-    vibration: Deformation, tr: Samples, td: Samples | float, tolerance: Samples, band: Band, *, of_parts: bool
+    vibration: Deformation,
+    tr: Samples,
+    td: Samples | float,
+    tolerance: Samples,
+    band: Band,
+    *,
+    of_parts: bool,
 ) -> Columns:
     """Give a column for each field of `Measured` of each tr (n,), for one ``td`` or each for its own.
 
     ``of_parts``: the deformations are those of parts, whose energy at td the mismatch is held against.
     """
     lock_in = lock_in_error(vibration, tr, td)
-    error, lowest, highest = band(residual(lock_in, kinetic_share(vibration, td)), tr, td)
+    error, lowest, highest = band(
+        residual(lock_in, kinetic_share(vibration, td)), tr, td
+    )
     return {
         "sign_match": sign_match(vibration, tr, td).astype(np.float64),
         "lock_in_error": lock_in,
@@ -82,7 +90,9 @@ def measured(
         "residual_low": lowest,
         "residual_high": highest,
         "timing_tolerance": tolerance,
-        "part_mismatch": part_mismatch(vibration, tr, td) if of_parts else np.full(tr.shape, np.nan),
+        "part_mismatch": part_mismatch(vibration, tr, td)
+        if of_parts
+        else np.full(tr.shape, np.nan),
     }
 
 
@@ -117,8 +127,12 @@ def level_error(energy: Samples | float, level: Samples | float) -> Samples:
     """
     energy = np.asarray(energy)
     comparable = (energy >= 0) & (level > 0)
-    with np.errstate(over="ignore"):  # a level next to nothing: any other energy is infinitely far off
-        square = np.divide(energy, level, out=np.full(energy.shape, np.nan), where=comparable)
+    with np.errstate(
+        over="ignore"
+    ):  # a level next to nothing: any other energy is infinitely far off
+        square = np.divide(
+            energy, level, out=np.full(energy.shape, np.nan), where=comparable
+        )
     return np.asarray(np.abs(np.sqrt(square) - 1))
 
 
@@ -132,19 +146,27 @@ def kinetic_share(vibration: Deformation, td: Samples | float) -> Samples:
     return np.asarray(vibration.kinetic_energy(td) / vibration.vibration_energy(td))
 
 
-def lock_in_error(vibration: Deformation, tr: Samples | float, td: Samples | float) -> Samples:
+def lock_in_error(
+    vibration: Deformation, tr: Samples | float, td: Samples | float
+) -> Samples:
     """L = |q(tr) - q(td)|/sqrt(V(td)) [-]: the error of the deformation that is locked in, of the shape of ``tr``.
 
     The same as |sqrt(E(tr)) - s sqrt(E(td))|/sqrt(V(td)) with s = 1 for equal signs of the deformation, else -1; for
     several modes or parts the root of the sum of squares over them, since their energies add up.  ``td`` is one for all
     tr, or one for each.
     """
-    return np.asarray(np.sqrt(vibration.separation(tr, td)) / np.sqrt(vibration.vibration_energy(td)))
+    return np.asarray(
+        np.sqrt(vibration.separation(tr, td)) / np.sqrt(vibration.vibration_energy(td))
+    )
 
 
-def part_mismatch(vibration: Deformation, tr: Samples | float, td: Samples | float) -> Samples:
+def part_mismatch(
+    vibration: Deformation, tr: Samples | float, td: Samples | float
+) -> Samples:
     """D = L/sqrt(1 - K) [-]: the same error against the internal energy at td alone, of the shape of ``tr``."""
-    return np.asarray(np.sqrt(vibration.separation(tr, td)) / np.sqrt(vibration.elastic_energy(td)))
+    return np.asarray(
+        np.sqrt(vibration.separation(tr, td)) / np.sqrt(vibration.elastic_energy(td))
+    )
 
 
 def mismatch_shares(vibration: SignedAmplitudes, tr: float, td: float) -> Samples:
@@ -154,7 +176,9 @@ def mismatch_shares(vibration: SignedAmplitudes, tr: float, td: float) -> Sample
     return square / total if total > 0 else square
 
 
-def sign_match(vibration: Deformation, tr: Samples | float, td: Samples | float) -> NDArray[np.bool_]:
+def sign_match(
+    vibration: Deformation, tr: Samples | float, td: Samples | float
+) -> NDArray[np.bool_]:
     """Whether the deformations at tr and td point the same way, of the shape of ``tr``.
 
     For one mode or part: equal signs.  For several: the sum over q(tr) q(td) is not negative, so that a part which is
@@ -164,7 +188,10 @@ def sign_match(vibration: Deformation, tr: Samples | float, td: Samples | float)
 
 
 def band_up_to(
-    highest: Callable[[Samples, Samples, Any], Samples], stated: Samples, tr: Samples, td: Samples | float
+    highest: Callable[[Samples, Samples, Any], Samples],
+    stated: Samples,
+    tr: Samples,
+    td: Samples | float,
 ) -> tuple[Samples, Samples, Samples]:
     """Give the band of a model whose stated residual is the least one, from what gives the ``highest``."""
     return stated, stated, highest(stated, tr, td)
@@ -192,7 +219,9 @@ def wrong_sign(kinetic: float) -> float:
     return sqrt(4 - 3 * kinetic)
 
 
-def run_time_share(rigid_fraction: float, cost_share: float, step_ratio: float) -> float:
+def run_time_share(
+    rigid_fraction: float, cost_share: float, step_ratio: float
+) -> float:
     """Expected run time of the switched run over that of the reference, 1 - f (1 - (1 - c)/n) [-].
 
     In the rigid window, a fraction f of the run, the share c of the cost of a step that the switched parts' elements
@@ -222,7 +251,9 @@ def timing_tolerance(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
     tolerated growth; a period where q stays inside, since all it does it has done then.
     """
     wanted = np.broadcast_to(mode.deformation(td), tr.shape)
-    room = (lock_in_error(mode, tr, td) + TOLERATED_GROWTH) * np.sqrt(mode.vibration_energy(td))
+    room = (lock_in_error(mode, tr, td) + TOLERATED_GROWTH) * np.sqrt(
+        mode.vibration_energy(td)
+    )
     half, still = np.pi / mode.omega, mode.standstill_after(tr)
     # on both sides of tr, in columns side by side, the standstills between which q is monotone
     steps = np.repeat([[0.0, 1.0, 2.0], [-1.0, -2.0, -3.0]], tr.size, axis=0).T * half
@@ -245,23 +276,33 @@ def _leaving(mode: Mode, edges: Samples, wanted: Samples, room: Samples) -> Samp
     middle, most = wanted[column], room[column]
     side = np.sign(mode.deformation(outer) - middle)
     found = narrow(
-        lambda t: most - side * (mode.deformation(t) - middle), inner, outer, slope=lambda t: -side * mode.velocity(t)
+        lambda t: most - side * (mode.deformation(t) - middle),
+        inner,
+        outer,
+        slope=lambda t: -side * mode.velocity(t),
     )
     distances = np.full(room.size, np.inf)
     distances[column] = np.abs(found.at - edges[0, column])
     return distances
 
 
-def vertices(time: Samples, values: Samples, at: NDArray[np.intp]) -> tuple[Samples, Samples]:
+def vertices(
+    time: Samples, values: Samples, at: NDArray[np.intp]
+) -> tuple[Samples, Samples]:
     """Times and values of the vertices of the parabolas through the samples ``at`` and their neighbours."""
     before, after = time[at] - time[at - 1], time[at + 1] - time[at]
-    fall, rise = (values[at] - values[at - 1]) / before, (values[at + 1] - values[at]) / after
+    fall, rise = (
+        (values[at] - values[at - 1]) / before,
+        (values[at + 1] - values[at]) / after,
+    )
     bend = (rise - fall) / (before + after)
     slope = (fall * after + rise * before) / (before + after)
     # beside a value without bound a sample is its own vertex, as where nothing bends
     bent = np.isfinite(bend) & (bend != 0)
     step = np.divide(-slope, 2 * bend, out=np.zeros(at.shape), where=bent)
-    return time[at] + step, values[at] + np.multiply(step, slope / 2, out=np.zeros(at.shape), where=bent)
+    return time[at] + step, values[at] + np.multiply(
+        step, slope / 2, out=np.zeros(at.shape), where=bent
+    )
 
 
 class Profile(NamedTuple):
@@ -273,7 +314,9 @@ class Profile(NamedTuple):
     @classmethod
     def of(cls, vibration: Deformation, time: Samples, td: float) -> Profile:
         """Profile at the times before ``td``."""
-        before = time[: np.searchsorted(time, td)]  # a copy for each td would fill the memory
+        before = time[
+            : np.searchsorted(time, td)
+        ]  # a copy for each td would fill the memory
         return cls(before, lock_in_error(vibration, before, td))
 
     def minima(self) -> tuple[float, ...]:
@@ -281,7 +324,10 @@ class Profile(NamedTuple):
         t, square = self.time, self.error**2
         if t.size < 3:
             return ()
-        at = np.flatnonzero((square[1:-1] < square[:-2]) & (square[1:-1] <= square[2:])) + 1
+        at = (
+            np.flatnonzero((square[1:-1] < square[:-2]) & (square[1:-1] <= square[2:]))
+            + 1
+        )
         return tuple(vertices(t, square, at)[0].tolist())
 
     def cell(self, at: Samples) -> Samples:
@@ -294,19 +340,30 @@ class Profile(NamedTuple):
 
         ``errors`` are those at each tr; between its times the profile is linear.
         """
-        limit, middle, last = errors + TOLERATED_GROWTH, np.searchsorted(self.time, tr), self.time.size - 1
+        limit, middle, last = (
+            errors + TOLERATED_GROWTH,
+            np.searchsorted(self.time, tr),
+            self.time.size - 1,
+        )
         after = first_above(self.error, middle, limit)
         before = last - first_above(self.error[::-1], last + 1 - middle, limit)
         most = np.full(tr.shape, self.time[-1] - self.time[0])
         for outside, inwards in ((after, -1), (before, 1)):
             there = np.flatnonzero((outside >= 0) & (outside <= last))
-            most[there] = np.fmin(most[there], self._leaving(outside[there], inwards, tr[there], limit[there]))
+            most[there] = np.fmin(
+                most[there],
+                self._leaving(outside[there], inwards, tr[there], limit[there]),
+            )
         return most
 
-    def _leaving(self, outside: NDArray[np.intp], inwards: int, tr: Samples, limit: Samples) -> Samples:
+    def _leaving(
+        self, outside: NDArray[np.intp], inwards: int, tr: Samples, limit: Samples
+    ) -> Samples:
         """Distance from each ``tr`` to where the error passes ``limit``, linear from the time ``outside`` inwards."""
         inside = np.clip(outside + inwards, 0, self.time.size - 1)
-        (t0, e0), (t1, e1) = ((self.time[at], self.error[at]) for at in (inside, outside))
+        (t0, e0), (t1, e1) = (
+            (self.time[at], self.error[at]) for at in (inside, outside)
+        )
         share = np.divide(limit - e0, e1 - e0, out=np.zeros(tr.shape), where=e1 != e0)
         # where no time lies between tr and the outside, that counts
         return np.asarray(np.abs(np.where(e0 > limit, t1, t0 + share * (t1 - t0)) - tr))

@@ -64,19 +64,26 @@ class Reading:
         t = np.asarray(t, dtype=np.float64)
         energy = self.modes.at(t) + np.interp(t, self.times, self.rest)
         if self.no_static:
-            return np.asarray(energy + self.spectrum.mean.at(t) + self.spectrum.lines.some(~self.is_mode).at(t))
+            return np.asarray(
+                energy
+                + self.spectrum.mean.at(t)
+                + self.spectrum.lines.some(~self.is_mode).at(t)
+            )
         return np.asarray(energy + self.level_of_modes(t) / 2)
 
     def level_of_modes(self, t: Samples | float) -> Samples:
         """Sum of the energies that the lines of the modes tell, of the shape of ``t`` [energy]."""
         decays = self.modes._replace(
-            poles=self.modes.poles.real.astype(np.complex128), weights=self._peak_energies.astype(np.complex128)
+            poles=self.modes.poles.real.astype(np.complex128),
+            weights=self._peak_energies.astype(np.complex128),
         )
         return decays.at(t)
 
     def level(self, t: Samples | float) -> Samples:
         """H, the energy of all modes but for its changes within a period, of the shape of ``t`` [energy]."""
-        level = 2 * self.spectrum.mean.at(t) if self.no_static else self.level_of_modes(t)
+        level = (
+            2 * self.spectrum.mean.at(t) if self.no_static else self.level_of_modes(t)
+        )
         return np.maximum(level, self.tiny)
 
     def vibration_energy(self, t: Samples | float) -> Samples:
@@ -96,11 +103,15 @@ class Reading:
         """Vibration energy of each mode at a time, shape (k,), not negative [energy]."""
         decayed = self._peak_energies * np.abs(self.modes.waves(t))
         within_period = self._within_period
-        return np.maximum(decayed + (within_period.waves(t) * within_period.weights).real, 0.0)
+        return np.maximum(
+            decayed + (within_period.waves(t) * within_period.weights).real, 0.0
+        )
 
     def coherence(self, tr: Samples | float, td: Samples | float) -> Samples:
         """C, how far the modes are in step after td - tr, for pairs of times whose shapes go together [energy]."""
-        return np.asarray(np.einsum("...k,...k->...", self.earlier(tr), self.later(td)).real)
+        return np.asarray(
+            np.einsum("...k,...k->...", self.earlier(tr), self.later(td)).real
+        )
 
     def earlier(self, tr: Samples | float) -> Complex:
         """What tr has in the coherence, of its shape with an axis for modes behind it [energy]."""
@@ -119,7 +130,11 @@ class Reading:
     def free_overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
         """The same as it comes out, which noise and a wrong model may drive beyond the bounds [energy]."""
         middle = (np.asarray(tr) + td) / 2
-        return self.elastic_energy(middle) - self.level(middle) / 2 + self.coherence(tr, td) / 2
+        return (
+            self.elastic_energy(middle)
+            - self.level(middle) / 2
+            + self.coherence(tr, td) / 2
+        )
 
     def bound(self, tr: Samples | float, td: Samples | float) -> Samples:
         """Largest product that deformations with these energies have [energy]."""

@@ -16,7 +16,12 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.vibration.lines import FIRST_PART, even_grid, predict
-from d2rpick.vibration.locked_lines import NOTABLE, Stretch, find_stretches, measure_harmonics
+from d2rpick.vibration.locked_lines import (
+    NOTABLE,
+    Stretch,
+    find_stretches,
+    measure_harmonics,
+)
 from d2rpick.vibration.measures import Profile
 from d2rpick.vibration.midpoint import Reading
 from d2rpick.vibration.swings import SOLVER_FLOOR
@@ -51,9 +56,14 @@ _MOST_NEGATIVE, _MOST_NEGATIVE_AT_ALL = (
     0.5,
 )  # negative static energy over the mean vibration energy, beyond what noise makes
 _MOST_DRIFT: Final = 0.6  # change of the static energy over the mean vibration energy
-_MOST_BEYOND: Final = 0.12  # overlap beyond its bounds over the vibration energy, rms over all pairs
+_MOST_BEYOND: Final = (
+    0.12  # overlap beyond its bounds over the vibration energy, rms over all pairs
+)
 _MOST_HARMONIC: Final = 0.05  # lines locked to a first one over it
-_MOST_UNSTRETCHED, _MOST_UNSTRETCHED_AT_ALL = 0.15, 0.6  # energy of a stretch that the static energy does not hold
+_MOST_UNSTRETCHED, _MOST_UNSTRETCHED_AT_ALL = (
+    0.15,
+    0.6,
+)  # energy of a stretch that the static energy does not hold
 _FEWEST_PER_PERIOD: Final = 2.4  # states per period of the fastest strong line
 
 # Times in a period of the fastest notable line at which a deformation is looked at.
@@ -67,7 +77,9 @@ _LITTLE_LEFT, _LITTLE_MISSED = 0.05, 0.2
 
 # The half-width of R^2, before anything is known to be wrong.
 _LEAST_HALF: Final = 0.01
-_VAGUE_HALF: Final = 0.2  # half-width of the band of R^2; that of well-read modes is 0.02 to 0.1
+_VAGUE_HALF: Final = (
+    0.2  # half-width of the band of R^2; that of well-read modes is 0.02 to 0.1
+)
 _SOME_TIMES: Final = 64  # at which the band is looked at as a whole
 _DRIFT_COUNTS, _NEGATIVE_COUNTS, _NOISE_COUNTS = 0.35, 1.2, 2.5
 _DRIFT_OF_NOISE: Final = 0.08
@@ -103,14 +115,32 @@ class Doubts(NamedTuple):
 
     def _first_of(self, most_negative: float, most_unstretched: float) -> str | None:
         reasons = (
-            (self.coarse < _FEWEST_PER_PERIOD, f"{self.coarse:.2g} states per period of the energy are too few"),
-            (self.missed > _MOST_MISSED, "the first part of the flight does not predict the rest"),
+            (
+                self.coarse < _FEWEST_PER_PERIOD,
+                f"{self.coarse:.2g} states per period of the energy are too few",
+            ),
+            (
+                self.missed > _MOST_MISSED,
+                "the first part of the flight does not predict the rest",
+            ),
             (self.misfit > _MOST_MISFIT, "lines do not describe the energy"),
             (self.negative > most_negative, "the lines hold more energy than there is"),
-            (self.drift > _MOST_DRIFT, "the mean energy changes in the flight by as much as vibrates"),
-            (self.beyond > _MOST_BEYOND, "the energy halfway is beyond what any deformations allow"),
-            (self.harmonic > _MOST_HARMONIC, "the lines are harmonics of one another, as those of a nonlinear spring"),
-            (self.unstretched > most_unstretched, "lines at half the rate of others hold more than the static energy"),
+            (
+                self.drift > _MOST_DRIFT,
+                "the mean energy changes in the flight by as much as vibrates",
+            ),
+            (
+                self.beyond > _MOST_BEYOND,
+                "the energy halfway is beyond what any deformations allow",
+            ),
+            (
+                self.harmonic > _MOST_HARMONIC,
+                "the lines are harmonics of one another, as those of a nonlinear spring",
+            ),
+            (
+                self.unstretched > most_unstretched,
+                "lines at half the rate of others hold more than the static energy",
+            ),
         )
         return next((reason for holds, reason in reasons if holds), None)
 
@@ -177,7 +207,9 @@ class ModalVibration:
     @property
     def signed(self) -> bool:
         """Whether nothing refuses the record."""
-        return (self.doubts.refusal_at_all if self.last_resort else self.doubts.refusal) is None
+        return (
+            self.doubts.refusal_at_all if self.last_resort else self.doubts.refusal
+        ) is None
 
     def as_last_resort(self) -> ModalVibration:
         """Give the same, to be relied on since nothing better is known."""
@@ -196,7 +228,11 @@ class ModalVibration:
         """Name what a choice rests on: the modes, by their rates."""
         rates = np.sort(self.reading.modes.poles.imag / 2)
         count = f"{rates.size} mode{'s' * (rates.size != 1)}"
-        span = f"omega {rates[0]:.4g}" if rates.size == 1 else f"omega {rates[0]:.4g} to {rates[-1]:.4g}"
+        span = (
+            f"omega {rates[0]:.4g}"
+            if rates.size == 1
+            else f"omega {rates[0]:.4g} to {rates[-1]:.4g}"
+        )
         return f"modal, {count} identified from the lines of the {self.source}, {span}"
 
     def modes_at(self, td: float) -> list[ModeAtTd]:
@@ -212,7 +248,10 @@ class ModalVibration:
     def known_at(self, td: float) -> bool:
         """Whether td lies where the modes were identified, and more than the error of a solver vibrates there."""
         level = self.reading.level(np.append(self.time[[0, -1]], td))
-        return bool(self.time[0] <= td <= self.time[-1] and level[-1] >= SOLVER_FLOOR * level[:-1].max())
+        return bool(
+            self.time[0] <= td <= self.time[-1]
+            and level[-1] >= SOLVER_FLOOR * level[:-1].max()
+        )
 
     def elastic_energy(self, t: Samples | float) -> Samples:
         """V, of the shape of ``t``, not negative [energy]."""
@@ -232,7 +271,9 @@ class ModalVibration:
 
     def separation(self, tr: Samples | float, td: Samples | float) -> Samples:
         """Elastic energy of the difference of the deformations at tr and td [energy]."""
-        apart = self.elastic_energy(tr) - 2 * self.overlap(tr, td) + self.elastic_energy(td)
+        apart = (
+            self.elastic_energy(tr) - 2 * self.overlap(tr, td) + self.elastic_energy(td)
+        )
         return np.maximum(apart, 0.0)
 
     def profile(self, td: float) -> Profile:
@@ -242,25 +283,45 @@ class ModalVibration:
         middle = (self.time[:last] + td) / 2
         at_td = float(self.elastic_energy(td))
         coherence = (earlier[:last] @ self.reading.later(td)).real
-        overlap = np.interp(middle, finer.time, finer.energy) - self.reading.level(middle) / 2 + coherence / 2
+        overlap = (
+            np.interp(middle, finer.time, finer.energy)
+            - self.reading.level(middle) / 2
+            + coherence / 2
+        )
         bound = np.sqrt(elastic[:last] * at_td)
         separation = elastic[:last] - 2 * np.clip(overlap, -bound, bound) + at_td
-        return Profile(self.time[:last], np.sqrt(np.maximum(separation, 0.0) / self.vibration_energy(td)))
+        return Profile(
+            self.time[:last],
+            np.sqrt(np.maximum(separation, 0.0) / self.vibration_energy(td)),
+        )
 
     @cached_property
     def _at_all_times(self) -> tuple[Samples, _Course, Complex]:
         """Elastic energy at the ``time``, at times between, and what tr has in the coherence."""
-        finer = np.linspace(self.time[0], self.time[-1], _FINER * (self.time.size - 1) + 1)
+        finer = np.linspace(
+            self.time[0], self.time[-1], _FINER * (self.time.size - 1) + 1
+        )
         course = _Course(finer, self.reading.elastic_energy(finer))
-        return np.maximum(course.energy[::_FINER], 0.0), course, self.reading.earlier(self.time)
+        return (
+            np.maximum(course.energy[::_FINER], 0.0),
+            course,
+            self.reading.earlier(self.time),
+        )
 
     def half_width(self, tr: Samples | float, td: Samples | float) -> Samples:
         """Half-width of the band of R^2 of pairs of times [-]."""
         reading, level = self.reading, self.reading.level(td)
         squared = reading.residual_squared(tr, td)
-        lines = np.abs(reading.coherence(tr, td) - self.of_first_part.coherence(tr, td)) / level
+        lines = (
+            np.abs(reading.coherence(tr, td) - self.of_first_part.coherence(tr, td))
+            / level
+        )
         scatter = self.noise / level * np.sqrt(5 * self.systematic + 0.5)
-        beside = 0.0 if self.second is None else np.abs(self.second.residual_squared(tr, td) - squared)
+        beside = (
+            0.0
+            if self.second is None
+            else np.abs(self.second.residual_squared(tr, td) - squared)
+        )
         return np.asarray(
             (_LEAST_HALF + min(self._wrong, 1.0)) * (1 + np.abs(squared - 1))
             + np.minimum(lines, 1.0)
@@ -276,7 +337,9 @@ class ModalVibration:
         widths = [self.half_width(some, td) for td in some[:: _SOME_TIMES // 8]]
         return bool(np.mean(np.array(widths) > _VAGUE_HALF) > 0.5)
 
-    def residual_band(self, stated: Samples, tr: Samples, td: Samples | float) -> tuple[Samples, Samples, Samples]:
+    def residual_band(
+        self, stated: Samples, tr: Samples, td: Samples | float
+    ) -> tuple[Samples, Samples, Samples]:
         """Residual of each tr (n,), and the lowest and highest that the record allows [-].
 
         No square is below zero: where the band reaches there, the middle of the rest is stated instead of ``stated``.
@@ -299,16 +362,30 @@ class ModalVibration:
         drifts = not self.reading.no_static or doubts.drift > _DRIFT_OF_NOISE
         negative = max(doubts.negative - self.slack, 0.0)
         return (
-            _DRIFT_COUNTS * doubts.drift * drifts + _NEGATIVE_COUNTS * (negative + doubts.unstretched) + doubts.harmonic
+            _DRIFT_COUNTS * doubts.drift * drifts
+            + _NEGATIVE_COUNTS * (negative + doubts.unstretched)
+            + doubts.harmonic
         )
 
-    def _of_other_readings(self, tr: Samples | float, td: Samples | float, squared: Samples) -> Samples:
+    def _of_other_readings(
+        self, tr: Samples | float, td: Samples | float, squared: Samples
+    ) -> Samples:
         """How far R^2 may be off because the lines can be read in another way [-]."""
-        apart = [np.abs(other.residual_squared(tr, td) - squared) for other in self.others]
+        apart = [
+            np.abs(other.residual_squared(tr, td) - squared) for other in self.others
+        ]
         if self.reading.no_static or self.is_ambiguous:
-            return np.asarray(np.max(apart, axis=0)) if apart else np.zeros(squared.shape)
+            return (
+                np.asarray(np.max(apart, axis=0)) if apart else np.zeros(squared.shape)
+            )
         # lines that hide in the rest hold no more than this beside those that were found
-        hidden = 2 * np.sqrt(2 * _HIDDEN_LINES) * self.noise / self.reading.level(td) * np.abs(1.5 - squared)
+        hidden = (
+            2
+            * np.sqrt(2 * _HIDDEN_LINES)
+            * self.noise
+            / self.reading.level(td)
+            * np.abs(1.5 - squared)
+        )
         return np.asarray(np.min([*apart, hidden], axis=0))
 
     @property
@@ -317,7 +394,9 @@ class ModalVibration:
         return not self.reading.is_mode.all() and bool(self.others)
 
 
-def identify_modal(time: Samples, energy: Samples, *, kinetic: bool = False) -> ModalVibration | None:
+def identify_modal(
+    time: Samples, energy: Samples, *, kinetic: bool = False
+) -> ModalVibration | None:
     """Identify the modes of a structure from its energy in free flight; None if it has no lines.
 
     The kinetic energy has the lines of the internal energy with the opposite sign, and whatever else it holds is slow:
@@ -350,7 +429,9 @@ def identify_modal(time: Samples, energy: Samples, *, kinetic: bool = False) -> 
         return None
     grid = even_grid(time, energy)
     prediction = predict(grid)
-    if prediction is None or prediction.swing <= _RESOLVED * float(np.abs(energy).max()):
+    if prediction is None or prediction.swing <= _RESOLVED * float(
+        np.abs(energy).max()
+    ):
         return None
     if not prediction.spectrum.lines.poles.size:
         return None
@@ -360,7 +441,9 @@ def identify_modal(time: Samples, energy: Samples, *, kinetic: bool = False) -> 
     return _read(grid, prediction, window)
 
 
-def confirm(internal: ModalVibration | None, kinetic: ModalVibration | None) -> ModalVibration | None:
+def confirm(
+    internal: ModalVibration | None, kinetic: ModalVibration | None
+) -> ModalVibration | None:
     """Give what the internal energy says, its band widened to what the kinetic energy says; else that alone."""
     if kinetic is None or not kinetic.signed:
         return internal
@@ -378,10 +461,18 @@ def _may_decide(internal: ModalVibration, kinetic: ModalVibration) -> bool:
     """
     held = float(np.mean(internal.reading.spectrum.mean.at(internal.time)))
     needed = float(np.mean(kinetic.reading.level_of_modes(internal.time))) / 2
-    return held > (1 - _MOST_NEGATIVE) * needed and internal.doubts.beyond < _MOST_BEYOND
+    return (
+        held > (1 - _MOST_NEGATIVE) * needed and internal.doubts.beyond < _MOST_BEYOND
+    )
 
 
-def _read(grid: Grid, prediction: Prediction, window: tuple[float, float], *, kinetic: bool = False) -> ModalVibration:
+def _read(
+    grid: Grid,
+    prediction: Prediction,
+    window: tuple[float, float],
+    *,
+    kinetic: bool = False,
+) -> ModalVibration:
     """Read the lines in the way that fits, and in others; of a ``kinetic`` energy the mean says nothing.
 
     ``window`` is from the first state to the last, which means over the blocks of the grid do not reach [time].
@@ -394,7 +485,14 @@ def _read(grid: Grid, prediction: Prediction, window: tuple[float, float], *, ki
     stretches = find_stretches(spectrum.lines, grid.span, scatter)
     is_mode = _without(spectrum.lines, stretches)
 
-    plain = Reading(spectrum, np.ones(is_mode.shape, dtype=bool), True, grid.time, systematic * rest, tiny)
+    plain = Reading(
+        spectrum,
+        np.ones(is_mode.shape, dtype=bool),
+        True,
+        grid.time,
+        systematic * rest,
+        tiny,
+    )
     with_static = replace(plain, is_mode=is_mode, no_static=False)
     half = with_static.level_of_modes(grid.time) / 2
     static = spectrum.mean.at(grid.time) - half
@@ -402,15 +500,32 @@ def _read(grid: Grid, prediction: Prediction, window: tuple[float, float], *, ki
     share = float(np.mean(static)) / mean
     half_of_all = plain.level_of_modes(grid.time) / 2
     excess = abs(float(np.mean(spectrum.mean.at(grid.time) - half_of_all)))
-    ambiguous = bool(stretches) and not kinetic and excess < _AMBIGUOUS * float(np.mean(half_of_all))
+    ambiguous = (
+        bool(stretches)
+        and not kinetic
+        and excess < _AMBIGUOUS * float(np.mean(half_of_all))
+    )
     no_static = abs(share) < _NO_STATIC and not stretches and not kinetic
     reading = plain if no_static else with_static
-    others = (plain,) if ambiguous else () if stretches or kinetic else (with_static if no_static else plain,)
+    others = (
+        (plain,)
+        if ambiguous
+        else ()
+        if stretches or kinetic
+        else (with_static if no_static else plain,)
+    )
 
     first = prediction.of_first_part
-    first_stretches = find_stretches(first.lines, FIRST_PART * grid.span, scatter) if stretches else ()
+    first_stretches = (
+        find_stretches(first.lines, FIRST_PART * grid.span, scatter)
+        if stretches
+        else ()
+    )
     of_first_part = replace(
-        reading, spectrum=first, is_mode=_without(first.lines, first_stretches), rest=np.zeros(grid.time.size)
+        reading,
+        spectrum=first,
+        is_mode=_without(first.lines, first_stretches),
+        rest=np.zeros(grid.time.size),
     )
     held = sum(stretch.energy for stretch in stretches) / mean
     doubts = Doubts(
@@ -460,5 +575,7 @@ def _beyond_bounds(reading: Reading, grid: Grid) -> float:
     even = np.linspace(grid.time[0], grid.time[-1], _CHECKED)
     pairs = np.array([(tr, td) for tr, td in product(even, even) if tr < td])
     tr, td = pairs.T
-    beyond = np.maximum(np.abs(reading.free_overlap(tr, td)) - reading.bound(tr, td), 0.0)
+    beyond = np.maximum(
+        np.abs(reading.free_overlap(tr, td)) - reading.bound(tr, td), 0.0
+    )
     return float(np.sqrt(np.mean((beyond / reading.level((tr + td) / 2)) ** 2)))

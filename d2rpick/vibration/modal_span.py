@@ -34,7 +34,9 @@ class Described(NamedTuple):
     span: Span
 
 
-def find_described(history: History, td: float, guess: Span | None, memory: Memory) -> Described | None:
+def find_described(
+    history: History, td: float, guess: Span | None, memory: Memory
+) -> Described | None:
     """Find a window around td whose modes go on by themselves; None if none is found.
 
     Parameters
@@ -66,7 +68,11 @@ def inner_window(history: History, guess: Span) -> Span:
     first, last = float(history.time[0]), float(history.time[-1])
     part = (last - first) / _PARTS
     start = first + part * np.ceil((guess.start - first) / part)
-    end = last if guess.end >= last else first + part * np.floor((guess.end - first) / part)
+    end = (
+        last
+        if guess.end >= last
+        else first + part * np.floor((guess.end - first) / part)
+    )
     return Span(float(start), float(end))
 
 
@@ -78,12 +84,18 @@ def _windows(history: History, td: float, guess: Span | None) -> Iterator[Span]:
             yield inner
     first, last = float(history.time[0]), float(history.time[-1])
     yield from (
-        Span(first + share * (last - first), last) for share in _BEGINNINGS if first + share * (last - first) < td
+        Span(first + share * (last - first), last)
+        for share in _BEGINNINGS
+        if first + share * (last - first) < td
     )
 
 
-def _identified(history: History, window: Span, memory: Memory) -> ModalVibration | None:
-    return memory.once(("lines", *window), lambda: identify_modal(*history.between(*window)))
+def _identified(
+    history: History, window: Span, memory: Memory
+) -> ModalVibration | None:
+    return memory.once(
+        ("lines", *window), lambda: identify_modal(*history.between(*window))
+    )
 
 
 def _grown(history: History, found: Described, memory: Memory) -> Described:
@@ -104,25 +116,38 @@ def _reach(history: History, found: Described) -> Span:
     time, energy = history.time, history.energy
     inside = slice(*np.searchsorted(time, found.span).tolist())
     spacing = float(median(np.diff(time[inside])))
-    period = 2 * np.pi / max(float(found.vibration.reading.modes.poles.imag.max()), 1e-300)
+    period = (
+        2 * np.pi / max(float(found.vibration.reading.modes.poles.imag.max()), 1e-300)
+    )
     width = max(3, round(period / _MEANS_PER_PERIOD / spacing))
-    before = _last_off(time[: inside.start], energy[: inside.start], found.vibration, width)
-    after = _last_off(time[inside.stop :][::-1], energy[inside.stop :][::-1], found.vibration, width)
+    before = _last_off(
+        time[: inside.start], energy[: inside.start], found.vibration, width
+    )
+    after = _last_off(
+        time[inside.stop :][::-1], energy[inside.stop :][::-1], found.vibration, width
+    )
     return Span(
         float(time[before]) if before < inside.start else found.span.start,
-        float(time[time.size - 1 - after]) if after < time.size - inside.stop else found.span.end,
+        float(time[time.size - 1 - after])
+        if after < time.size - inside.stop
+        else found.span.end,
     )
 
 
-def _last_off(time: Samples, energy: Samples, vibration: ModalVibration, width: int) -> int:
+def _last_off(
+    time: Samples, energy: Samples, vibration: ModalVibration, width: int
+) -> int:
     """Number of the states, which come nearer and nearer to the window, up to the last that is off the modes."""
     if time.size < width:
         return int(time.size)
-    with np.errstate(over="ignore", invalid="ignore"):  # far off, damped modes grow beyond all numbers
+    with np.errstate(
+        over="ignore", invalid="ignore"
+    ):  # far off, damped modes grow beyond all numbers
         off = energy - vibration.reading.spectrum.at(time)
         means = np.abs(np.convolve(off, np.full(width, 1 / width), mode="valid"))
         room = np.maximum(
-            _MOST_OFF * vibration.vibration_energy(time[width - 1 :]), _SCATTERS_OFF * vibration.noise / np.sqrt(width)
+            _MOST_OFF * vibration.vibration_energy(time[width - 1 :]),
+            _SCATTERS_OFF * vibration.noise / np.sqrt(width),
         )
         wrong = np.flatnonzero(~(means <= room))
     return int(wrong[-1]) + width if wrong.size else 0

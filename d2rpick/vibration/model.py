@@ -19,9 +19,18 @@ from d2rpick.base.errors import listing
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.vibration import MODELS, measures
 from d2rpick.vibration.fitting import MAX_MISFIT
-from d2rpick.vibration.identify import MIN_SAMPLES_PER_PERIOD, Identification, samples_per_period
+from d2rpick.vibration.identify import (
+    MIN_SAMPLES_PER_PERIOD,
+    Identification,
+    samples_per_period,
+)
 from d2rpick.vibration.modes import Mode
-from d2rpick.vibration.moments import Moments, OscillatorEnergy, SampledEnergy, moments_of_mode
+from d2rpick.vibration.moments import (
+    Moments,
+    OscillatorEnergy,
+    SampledEnergy,
+    moments_of_mode,
+)
 from d2rpick.vibration.span import SMALLEST, residual_bound
 
 if TYPE_CHECKING:
@@ -108,23 +117,36 @@ class Vibration:
     @property
     def modal(self) -> ModalVibration | None:
         """The modes of the structure that are relied on; None where they are not."""
-        return cast("ModalVibration", self.compared.deformation) if self.basis == "modal" and self.compared else None
+        return (
+            cast("ModalVibration", self.compared.deformation)
+            if self.basis == "modal" and self.compared
+            else None
+        )
 
     @property
     def reasons(self) -> str | None:
         """Say why no deformation with its sign is known, of single parts too; None where one is."""
         if self.compared or not self.parts:
             return self.unknown
-        names: dict[str | None, list[str]] = {}  # of each reason, since all parts of a structure often share one
+        names: dict[
+            str | None, list[str]
+        ] = {}  # of each reason, since all parts of a structure often share one
         for part in self.parts.unsigned:
             names.setdefault(part.reason, []).append(part.name)
-        of_parts = (f"{listing(alike, most=_NAMED)}: {reason}" for reason, alike in names.items())
+        of_parts = (
+            f"{listing(alike, most=_NAMED)}: {reason}"
+            for reason, alike in names.items()
+        )
         return "; ".join((self.unknown or "", *of_parts))
 
     @property
     def kinetic_share(self) -> float | None:
         """K at td, None where it is not known [-]."""
-        return None if self.compared is None else float(measures.kinetic_share(self.compared.deformation, self.td))
+        return (
+            None
+            if self.compared is None
+            else float(measures.kinetic_share(self.compared.deformation, self.td))
+        )
 
     @cached_property
     def profile(self) -> Profile | None:
@@ -155,7 +177,9 @@ class Vibration:
         if self.basis != "modal":
             return None
         least = self.least_residual or 0.0
-        most = NOTHING_KEPT if least <= NOTHING_KEPT else least + measures.TOLERATED_GROWTH
+        most = (
+            NOTHING_KEPT if least <= NOTHING_KEPT else least + measures.TOLERATED_GROWTH
+        )
         return float(np.sqrt(max(most**2 - (self.kinetic_share or 0.0), 0.0)))
 
     def moments(self, tolerance: float, since: float = -np.inf) -> Moments:
@@ -166,22 +190,36 @@ class Vibration:
         if self.compared and isinstance(self.whole, OscillatorEnergy):
             turns = self.whole.standstills()
             turns = turns[self.comparable(turns)]
-            turns = turns[measures.lock_in_error(self.compared.deformation, turns, self.td) <= tolerance]
+            turns = turns[
+                measures.lock_in_error(self.compared.deformation, turns, self.td)
+                <= tolerance
+            ]
         else:
             turns = self.whole.turns_near(tolerance, since)
         matches = self.profile.minima() if self.profile else ()
         if self.basis == "modal":  # the level of all modes together decides nothing
             return Moments.of("match", [*matches, *self._least_deformed()])
         crossings = self.whole.crossings(since)
-        return Moments.of_level(*crossings, Moments.of("extremum", turns), Moments.of("match", matches))
+        return Moments.of_level(
+            *crossings, Moments.of("extremum", turns), Moments.of("match", matches)
+        )
 
     def _least_deformed(self) -> tuple[float, ...]:
         """Time at which least vibration energy is elastic, if no tr keeps the vibration: that keeps the static part."""
         if not self.keeps_nothing or self.compared is None or self.profile is None:
             return ()
         times = self.profile.time
-        times = times[: max(1, np.searchsorted(times, self.td - NEAR_TD * (self.td - self.compared.first)))]
-        return (float(times[np.argmin(self.compared.deformation.elastic_energy(times))]),)
+        times = times[
+            : max(
+                1,
+                np.searchsorted(
+                    times, self.td - NEAR_TD * (self.td - self.compared.first)
+                ),
+            )
+        ]
+        return (
+            float(times[np.argmin(self.compared.deformation.elastic_energy(times))]),
+        )
 
     def measured(self, times: Samples) -> Columns:
         """Measures of each time as tr, as far as its deformation can be compared with that at td."""
@@ -193,13 +231,17 @@ class Vibration:
         The lock-in error, of few modes if the signs match; the level error if no signs are known.
         """
         if self.compared is None:
-            errors = measures.level_error(self.whole.energies(times), self.whole.energy(self.td))
+            errors = measures.level_error(
+                self.whole.energies(times), self.whole.energy(self.td)
+            )
             return np.where(np.isnan(errors), np.inf, errors)
         deformation = self.compared.deformation
         comparable = self.comparable(times)
         if self.basis != "modal":
             comparable &= measures.sign_match(deformation, times, self.td)
-        return np.where(comparable, measures.lock_in_error(deformation, times, self.td), np.inf)
+        return np.where(
+            comparable, measures.lock_in_error(deformation, times, self.td), np.inf
+        )
 
     def knots(self) -> Samples:
         """Times before td between which the errors run monotone [time]."""
@@ -209,13 +251,19 @@ class Vibration:
         """How far the true time of each moment may lie away; of a match half a cell of the profile [time]."""
         reach = self.whole.reach(moments.tr)
         # a match lies where the error is least
-        return np.where(moments.are("match"), self.profile.cell(moments.tr) / 2, reach) if self.profile else reach
+        return (
+            np.where(moments.are("match"), self.profile.cell(moments.tr) / 2, reach)
+            if self.profile
+            else reach
+        )
 
     def part_matches(self, tr: float) -> tuple[PartMatch, ...]:
         """What each part has of the mismatch; nothing where single parts are not known."""
         if self.signed is None:
             return ()
-        from d2rpick.vibration.part_signs import contributions  # not above: a table has no parts
+        from d2rpick.vibration.part_signs import (
+            contributions,
+        )  # not above: a table has no parts
 
         return contributions(self.signed, tr, self.td)
 
@@ -233,12 +281,18 @@ class Vibration:
             tolerance = measures.timing_tolerance(deformation, tr, td)
         else:
             assert self.profile is not None
-            tolerance = self.profile.tolerances(tr, measures.lock_in_error(deformation, tr, td))
+            tolerance = self.profile.tolerances(
+                tr, measures.lock_in_error(deformation, tr, td)
+            )
         of_parts = self.basis == "parts"
-        return measures.measured(deformation, tr, td, tolerance, self.compared.band, of_parts=of_parts)
+        return measures.measured(
+            deformation, tr, td, tolerance, self.compared.band, of_parts=of_parts
+        )
 
 
-def moments_of(vibrations: Sequence[Vibration], tolerance: float, since: Sequence[float]) -> list[Moments]:
+def moments_of(
+    vibrations: Sequence[Vibration], tolerance: float, since: Sequence[float]
+) -> list[Moments]:
     """Give the moments of each vibration, as ``Vibration.moments`` does: of one mode in one go.
 
     Parameters
@@ -253,28 +307,46 @@ def moments_of(vibrations: Sequence[Vibration], tolerance: float, since: Sequenc
     for places in _alike(vibrations):
         first, times = vibrations[places[0]], [since[i] for i in places]
         if len(places) > 1:
-            seen = [one.whole for one in map(vibrations.__getitem__, places) if isinstance(one.whole, OscillatorEnergy)]
+            seen = [
+                one.whole
+                for one in map(vibrations.__getitem__, places)
+                if isinstance(one.whole, OscillatorEnergy)
+            ]
             found |= zip(places, moments_of_mode(seen, tolerance, times), strict=True)
         else:
             found[places[0]] = first.moments(tolerance, *times)
     return [found[i] for i in range(len(vibrations))]
 
 
-def measured_of(vibrations: Sequence[Vibration], tr: Samples, ends: Sequence[int]) -> tuple[Samples, Columns]:
+def measured_of(
+    vibrations: Sequence[Vibration], tr: Samples, ends: Sequence[int]
+) -> tuple[Samples, Columns]:
     """Give the energy of each tr (n,), and its measures as far as its deformation is comparable to that at its td.
 
     Those of the i-th vibration lie between the i-th of the ``ends`` and the next one.
     """
     energy, found = np.empty(tr.shape), []
     for places in _alike(vibrations):
-        first, each = vibrations[places[0]], [slice(ends[i], ends[i + 1]) for i in places]
-        rows: Any = each[0] if len(each) == 1 else np.concatenate([np.arange(one.start, one.stop) for one in each])
+        first, each = (
+            vibrations[places[0]],
+            [slice(ends[i], ends[i + 1]) for i in places],
+        )
+        rows: Any = (
+            each[0]
+            if len(each) == 1
+            else np.concatenate([np.arange(one.start, one.stop) for one in each])
+        )
         energy[rows] = first.whole.energies(tr[rows])
         here = first.comparable(tr[rows])
         if here.any():
-            seen_from = np.repeat([vibrations[i].td for i in places], [one.stop - one.start for one in each])
+            seen_from = np.repeat(
+                [vibrations[i].td for i in places],
+                [one.stop - one.start for one in each],
+            )
             td = seen_from[here] if len(each) > 1 else first.td
-            found.append((np.arange(tr.size)[rows][here], first.measures_of(tr[rows][here], td)))
+            found.append(
+                (np.arange(tr.size)[rows][here], first.measures_of(tr[rows][here], td))
+            )
     return energy, measures.spread(tr.size, found)
 
 
@@ -282,8 +354,15 @@ def _alike(vibrations: Sequence[Vibration]) -> Iterable[list[int]]:
     """Places of the vibrations that a single mode describes in one window, together; of each other one by itself."""
     groups: dict[object, list[int]] = {}
     for place, one in enumerate(vibrations):
-        whole, single = one.whole, one.compared is not None and isinstance(one.compared.deformation, Mode)
-        key = (id(whole.fit), whole.span) if single and isinstance(whole, OscillatorEnergy) else place
+        whole, single = (
+            one.whole,
+            one.compared is not None and isinstance(one.compared.deformation, Mode),
+        )
+        key = (
+            (id(whole.fit), whole.span)
+            if single and isinstance(whole, OscillatorEnergy)
+            else place
+        )
         groups.setdefault(key, []).append(place)
     return groups.values()
 
@@ -333,7 +412,9 @@ class Evidence(NamedTuple):
     def is_that_of(self, other: Evidence) -> bool:
         """Whether the same was found, of one record."""
         same = self.fit is other.fit and self.span == other.span
-        return same and all(self.models.get(name) is other.models.get(name) for name in MODELS)
+        return same and all(
+            self.models.get(name) is other.models.get(name) for name in MODELS
+        )
 
 
 def model_at(whole: Vibration, evidence: Evidence) -> Vibration:
@@ -344,10 +425,19 @@ def model_at(whole: Vibration, evidence: Evidence) -> Vibration:
 def _best(whole: Vibration, evidence: Evidence) -> Vibration:
     if not evidence.signed:
         return whole
-    basis, model, td, names = evidence.signed, evidence.models[evidence.signed], whole.td, [*MODELS]
+    basis, model, td, names = (
+        evidence.signed,
+        evidence.models[evidence.signed],
+        whole.td,
+        [*MODELS],
+    )
     modes = whole.whole
     if names.index(basis) < names.index("oscillator"):
-        return _with_signs(whole, basis, model) if whole.compared or model.known_at(td) else _sunk(whole)
+        return (
+            _with_signs(whole, basis, model)
+            if whole.compared or model.known_at(td)
+            else _sunk(whole)
+        )
     if whole.doubts or not doubtful(whole) or not model.known_at(td):
         return whole
     if not isinstance(modes, OscillatorEnergy):
@@ -355,7 +445,11 @@ def _best(whole: Vibration, evidence: Evidence) -> Vibration:
     # what neighbouring states share is a further mode, of which modes tell more; in white noise one can only hide
     is_further_mode = basis == "modal" and modes.fit.structure > 0
     if is_further_mode or model.unseen(modes.span.start, td) < modes.fit.hidden_share:
-        return _with_signs(Vibration("energy", SampledEnergy(modes.history, td), unknown=_LEFT_OVER), basis, model)
+        return _with_signs(
+            Vibration("energy", SampledEnergy(modes.history, td), unknown=_LEFT_OVER),
+            basis,
+            model,
+        )
     return whole
 
 
@@ -365,23 +459,34 @@ def _with_signs(whole: Vibration, basis: str, model: SignedModel) -> Vibration:
     return replace(
         whole,
         basis=basis,
-        compared=Compared(model, first, float(model.time[-1]), model.profile, model.residual_band),
+        compared=Compared(
+            model, first, float(model.time[-1]), model.profile, model.residual_band
+        ),
         unknown=None,
         undescribed=model.undescribed,
         told=model.told,
-        estimated=f"{model.kinetic}: {whole.unknown}" if whole.unknown and model.kinetic else None,
+        estimated=f"{model.kinetic}: {whole.unknown}"
+        if whole.unknown and model.kinetic
+        else None,
     )
 
 
 def _sunk(whole: Vibration) -> Vibration:
     """Say too that the parts vibrate less at td than a solver errs."""
     unknown = f"{whole.unknown}; at td the vibration of the parts is below the error of a solver"
-    return replace(whole, unknown=unknown, doubts=(SUNK, *(doubt for doubt in whole.doubts if doubt != SUNK)))
+    return replace(
+        whole,
+        unknown=unknown,
+        doubts=(SUNK, *(doubt for doubt in whole.doubts if doubt != SUNK)),
+    )
 
 
 def doubtful(whole: Vibration) -> bool:
     """Whether no oscillator is known, or one that leaves so much over that its sign may be wrong."""
-    return not isinstance(whole.whole, OscillatorEnergy) or whole.whole.fit.hidden_share > SMALLEST
+    return (
+        not isinstance(whole.whole, OscillatorEnergy)
+        or whole.whole.fit.hidden_share > SMALLEST
+    )
 
 
 def energy_at(history: History, td: float, evidence: Evidence) -> Vibration:
@@ -390,22 +495,45 @@ def energy_at(history: History, td: float, evidence: Evidence) -> Vibration:
     samples = partial(Vibration, "energy", SampledEnergy(history, td))
     if fit is None:
         return samples(unknown="identification was switched off")
-    prescribed = ("the oscillator that was asked for does not describe the record at td",) * evidence.prescribed
+    prescribed = (
+        "the oscillator that was asked for does not describe the record at td",
+    ) * evidence.prescribed
     if fit.reason:
-        what = "the given oscillator does not describe" if evidence.given else "no single oscillator describes"
-        return samples(unknown=f"{what} the record: {fit.reason}", doubts=(*prescribed, *_aliased(history, fit)))
+        what = (
+            "the given oscillator does not describe"
+            if evidence.given
+            else "no single oscillator describes"
+        )
+        return samples(
+            unknown=f"{what} the record: {fit.reason}",
+            doubts=(*prescribed, *_aliased(history, fit)),
+        )
     if not isinstance(whole, OscillatorEnergy) or not whole.described(td):
-        return samples(unknown="the oscillator does not describe the record at td", doubts=prescribed)
+        return samples(
+            unknown="the oscillator does not describe the record at td",
+            doubts=prescribed,
+        )
     if whole.sunk:
         return samples(unknown=whole.sunk, doubts=(SUNK, *prescribed))
-    compared = Compared(whole.mode, *whole.span, None, partial(measures.band_up_to, partial(residual_bound, fit)))
-    return Vibration("oscillator", whole, compared, undescribed="not described by the oscillator")
+    compared = Compared(
+        whole.mode,
+        *whole.span,
+        None,
+        partial(measures.band_up_to, partial(residual_bound, fit)),
+    )
+    return Vibration(
+        "oscillator", whole, compared, undescribed="not described by the oscillator"
+    )
 
 
 def describing(history: History, td: float, evidence: Evidence) -> SampledEnergy:
     """Give the energy as it is known whatever it is worth at ``td``: of an oscillator where it describes a window."""
     fit, span = evidence.fit, evidence.span
-    return OscillatorEnergy(history, td, fit, span) if fit and fit.mode and span else SampledEnergy(history, td)
+    return (
+        OscillatorEnergy(history, td, fit, span)
+        if fit and fit.mode and span
+        else SampledEnergy(history, td)
+    )
 
 
 def _aliased(history: History, fit: Identification) -> tuple[str, ...]:

@@ -109,7 +109,10 @@ class Mode(SignedAmplitudes):
         cosine, sine = self._velocity_parts
 
         def energy(decay: Samples, cos: Samples, sin: Samples) -> Samples:
-            swing, velocity = decay * (self.cosine * cos + self.sine * sin), decay * (cosine * cos + sine * sin)
+            swing, velocity = (
+                decay * (self.cosine * cos + self.sine * sin),
+                decay * (cosine * cos + sine * sin),
+            )
             return swing**2 + (velocity / self.omega_0) ** 2
 
         return self._of_waves(energy, t)
@@ -122,13 +125,24 @@ class Mode(SignedAmplitudes):
 
     def energy_gradient(self, t: Samples, size: int) -> Samples:
         """Derivatives of E(t) by the first ``size`` parameters in the order of the class, less origin, (size, n)."""
-        own = np.array([self.omega, self.alpha, self.cosine, self.sine, self.energy_plastic, self.preload])
+        own = np.array(
+            [
+                self.omega,
+                self.alpha,
+                self.cosine,
+                self.sine,
+                self.energy_plastic,
+                self.preload,
+            ]
+        )
         return energy_and_jacobian(own, t - self.origin, size)[1]
 
     def standstill_after(self, t: Samples | float) -> Samples:
         """Find the first time at or after ``t`` where the deformation stands still; the next is half a period on."""
         cosine, sine = self._velocity_parts
-        phase = np.arctan2(-cosine, sine)  # cosine cos x + sine sin x = 0 at x = phase + n pi
+        phase = np.arctan2(
+            -cosine, sine
+        )  # cosine cos x + sine sin x = 0 at x = phase + n pi
         turns = np.ceil((self.omega * (np.asarray(t) - self.origin) - phase) / np.pi)
         return np.asarray(self.origin + (phase + np.pi * turns) / self.omega)
 
@@ -137,7 +151,9 @@ class Mode(SignedAmplitudes):
         if not start < end:  # nor need ``start`` be a time whose phase is a number
             return ()
         first = float(self.standstill_after(start))
-        times = first + np.pi / self.omega * np.arange(max(0.0, np.ceil((end - first) * self.omega / np.pi)))
+        times = first + np.pi / self.omega * np.arange(
+            max(0.0, np.ceil((end - first) * self.omega / np.pi))
+        )
         return tuple(times[(times > start) & (times < end)].tolist())
 
     def peaks(self, start: float, end: float) -> tuple[float, ...]:
@@ -154,13 +170,17 @@ class Mode(SignedAmplitudes):
 
         An extremum that only touches the level (to rounding) is no crossing, nor are ``start`` and ``end``.
         """
-        return tuple(self._passages(np.array([level_q]), start, np.array([end]))[1].tolist())
+        return tuple(
+            self._passages(np.array([level_q]), start, np.array([end]))[1].tolist()
+        )
 
     def level_crossings(self, td: float, start: float) -> tuple[float, ...]:
         """Find the times in (start, td), ascending, where the energy passes its level at ``td`` [time]."""
         return tuple(self.all_level_crossings(np.array([td]), start)[1].tolist())
 
-    def all_level_crossings(self, td: Samples, start: float) -> tuple[NDArray[np.intp], Samples]:
+    def all_level_crossings(
+        self, td: Samples, start: float
+    ) -> tuple[NDArray[np.intp], Samples]:
         """Find the same for each ``td`` of shape (n,), all at once: its place among them, and the time."""
         level = self.deformation(td)
         # a level of zero is met once by each passage, whatever rounding makes of its sign
@@ -172,18 +192,28 @@ class Mode(SignedAmplitudes):
         order = np.lexsort((times, place))
         return place[order], times[order]
 
-    def _passages(self, levels: Samples, start: float, ends: Samples) -> tuple[NDArray[np.intp], Samples]:
+    def _passages(
+        self, levels: Samples, start: float, ends: Samples
+    ) -> tuple[NDArray[np.intp], Samples]:
         """Find the times in (start, end) where q passes a level, for each level and its end, both of shape (n,).
 
         Places of the levels and times, ascending in both.
         """
         inner = np.array(self.extrema(start, float(ends.max(initial=start))))
         rows = np.broadcast_to(inner, (ends.size, inner.size))
-        edges = np.column_stack([np.full(ends.size, start), np.minimum(rows, ends[:, np.newaxis]), ends])
+        edges = np.column_stack(
+            [np.full(ends.size, start), np.minimum(rows, ends[:, np.newaxis]), ends]
+        )
         above = self.deformation(edges) - levels[:, np.newaxis]
-        scale = np.abs(levels)[:, np.newaxis] + abs(self.preload) + np.sqrt(self.vibration_energy(edges))
+        scale = (
+            np.abs(levels)[:, np.newaxis]
+            + abs(self.preload)
+            + np.sqrt(self.vibration_energy(edges))
+        )
         above[np.abs(above) <= 8 * _EPS * scale] = 0.0
-        place, cell = np.nonzero(above[:, :-1] * above[:, 1:] < 0)  # between neighbouring extrema q is monotone
+        place, cell = np.nonzero(
+            above[:, :-1] * above[:, 1:] < 0
+        )  # between neighbouring extrema q is monotone
         side, wanted = np.sign(above[place, cell]), levels[place]
         found = narrow(
             lambda t: side * (self.deformation(t) - wanted), edges[place, cell], edges[place, cell + 1],
@@ -194,13 +224,20 @@ class Mode(SignedAmplitudes):
     @property
     def _velocity_parts(self) -> tuple[float, float]:
         half = self.alpha / 2
-        return self.omega * self.sine - half * self.cosine, -self.omega * self.cosine - half * self.sine
+        return (
+            self.omega * self.sine - half * self.cosine,
+            -self.omega * self.cosine - half * self.sine,
+        )
 
     def _swing(self, t: Samples | float, cosine: float, sine: float) -> Samples:
         """exp(-alpha s/2) (cosine cos(omega s) + sine sin(omega s)) with s = t - origin."""
-        return self._of_waves(lambda decay, cos, sin: decay * (cosine * cos + sine * sin), t)
+        return self._of_waves(
+            lambda decay, cos, sin: decay * (cosine * cos + sine * sin), t
+        )
 
-    def _of_waves(self, make: Callable[[Samples, Samples, Samples], Samples], t: Samples | float) -> Samples:
+    def _of_waves(
+        self, make: Callable[[Samples, Samples, Samples], Samples], t: Samples | float
+    ) -> Samples:
         """Make something of exp(-alpha s/2), cos(omega s) and sin(omega s), of many times block by block."""
 
         def made(times: Samples) -> Samples:
@@ -211,10 +248,14 @@ class Mode(SignedAmplitudes):
         t = np.asarray(t, dtype=np.float64)
         if t.ndim != 1 or t.size <= BLOCK:
             return made(t)
-        return np.concatenate([made(t[first : first + BLOCK]) for first in range(0, t.size, BLOCK)])
+        return np.concatenate(
+            [made(t[first : first + BLOCK]) for first in range(0, t.size, BLOCK)]
+        )
 
 
-def energy_and_jacobian(parameters: Samples, s: Samples, size: int) -> tuple[Samples, Samples]:
+def energy_and_jacobian(
+    parameters: Samples, s: Samples, size: int
+) -> tuple[Samples, Samples]:
     """Return E(s), shape (n,), and its derivatives by the first ``size`` parameters, shape (size, n).
 
     The parameters are omega, alpha, cosine, sine, energy_plastic, preload of a `Mode` with its origin at s = 0.
@@ -225,7 +266,9 @@ def energy_and_jacobian(parameters: Samples, s: Samples, size: int) -> tuple[Sam
     swing = cosine * cos + sine * sin
     q = preload + swing
     twice = q + q
-    jacobian = np.empty((size, s.size))  # written in place: this is where identification spends its time
+    jacobian = np.empty(
+        (size, s.size)
+    )  # written in place: this is where identification spends its time
     by_rate = np.multiply(twice, s, out=jacobian[0])
     np.multiply(by_rate, swing, out=jacobian[1])
     jacobian[1] *= -0.5

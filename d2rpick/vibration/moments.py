@@ -46,7 +46,11 @@ class SampledEnergy:
 
     def energy(self, time: float) -> float:
         """E at a time: of the modes where they describe the record, of the samples elsewhere [energy]."""
-        return float(self.mode.energy(time)) if self.mode and self.described(time) else self.history.energy_at(time)
+        return (
+            float(self.mode.energy(time))
+            if self.mode and self.described(time)
+            else self.history.energy_at(time)
+        )
 
     def energies(self, times: Samples) -> Samples:
         """E at many times, of their shape [energy]."""
@@ -96,7 +100,9 @@ class OscillatorEnergy(SampledEnergy):
 
     mode: Mode
 
-    def __init__(self, history: History, td: float, fit: Identification, span: Span) -> None:
+    def __init__(
+        self, history: History, td: float, fit: Identification, span: Span
+    ) -> None:
         super().__init__(history, td)
         assert fit.mode
         self.fit, self.mode, self.span = fit, fit.mode, span
@@ -104,14 +110,23 @@ class OscillatorEnergy(SampledEnergy):
     @cached_property
     def sunk(self) -> str | None:
         """Say so when the vibration at td is no more than the scatter of the record about it."""
-        start, end = max(self.td - 2 * np.pi / self.mode.omega, self.span.start), max(self.td, self.span.start)
+        start, end = (
+            max(self.td - 2 * np.pi / self.mode.omega, self.span.start),
+            max(self.td, self.span.start),
+        )
         time, energy = self.history.between(start, end)
         vibration, fit = float(self.mode.vibration_energy(self.td)), self.fit
         fitted = fit.start <= start and end <= fit.end
-        if fitted and fit.rms * np.sqrt(self.history.time.size / time.size) < _DROWNED * vibration:
+        if (
+            fitted
+            and fit.rms * np.sqrt(self.history.time.size / time.size)
+            < _DROWNED * vibration
+        ):
             return None  # nor could it be, if all scatter of the fit lay here
         scatter = float(np.sqrt(np.mean((energy - self.mode.energy(time)) ** 2)))
-        if vibration > 0 and scatter <= _DROWNED * vibration:  # both may be too small for a number
+        if (
+            vibration > 0 and scatter <= _DROWNED * vibration
+        ):  # both may be too small for a number
             return None
         found = f"at td the vibration energy {vibration:.3g} is below the noise of the record, {scatter:.3g}"
         return f"{found}: the sign of the deformation is unknown"
@@ -135,8 +150,13 @@ class OscillatorEnergy(SampledEnergy):
 
     def crossings(self, since: float) -> Passages:
         """Times of the crossings: of the samples before the span, exact ones within it, and which of them rise."""
-        times = np.maximum(self.mode.level_crossings(self.td, self.before), self.span.start)
-        (sampled, up), rising = self.crossings_before(since), self.mode.energy_slopes(times)[0] > 0
+        times = np.maximum(
+            self.mode.level_crossings(self.td, self.before), self.span.start
+        )
+        (sampled, up), rising = (
+            self.crossings_before(since),
+            self.mode.energy_slopes(times)[0] > 0,
+        )
         return np.append(sampled, times), np.append(up, rising)
 
     def crossings_before(self, since: float) -> Passages:
@@ -154,12 +174,18 @@ class OscillatorEnergy(SampledEnergy):
 
     def edges(self) -> Samples:
         """Standstills and ends of the span, between which the energy runs monotone [time]."""
-        return np.concatenate([self.mode.extrema(float(self.history.time[0]), self.td), self.span])
+        return np.concatenate(
+            [self.mode.extrema(float(self.history.time[0]), self.td), self.span]
+        )
 
     def reach(self, times: Samples) -> Samples:
         """How far fit, sampling and printed digits leave the true time of the level open [time]."""
         return self._each(
-            times, lambda inside: fitted_reach(self.history, self.fit, self.mode, inside, self.td), super().reach
+            times,
+            lambda inside: fitted_reach(
+                self.history, self.fit, self.mode, inside, self.td
+            ),
+            super().reach,
         )
 
     def within(self, times: Samples) -> NDArray[np.bool_]:
@@ -167,7 +193,10 @@ class OscillatorEnergy(SampledEnergy):
         return (times >= self.span.start) & (times <= self.span.end)
 
     def _each(
-        self, times: Samples, inside: Callable[[Samples], Samples], outside: Callable[[Samples], Samples]
+        self,
+        times: Samples,
+        inside: Callable[[Samples], Samples],
+        outside: Callable[[Samples], Samples],
     ) -> Samples:
         """Give one thing for times in the window that the modes describe, another for those outside, of their shape."""
         here = self.within(times)
@@ -199,18 +228,30 @@ class Moments:
     def of(cls, kind: str, times: Samples | Sequence[float]) -> Moments:
         """Give moments of one kind, where nothing is said of how the energy runs."""
         none = np.zeros(len(times), np.int8)
-        return cls(np.array(times, dtype=float), none + np.int8(_KINDS.index(kind)), none)
+        return cls(
+            np.array(times, dtype=float), none + np.int8(_KINDS.index(kind)), none
+        )
 
     @classmethod
-    def of_level(cls, crossings: Samples, rising: NDArray[np.bool_], *others: Moments) -> Moments:
+    def of_level(
+        cls, crossings: Samples, rising: NDArray[np.bool_], *others: Moments
+    ) -> Moments:
         """Give crossings of the level, shape (k,), and after them other moments."""
-        kind, sides = np.zeros(crossings.size, np.int8), np.where(rising, 1, -1).astype(np.int8)
+        kind, sides = (
+            np.zeros(crossings.size, np.int8),
+            np.where(rising, 1, -1).astype(np.int8),
+        )
         return cls.joined([cls(crossings, kind, sides), *others])
 
     @classmethod
     def joined(cls, some: Iterable[Moments]) -> Moments:
         """Give some moments, and others after them."""
-        return cls(*map(np.concatenate, zip(*((one.tr, one.kind, one.rising) for one in some), strict=True)))
+        return cls(
+            *map(
+                np.concatenate,
+                zip(*((one.tr, one.kind, one.rising) for one in some), strict=True),
+            )
+        )
 
     def are(self, kind: str) -> NDArray[np.bool_]:
         """Which of them are of a kind."""
@@ -226,10 +267,16 @@ class Moments:
     def __getitem__(self, place: int) -> tuple[float, str, bool | None]:
         """Give tr, kind and whether it rises, None where the energy turns, of the moment at a place."""
         rising = int(self.rising[place])
-        return float(self.tr[place]), _KINDS[self.kind[place]], rising > 0 if rising else None
+        return (
+            float(self.tr[place]),
+            _KINDS[self.kind[place]],
+            rising > 0 if rising else None,
+        )
 
 
-def moments_of_mode(seen: Sequence[OscillatorEnergy], tolerance: float, since: Sequence[float]) -> list[Moments]:
+def moments_of_mode(
+    seen: Sequence[OscillatorEnergy], tolerance: float, since: Sequence[float]
+) -> list[Moments]:
     """Give the moments of one mode in one window, ascending in time, for each td that it is ``seen`` from.
 
     Standstills count within the ``tolerance``; crossings before each of ``since`` [time] may be left out.
@@ -237,16 +284,33 @@ def moments_of_mode(seen: Sequence[OscillatorEnergy], tolerance: float, since: S
     mode, td = seen[0].mode, np.array([one.td for one in seen])
     place, times = mode.all_level_crossings(td, seen[0].before)
     times = np.maximum(times, seen[0].span.start)
-    early = [one.crossings_before(first) for one, first in zip(seen, since, strict=True)]
+    early = [
+        one.crossings_before(first) for one, first in zip(seen, since, strict=True)
+    ]
     crossings = np.concatenate([*(sampled for sampled, _ in early), times])
-    rising = np.concatenate([*(up for _, up in early), mode.energy_slopes(times)[0] > 0])
+    rising = np.concatenate(
+        [*(up for _, up in early), mode.energy_slopes(times)[0] > 0]
+    )
     turns = seen[int(td.argmax())].standstills()
-    of, which = np.nonzero(turns < (td - _ZERO / mode.omega)[:, np.newaxis])  # td may be an extremum itself
+    of, which = np.nonzero(
+        turns < (td - _ZERO / mode.omega)[:, np.newaxis]
+    )  # td may be an extremum itself
     near = measures.lock_in_error(mode, turns[which], td[of]) <= tolerance
-    found = Moments.of_level(crossings, rising, Moments.of("extremum", turns[which[near]]))
-    place = np.concatenate([np.repeat(np.arange(td.size), [sampled.size for sampled, _ in early]), place, of[near]])
+    found = Moments.of_level(
+        crossings, rising, Moments.of("extremum", turns[which[near]])
+    )
+    place = np.concatenate(
+        [
+            np.repeat(np.arange(td.size), [sampled.size for sampled, _ in early]),
+            place,
+            of[near],
+        ]
+    )
     order = np.lexsort((found.tr, place))
-    found, ends = found.at(order), np.searchsorted(place[order], np.arange(td.size + 1)).tolist()
+    found, ends = (
+        found.at(order),
+        np.searchsorted(place[order], np.arange(td.size + 1)).tolist(),
+    )
     return [found.at(slice(*each)) for each in pairwise(ends)]
 
 
@@ -288,7 +352,12 @@ def sampled_reach(history: History, times: Samples, td: float, level: float) -> 
     at_td, _ = _cells(time, np.atleast_1d(td))
     bend = curvature(time, energy, times)
     # Newton's error of linear interpolation: E''/2 times the distances to both neighbours; zero on a sample.
-    off_td = float(curvature(time, energy, td)) * (td - time[at_td]) * (time[at_td + 1] - td) / 2
+    off_td = (
+        float(curvature(time, energy, td))
+        * (td - time[at_td])
+        * (time[at_td + 1] - td)
+        / 2
+    )
     curved = _BEND_RESERVE * (bend * interval**2 / 8 + off_td)
     of_tr, of_td = _rounding(history, times), _rounding(history, np.atleast_1d(td))
     most, square = (a + b for a, b in zip(of_tr, of_td, strict=True))
@@ -298,25 +367,38 @@ def sampled_reach(history: History, times: Samples, td: float, level: float) -> 
     return np.minimum(reach(slope, bend, error), 2 * interval)
 
 
-def fitted_reach(history: History, fit: Identification, mode: Mode, times: Samples, td: float) -> Samples:
+def fitted_reach(
+    history: History, fit: Identification, mode: Mode, times: Samples, td: float
+) -> Samples:
     """Distance to the true crossing where tr and the level come from the fitted oscillator.
 
     The energy error is that of the fitted curve at tr and at td: its standard deviation from the scatter of the
     record about it, and what of the misfit is no scatter.  Arguments and result as in ``sampled_reach``, without level.
     """
     both = np.append(times, td)
-    off = _DEVIATIONS * fit.energy_deviation(both) + _PEAK_OF_REST * _local_rest(fit, mode, both)
+    off = _DEVIATIONS * fit.energy_deviation(both) + _PEAK_OF_REST * _local_rest(
+        fit, mode, both
+    )
     error = off[:-1] + off[-1]
     slope, bend = mode.energy_slopes(times)
     distance = reach(np.abs(slope), np.abs(bend), error)
     # the fit, not the output interval, bounds how far a crossing can be off: it stays within a quarter of a period
-    quanta = _half_quanta(history.time_precision, times) + history.time_precision.quantum(td) / 2
-    return np.minimum(distance, np.pi / 2 / mode.omega) + _BETWEEN_SAMPLES * history.step + quanta
+    quanta = (
+        _half_quanta(history.time_precision, times)
+        + history.time_precision.quantum(td) / 2
+    )
+    return (
+        np.minimum(distance, np.pi / 2 / mode.omega)
+        + _BETWEEN_SAMPLES * history.step
+        + quanta
+    )
 
 
 def _local_rest(fit: Identification, mode: Mode, at: Samples) -> Samples:
     """Systematic rest of a fit near each time: its rms, and more where the vibration is above its own rms [energy]."""
-    return np.asarray(fit.structure * np.maximum(1.0, mode.vibration_energy(at) / fit.vibration))
+    return np.asarray(
+        fit.structure * np.maximum(1.0, mode.vibration_energy(at) / fit.vibration)
+    )
 
 
 def _cells(time: Samples, at: Samples) -> tuple[NDArray[np.intp], Samples]:
@@ -332,8 +414,13 @@ def _rounding(history: History, at: Samples) -> tuple[Samples, Samples]:
     """
     cell, interval = _cells(history.time, at)
     off = at - history.time[cell]
-    share, slope = off / interval, (history.energy[cell + 1] - history.energy[cell]) / interval
-    energies = _half_quanta(history.energy_precision, history.energy[cell] + slope * off)
+    share, slope = (
+        off / interval,
+        (history.energy[cell + 1] - history.energy[cell]) / interval,
+    )
+    energies = _half_quanta(
+        history.energy_precision, history.energy[cell] + slope * off
+    )
     times = slope * _half_quanta(history.time_precision, at)
     square = (energies**2 + times**2) / 3 * ((1 - share) ** 2 + share**2)
     return energies + np.abs(times), square
@@ -359,7 +446,9 @@ def curvature(time: Samples, energy: Samples, at: Samples | float) -> Samples:
     return np.asarray(second.max(axis=-1))
 
 
-def reach(slope: Samples | float, bend: Samples | float, error: Samples | float) -> Samples:
+def reach(
+    slope: Samples | float, bend: Samples | float, error: Samples | float
+) -> Samples:
     """How far in time a crossing can lie away when the energy there is wrong by ``error``.
 
     The smaller root x of slope x - bend x^2/2 = error; where there is none, the curve may turn before it
@@ -375,9 +464,14 @@ def reach(slope: Samples | float, bend: Samples | float, error: Samples | float)
     >>> float(reach(2.0, 0.0, 1.0)), float(reach(0.0, 2.0, 1.0))
     (0.5, 1.0)
     """
-    slope, bend, error = np.broadcast_arrays(*(np.asarray(v, dtype=np.float64) for v in (slope, bend, error)))
+    slope, bend, error = np.broadcast_arrays(
+        *(np.asarray(v, dtype=np.float64) for v in (slope, bend, error))
+    )
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        steep, curved = slope / error, bend / error  # per error: squares of energies might overflow
+        steep, curved = (
+            slope / error,
+            bend / error,
+        )  # per error: squares of energies might overflow
         root = steep**2 - 2 * curved
         regular = 2 / (steep + np.sqrt(np.maximum(root, 0)))
         turning = np.sqrt(2 / curved)

@@ -65,7 +65,9 @@ class Oscillator:
         for name in ("stiffness", "mass", "frame_mass"):
             if not _SMALLEST <= getattr(self, name) <= _LARGEST:
                 found = f"{name} is {getattr(self, name)}"
-                raise RangeError(f"{found}, a positive number from {_SMALLEST:g} to {_LARGEST:g} was expected")
+                raise RangeError(
+                    f"{found}, a positive number from {_SMALLEST:g} to {_LARGEST:g} was expected"
+                )
         if not np.isfinite(self.alpha):
             raise RangeError(f"alpha is {self.alpha}, a finite number was expected")
 
@@ -112,7 +114,10 @@ class Oscillator:
         deformation = cosine * r + sine * (vr + self.alpha / 2 * r)
         rate = cosine * vr - sine * (self.omega_0**2 * r + self.alpha / 2 * vr)
         centre, velocity = self._centre(start)
-        centre, velocity = centre + velocity * _drift(self.alpha, t), velocity * np.exp(-self.alpha * t)
+        centre, velocity = (
+            centre + velocity * _drift(self.alpha, t),
+            velocity * np.exp(-self.alpha * t),
+        )
         frame, suspended = self._share(self.mass), self._share(self.frame_mass)
         z, y = centre - frame * deformation, centre + suspended * deformation
         return State(z, y, velocity - frame * rate, velocity + suspended * rate)
@@ -140,17 +145,28 @@ class Oscillator:
 
         def displacement(share: float) -> Values:
             swing = share * amplitude * turn_row
-            left = [swing.real, -swing.imag, centre + velocity * drift_row, velocity * slow_row]
-            table = np.stack(left, axis=1) @ np.stack([turn.real, turn.imag, np.ones(columns), drift])
+            left = [
+                swing.real,
+                -swing.imag,
+                centre + velocity * drift_row,
+                velocity * slow_row,
+            ]
+            table = np.stack(left, axis=1) @ np.stack(
+                [turn.real, turn.imag, np.ones(columns), drift]
+            )
             return np.asarray(table.ravel()[:count])
 
         def speed(share: float) -> Values:
             swing = share * rate * amplitude * turn_row
             table = np.stack([swing.real, -swing.imag, velocity * slow_row], axis=1)
-            return np.asarray((table @ np.stack([turn.real, turn.imag, slow])).ravel()[:count])
+            return np.asarray(
+                (table @ np.stack([turn.real, turn.imag, slow])).ravel()[:count]
+            )
 
         frame, suspended = -self._share(self.mass), self._share(self.frame_mass)
-        states = State(displacement(frame), displacement(suspended), speed(frame), speed(suspended))
+        states = State(
+            displacement(frame), displacement(suspended), speed(frame), speed(suspended)
+        )
         for column, value in zip(states, start, strict=True):
             column[:1] = value  # exact, as it was given
         return states
@@ -173,11 +189,16 @@ class Oscillator:
 
     def vibration_energy(self, state: State) -> Values:
         """Energy of the vibration: of the spring, and mu r'^2/2 of the masses against each other [energy]."""
-        return np.asarray(self.internal_energy(state) + self.reduced_mass / 2 * (state.vy - state.vz) ** 2)
+        return np.asarray(
+            self.internal_energy(state)
+            + self.reduced_mass / 2 * (state.vy - state.vz) ** 2
+        )
 
     def kinetic_energy(self, state: State) -> Values:
         """Kinetic energy of both masses [energy]."""
-        return np.asarray(self.frame_mass / 2 * state.vz**2 + self.mass / 2 * state.vy**2)
+        return np.asarray(
+            self.frame_mass / 2 * state.vz**2 + self.mass / 2 * state.vy**2
+        )
 
     def _share(self, mass: float) -> float:
         return mass / (self.frame_mass + self.mass)
@@ -185,7 +206,10 @@ class Oscillator:
     def _centre(self, state: State) -> tuple[Values, Values]:
         """Displacement and velocity of the centre of mass; (8) is the velocity."""
         frame, suspended = self._share(self.frame_mass), self._share(self.mass)
-        return frame * state.z + suspended * state.y, frame * state.vz + suspended * state.vy
+        return (
+            frame * state.z + suspended * state.y,
+            frame * state.vz + suspended * state.vy,
+        )
 
     def _vibration(self, t: Values) -> tuple[Values, Values]:
         """exp(-alpha t/2) times cos(omega_2 t) and sin(omega_2 t)/omega_2, continued to any damping.
@@ -200,14 +224,20 @@ class Oscillator:
             return decay * np.cos(omega * t), decay * t * np.sinc(omega * t / np.pi)
         kappa = np.sqrt(-square)
         slow = np.exp(-(self.omega_0**2) / (self.alpha / 2 + kappa) * t)
-        return slow * (1 + np.exp(-2 * kappa * t)) / 2, slow * -np.expm1(-2 * kappa * t) / (2 * kappa)
+        return slow * (1 + np.exp(-2 * kappa * t)) / 2, slow * -np.expm1(
+            -2 * kappa * t
+        ) / (2 * kappa)
 
 
 def _drift(alpha: float, t: Values) -> Values:
     """s(t) = (1 - exp(-alpha t))/alpha, the way of a damped body of unit speed; t where alpha is 0."""
     damping = alpha * t
     # of the smallest products the quotient keeps no digits; there two terms of the series are exact
-    return np.where(np.abs(damping) < 1e-8, t * (1 - damping / 2), -np.expm1(-damping) / (alpha or 1.0))
+    return np.where(
+        np.abs(damping) < 1e-8,
+        t * (1 - damping / 2),
+        -np.expm1(-damping) / (alpha or 1.0),
+    )
 
 
 def lacking_energy(oscillator: Oscillator, reference: State, switched: State) -> Values:
@@ -240,7 +270,9 @@ def to_mode(oscillator: Oscillator, v0: float) -> Mode:
         raise RangeError(f"{found}, less than {2 * oscillator.omega_0:g} was expected")
     sine = -v0 / omega * sqrt(oscillator.stiffness / 2)
     if not abs(sine) <= sqrt(LARGEST_ENERGY):
-        raise RangeError(f"v0 is {v0:g}: it gives energies above {LARGEST_ENERGY:g}; choose units of moderate numbers")
+        raise RangeError(
+            f"v0 is {v0:g}: it gives energies above {LARGEST_ENERGY:g}; choose units of moderate numbers"
+        )
     return Mode(omega=omega, alpha=oscillator.alpha, cosine=0.0, sine=sine, origin=0.0)
 
 
@@ -276,11 +308,15 @@ class Replay:
         released = self.oscillator.rigid(self.reference(self.tr), self.td - self.tr)
         phases = (
             self.reference(np.minimum(time, self.tr)),
-            self.oscillator.rigid(self.reference(self.tr), np.clip(time - self.tr, 0, self.td - self.tr)),
+            self.oscillator.rigid(
+                self.reference(self.tr), np.clip(time - self.tr, 0, self.td - self.tr)
+            ),
             self.oscillator.free(released, np.maximum(time - self.td, 0)),
         )
         phase = np.where(time < self.tr, 0, np.where(time < self.td, 1, 2))
-        return State(*(np.choose(phase, values) for values in zip(*phases, strict=True)))
+        return State(
+            *(np.choose(phase, values) for values in zip(*phases, strict=True))
+        )
 
     def residual(self) -> float:
         """Energy norm of what the switched run lacks at td, over that of the reference vibration [-]."""
@@ -299,7 +335,11 @@ class Trajectory(NamedTuple):
 
 
 def trajectory(
-    oscillator: Oscillator, start: State, t_end: float, dt: float, switched: Replay | None = None
+    oscillator: Oscillator,
+    start: State,
+    t_end: float,
+    dt: float,
+    switched: Replay | None = None,
 ) -> Trajectory:
     """Compute the motion at 0, dt, 2 dt, ... up to ``t_end``, of ``switched`` where it is given [time].
 
@@ -309,8 +349,22 @@ def trajectory(
     count = int(np.floor(t_end / dt * (1 + 1e-12))) + 1
     with np.errstate(all="ignore"):
         time = np.round(dt * np.arange(count), 13 - int(np.floor(np.log10(t_end))))
-        state = oscillator.free_on_grid(start, dt, count) if switched is None else switched.motion(time)
-        motion = Trajectory(time, state, oscillator.internal_energy(state), oscillator.kinetic_energy(state))
-    if not all(np.isfinite(column).all() for column in (time, *state, motion.internal_energy, motion.kinetic_energy)):
-        raise RangeError("the motion exceeds the range of numbers; choose units that give moderate numbers")
+        state = (
+            oscillator.free_on_grid(start, dt, count)
+            if switched is None
+            else switched.motion(time)
+        )
+        motion = Trajectory(
+            time,
+            state,
+            oscillator.internal_energy(state),
+            oscillator.kinetic_energy(state),
+        )
+    if not all(
+        np.isfinite(column).all()
+        for column in (time, *state, motion.internal_energy, motion.kinetic_energy)
+    ):
+        raise RangeError(
+            "the motion exceeds the range of numbers; choose units that give moderate numbers"
+        )
     return motion

@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 _CLEARLY = 0.5
 
 
-def by_own_mode(time: Samples, energy: Samples, followed: PartMotion | None) -> PartMotion | None:
+def by_own_mode(
+    time: Samples, energy: Samples, followed: PartMotion | None
+) -> PartMotion | None:
     """Give a part the motion of one mode if that describes its energy and leaves clearly less than ``followed``."""
     fit = identify(time, energy, quick=True)
     if fit.mode is None or not _purely_vibrates(fit):
@@ -41,7 +43,11 @@ def by_own_mode(time: Samples, energy: Samples, followed: PartMotion | None) -> 
 
 def _purely_vibrates(fit: Identification) -> bool:
     """Whether a fit describes the record without a plastic rest or preload: these may be a plane of a rate close by."""
-    return bool(fit.describes_record and fit.mode and not (fit.mode.energy_plastic or fit.mode.preload))
+    return bool(
+        fit.describes_record
+        and fit.mode
+        and not (fit.mode.energy_plastic or fit.mode.preload)
+    )
 
 
 # A deformation that swings about zero is zero on average; beyond this share of its mean size it swings about
@@ -50,7 +56,9 @@ _MOST_OFF_CENTRE = 0.5
 # Parts without a sign are left out where they hold no more than this share of the energy: D changes by 0.2 at most,
 # the default tolerance.
 MOST_UNSIGNED = 0.01
-_NOT_FOLLOWED = "no few modes have its energy, with the signs that its minima give or on their own"
+_NOT_FOLLOWED = (
+    "no few modes have its energy, with the signs that its minima give or on their own"
+)
 
 
 class PartMatch(NamedTuple):
@@ -97,7 +105,9 @@ class SignedParts(SignedAmplitudes):
     """
 
     kinetic = "the modes found in each part add up to"
-    undescribed = "the signs of the parts' deformations cannot be followed from here to td"
+    undescribed = (
+        "the signs of the parts' deformations cannot be followed from here to td"
+    )
 
     def __init__(self, time: Samples, energies: Samples, names: Sequence[str]) -> None:
         self.time, self._names, self._energies = time, names, energies
@@ -113,16 +123,22 @@ class SignedParts(SignedAmplitudes):
             lost += 0.0 if motion else held[i]
             if lost > MOST_UNSIGNED * held.sum():
                 break
-        self.unsigned_share = float(lost / held.sum()) if lost else float(not held.any())
+        self.unsigned_share = (
+            float(lost / held.sum()) if lost else float(not held.any())
+        )
 
     def _roots(self) -> Samples:
         """Roots of the energies, shape (k, n): not kept, since there may be a window for each td."""
         return np.sqrt(np.maximum(self._energies.T, 0.0), order="C")
 
-    def _by_zeros(self, places: Places, roots: Samples) -> Iterator[tuple[int, PartMotion | str]]:
+    def _by_zeros(
+        self, places: Places, roots: Samples
+    ) -> Iterator[tuple[int, PartMotion | str]]:
         """Read the signs of parts from the zeros of their energy, or why there are none."""
         lasting = np.gradient(self.time)
-        for i, own in zip(places.tolist(), all_zeros(self.time, roots[places]), strict=True):
+        for i, own in zip(
+            places.tolist(), all_zeros(self.time, roots[places]), strict=True
+        ):
             root = roots[i]
             tracked = np.where(np.searchsorted(own.sure, self.time) % 2, -root, root)
             reason = _no_sign(lasting, tracked, own.sure)
@@ -132,7 +148,10 @@ class SignedParts(SignedAmplitudes):
     @cached_property
     def _all(self) -> list[PartMotion | str]:
         """All parts: where too much has no sign, no mode of their own is looked for in those that hold less."""
-        found = {**self._main, **dict(self._by_zeros(self._order[len(self._main) :], self._roots()))}
+        found = {
+            **self._main,
+            **dict(self._by_zeros(self._order[len(self._main) :], self._roots())),
+        }
         return [found[i] for i in sorted(found)]
 
     @property
@@ -148,7 +167,11 @@ class SignedParts(SignedAmplitudes):
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Of the k parts that have a sign."""
-        return tuple(name for name, known in zip(self._names, self._all, strict=True) if isinstance(known, PartMotion))
+        return tuple(
+            name
+            for name, known in zip(self._names, self._all, strict=True)
+            if isinstance(known, PartMotion)
+        )
 
     @cached_property
     def motions(self) -> tuple[PartMotion, ...]:
@@ -159,12 +182,19 @@ class SignedParts(SignedAmplitudes):
     def unsigned(self) -> tuple[PartMatch, ...]:
         """Parts that were left out."""
         all_parts = zip(self._names, self._all, strict=True)
-        return tuple(PartMatch(name, None, None, why) for name, why in all_parts if isinstance(why, str))
+        return tuple(
+            PartMatch(name, None, None, why)
+            for name, why in all_parts
+            if isinstance(why, str)
+        )
 
     @cached_property
     def owner(self) -> Places:
         """Place in ``names`` of the part of each deformation: a part has one for each of its modes."""
-        return np.repeat(np.arange(len(self.names)), [len(one.model.amplitudes(0.0)) for one in self.motions])
+        return np.repeat(
+            np.arange(len(self.names)),
+            [len(one.model.amplitudes(0.0)) for one in self.motions],
+        )
 
     def amplitudes(self, t: Samples | float) -> Samples:
         """Signed deformations of the parts' modes, of the shape of ``t`` with an axis before it [sqrt(energy)]."""
@@ -172,34 +202,52 @@ class SignedParts(SignedAmplitudes):
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
         """Kinetic energy of the vibration, T [energy]."""
-        return np.asarray(np.sum([one.model.kinetic_energy(t) for one in self.motions], axis=0))
+        return np.asarray(
+            np.sum([one.model.kinetic_energy(t) for one in self.motions], axis=0)
+        )
 
     def vibration_energy(self, t: Samples | float) -> Samples:
         """Energy of the vibration, V = E + T [energy]."""
-        return np.asarray(np.sum([one.model.vibration_energy(t) for one in self.motions], axis=0))
+        return np.asarray(
+            np.sum([one.model.vibration_energy(t) for one in self.motions], axis=0)
+        )
 
     def unseen(self, t: Samples | float, td: float) -> Samples:
         """Share of the vibration energy at td that further modes, and parts left out, may have at ``t`` [-]."""
         beside = self.unsigned_share / (1 - self.unsigned_share)
-        hidden = [(one.hidden + beside) * one.model.vibration_energy(t) for one in self.motions]
+        hidden = [
+            (one.hidden + beside) * one.model.vibration_energy(t)
+            for one in self.motions
+        ]
         return np.asarray(np.sum(hidden, axis=0) / self.vibration_energy(td))
 
     def known_at(self, td: float) -> bool:
         """Whether the energy of the vibration is above a solver's errors at td."""
-        return bool(self.vibration_energy(td) >= SOLVER_FLOOR * np.max(self.vibration_energy(self.time)))
+        return bool(
+            self.vibration_energy(td)
+            >= SOLVER_FLOOR * np.max(self.vibration_energy(self.time))
+        )
 
     def profile(self, td: float) -> Profile:
         """Lock-in errors at the times before ``td`` whose sign can be compared with that at td."""
         since = np.searchsorted(self.time, self.comparable_since(td))
-        return Profile.of(self, self.time[since:], td)  # a copy for each td would fill the memory
+        return Profile.of(
+            self, self.time[since:], td
+        )  # a copy for each td would fill the memory
 
-    def residual_band(self, stated: Samples, tr: Samples, td: float) -> tuple[Samples, Samples, Samples]:
+    def residual_band(
+        self, stated: Samples, tr: Samples, td: float
+    ) -> tuple[Samples, Samples, Samples]:
         """Residual of each tr (n,) as it is stated, which is the least one, and the largest [-]."""
         return measures.band_up_to(self.residual_bound, stated, tr, td)
 
     def residual_bound(self, residual: Samples, tr: Samples, td: float) -> Samples:
         """Largest residual of each tr of shape (n,), if what may be hidden stood opposed at tr and td [-]."""
-        return np.asarray(np.hypot(residual, np.sqrt(self.unseen(tr, td)) + np.sqrt(self.unseen(td, td))))
+        return np.asarray(
+            np.hypot(
+                residual, np.sqrt(self.unseen(tr, td)) + np.sqrt(self.unseen(td, td))
+            )
+        )
 
     def comparable_since(self, td: float) -> float:
         """Earliest time whose signs can be compared with those at ``td``: the last unclear one before it [time]."""
@@ -221,11 +269,23 @@ def _no_sign(lasting: Samples, deformation: Samples, zeros: Samples) -> str | No
 _NAMED_TOGETHER = 0.8
 
 
-def contributions(vibration: SignedParts, tr: float, td: float) -> tuple[PartMatch, ...]:
+def contributions(
+    vibration: SignedParts, tr: float, td: float
+) -> tuple[PartMatch, ...]:
     """Give the match of each part, that with the largest share first, then those without a sign."""
-    shares = np.bincount(vibration.owner, measures.mismatch_shares(vibration, tr, td)).tolist()
-    same = np.bincount(vibration.owner, vibration.amplitudes(tr) * vibration.amplitudes(td)) >= 0
-    matches = [PartMatch(*row) for row in zip(vibration.names, same.tolist(), shares, strict=True)]
+    shares = np.bincount(
+        vibration.owner, measures.mismatch_shares(vibration, tr, td)
+    ).tolist()
+    same = (
+        np.bincount(
+            vibration.owner, vibration.amplitudes(tr) * vibration.amplitudes(td)
+        )
+        >= 0
+    )
+    matches = [
+        PartMatch(*row)
+        for row in zip(vibration.names, same.tolist(), shares, strict=True)
+    ]
     matches.sort(key=lambda one: -(one.share or 0.0))
     return (*matches, *vibration.unsigned)
 
@@ -242,6 +302,8 @@ def main_contributors(matches: Sequence[PartMatch]) -> str:
     for match in matches:
         if match.share is None or sum_of_shares >= _NAMED_TOGETHER:
             break
-        named.append(f"{match.name} {match.share * 100:.0f} %{'' if match.sign_match else ' (opposite sign)'}")
+        named.append(
+            f"{match.name} {match.share * 100:.0f} %{'' if match.sign_match else ' (opposite sign)'}"
+        )
         sum_of_shares += match.share
     return ", ".join(named)

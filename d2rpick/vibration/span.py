@@ -22,10 +22,14 @@ if TYPE_CHECKING:
     class Fitter(Protocol):
         """Gives the oscillator for some samples; ``quick`` where a refusal needs no more than a few of them."""
 
-        def __call__(self, time: Samples, energy: Samples, *, quick: bool = False) -> Identification:
+        def __call__(
+            self, time: Samples, energy: Samples, *, quick: bool = False
+        ) -> Identification:
             """Fit and judge an oscillator, as `identify` does."""
 
-    Reach = Callable[[float, Identification], "Span | None"]  # how far the record around a time stays with a fit
+    Reach = Callable[
+        [float, Identification], "Span | None"
+    ]  # how far the record around a time stays with a fit
 
     class Damped(Protocol):
         """What is fitted to an energy: a mode, or waves whose deformations add up."""
@@ -108,14 +112,18 @@ def described_span(
     reach = partial(_reach, history, bounds, memory or Memory())
     refused = {}
     for window in _windows(td, bounds, whole=whole):
-        span, fit = _grow(history, td, window, bounds, fitter if window == up_to_td else quick, reach)
+        span, fit = _grow(
+            history, td, window, bounds, fitter if window == up_to_td else quick, reach
+        )
         if span:
             return span, fit
         refused[window] = fit
     return None, refused[up_to_td]
 
 
-def _reach(history: History, bounds: Span, memory: Memory, anchor: float, fit: Identification) -> Span | None:
+def _reach(
+    history: History, bounds: Span, memory: Memory, anchor: float, fit: Identification
+) -> Span | None:
     """Give the `span_of` a fit; all times in it have the same but for rounding, and every td near it asks for it."""
     known = memory.once(("spans", fit.mode, fit.rms, fit.structure, bounds), list[Span])
     span = next((one for one in known if one.start <= anchor <= one.end), None)
@@ -124,7 +132,9 @@ def _reach(history: History, bounds: Span, memory: Memory, anchor: float, fit: I
     return span
 
 
-def span_of(history: History, anchor: float, fit: Identification, bounds: Span) -> Span | None:
+def span_of(
+    history: History, anchor: float, fit: Identification, bounds: Span
+) -> Span | None:
     """Find the window around ``anchor`` [time], within ``bounds``, in which the record stays with ``fit``.
 
     It ends where the energy drifts off the fit; None when it is off at the anchor itself.
@@ -132,22 +142,34 @@ def span_of(history: History, anchor: float, fit: Identification, bounds: Span) 
     assert fit.mode is not None
     time, energy = history.between(*bounds)
     period = 2 * np.pi / fit.mode.omega
-    typical = float(np.partition(np.diff(time), (time.size - 1) // 2)[(time.size - 1) // 2])
+    typical = float(
+        np.partition(np.diff(time), (time.size - 1) // 2)[(time.size - 1) // 2]
+    )
     width = max(3, round(period / _MEANS_PER_PERIOD / typical))
     room = max(_ERRORS_OFF * fit.rms / np.sqrt(width), _STRUCTURES_OFF * fit.structure)
     middle = int(np.searchsorted(time, anchor))
     behind, ahead = width // 2, (width - 1) // 2
     after = _first_off(time, energy, fit.mode, room, middle, behind, ahead)
-    before = _first_off(time[::-1], energy[::-1], fit.mode, room, time.size - middle, ahead, behind)
+    before = _first_off(
+        time[::-1], energy[::-1], fit.mode, room, time.size - middle, ahead, behind
+    )
     # the mean over ``width`` samples reaches half as far beyond its middle
     left = 0 if before is None else time.size - before + width // 2
     right = time.size - 1 if after is None else after - 1 - width // 2
     return Span(float(time[left]), float(time[right])) if left < right else None
 
 
-@np.errstate(over="ignore", invalid="ignore")  # far off, a damped fit grows beyond all numbers
+@np.errstate(
+    over="ignore", invalid="ignore"
+)  # far off, a damped fit grows beyond all numbers
 def _first_off(
-    time: Samples, energy: Samples, mode: Mode, room: float, first: int, behind: int, ahead: int
+    time: Samples,
+    energy: Samples,
+    mode: Mode,
+    room: float,
+    first: int,
+    behind: int,
+    ahead: int,
 ) -> int | None:
     """Place of the first mean, from the ``first`` on, that is off by more than ``room`` [energy] and the share allowed.
 
@@ -158,7 +180,9 @@ def _first_off(
         off = energy[inside] - mode.energy(time[inside])
         means = np.abs(_means(off, begin - inside.start, behind, ahead)[:BLOCK])
         loud = np.flatnonzero(~(means <= room))
-        far = loud[~(means[loud] <= _SHARE_OFF * mode.vibration_energy(time[begin + loud]))]
+        far = loud[
+            ~(means[loud] <= _SHARE_OFF * mode.vibration_energy(time[begin + loud]))
+        ]
         if far.size:
             return begin + int(far[0])
     return None
@@ -177,20 +201,46 @@ def _means(values: Samples, first: int, behind: int, ahead: int) -> Samples:
 def _windows(td: float, bounds: Span, *, whole: bool) -> Iterator[Span]:
     """Windows to try: around td, the longest first, then before td."""
     start, end = bounds
-    beginnings = [start, *(_mark(td - share * (td - start), bounds) for share in (() if whole else _BEGINNINGS))]
-    ends = [end, _mark(td, bounds), *(_mark(td + share * (end - td), bounds, 1) for share in (() if whole else _ENDS))]
-    around = {Span(beginning, late) for beginning in beginnings for late in ends if beginning < late}
+    beginnings = [
+        start,
+        *(
+            _mark(td - share * (td - start), bounds)
+            for share in (() if whole else _BEGINNINGS)
+        ),
+    ]
+    ends = [
+        end,
+        _mark(td, bounds),
+        *(
+            _mark(td + share * (end - td), bounds, 1)
+            for share in (() if whole else _ENDS)
+        ),
+    ]
+    around = {
+        Span(beginning, late)
+        for beginning in beginnings
+        for late in ends
+        if beginning < late
+    }
     around.add(Span(start, _mark(td, bounds)))
     yield from sorted(around, key=lambda window: window.start - window.end)
     if not whole:
         for share in _EARLIER_ENDS:
             early = _mark(td - share * (td - start), bounds)
-            yield from (Span(beginning, early) for beginning in dict.fromkeys(beginnings) if beginning < early)
+            yield from (
+                Span(beginning, early)
+                for beginning in dict.fromkeys(beginnings)
+                if beginning < early
+            )
 
 
 def _mark(time: float, bounds: Span, after: int = 0) -> float:
     """Give the last mark that is not after ``time``, or the one ``after`` it; where there is none, the time itself."""
-    share = (time - bounds.start) / (bounds.end - bounds.start) if bounds.end > bounds.start else 0.0
+    share = (
+        (time - bounds.start) / (bounds.end - bounds.start)
+        if bounds.end > bounds.start
+        else 0.0
+    )
     if not 0 < share <= 1:
         return time
     place = ceil(log(share) / log(_MARKS)) - after
@@ -198,14 +248,22 @@ def _mark(time: float, bounds: Span, after: int = 0) -> float:
 
 
 def _grow(
-    history: History, td: float, window: Span, bounds: Span, fitter: Fitter, reach: Reach
+    history: History,
+    td: float,
+    window: Span,
+    bounds: Span,
+    fitter: Fitter,
+    reach: Reach,
 ) -> tuple[Span | None, Identification]:
     """Fit a window, extend it while the record stays with the fit, refit, repeat until it stays."""
     fit, span = fitter(*history.between(*window)), window
     for _ in range(_MOST_REFITS):
         if not fit.follows or fit.mode is None:
             return None, fit
-        least = max(_LEAST_PERIODS * 2 * np.pi / fit.mode.omega, _MOST * (window.end - window.start))
+        least = max(
+            _LEAST_PERIODS * 2 * np.pi / fit.mode.omega,
+            _MOST * (window.end - window.start),
+        )
         # of a period far beyond the record, means over a part of it would be of far more samples than there are
         possible = least <= bounds.end - bounds.start
         grown = reach(min(td, window.end), fit) if possible else None
@@ -222,7 +280,12 @@ def _grow(
 
 
 def _cleared(
-    history: History, span: Span, fit: Identification, bounds: Span, fitter: Fitter, reach: Reach
+    history: History,
+    span: Span,
+    fit: Identification,
+    bounds: Span,
+    fitter: Fitter,
+    reach: Reach,
 ) -> tuple[Span, Identification]:
     """Fit the window once more without half a period at the ends where the record leaves it.
 
@@ -249,9 +312,16 @@ class Fits(Memory):
     def remembered(self, name: str, fitter: Fitter) -> Fitter:
         """Give a fitter that does as ``fitter``, which has this name, and fits no window twice."""
 
-        def fit(time: Samples, energy: Samples, *, quick: bool = False) -> Identification:
-            window = (*time[:1].tolist(), *time[-1:].tolist())  # of one record, so the ends tell the samples
-            return self.once((name, quick, *window), lambda: fitter(time, energy, quick=quick))
+        def fit(
+            time: Samples, energy: Samples, *, quick: bool = False
+        ) -> Identification:
+            window = (
+                *time[:1].tolist(),
+                *time[-1:].tolist(),
+            )  # of one record, so the ends tell the samples
+            return self.once(
+                (name, quick, *window), lambda: fitter(time, energy, quick=quick)
+            )
 
         return fit
 
@@ -260,7 +330,9 @@ class Fits(Memory):
 SMALLEST: Final = 1e-3
 _MOST_LINES: Final = 8192  # bounds the work; enough for 800 periods of the energy
 _FINER: Final = 4  # points per line of a spectrum, so that its top is met
-_CELLS_PER_PERIOD: Final = 4  # of the fastest line: below, the means over cells would hide most of it
+_CELLS_PER_PERIOD: Final = (
+    4  # of the fastest line: below, the means over cells would hide most of it
+)
 
 
 def hidden_share(time: Samples, energy: Samples, model: Damped) -> float:
@@ -288,7 +360,9 @@ def hidden_share(time: Samples, energy: Samples, model: Damped) -> float:
     return min(2 * amplitude / float(model.vibration_energy(time[0])), 1.0)
 
 
-def residual_bound(fit: Identification, residual: Samples, tr: Samples, td: Samples | float) -> Samples:
+def residual_bound(
+    fit: Identification, residual: Samples, tr: Samples, td: Samples | float
+) -> Samples:
     """Largest residual of each tr of shape (n,) with the energy that a hidden mode may have, at worst [-].
 
     It then stood at tr at one end of its swing and at td at the other, where it is smaller by the damping in between:

@@ -78,7 +78,9 @@ class Swings(SignedAmplitudes):
 
     def vibration_energy(self, t: Samples | float) -> Samples:
         """Energy of the vibration, at least the elastic one [energy]."""
-        return np.asarray(np.maximum(self.envelope.vibration_energy(t), self.amplitudes(t)[0] ** 2))
+        return np.asarray(
+            np.maximum(self.envelope.vibration_energy(t), self.amplitudes(t)[0] ** 2)
+        )
 
     def comparable_since(self, td: float) -> float:
         """Earliest time whose sign can be compared with that at ``td`` [time]."""
@@ -87,21 +89,31 @@ class Swings(SignedAmplitudes):
 
     def known_at(self, td: float) -> bool:
         """Whether the swings before ``td`` were counted, two at least, and more than the error of a solver vibrates."""
-        counted = np.count_nonzero((self.bottoms > self.comparable_since(td)) & (self.bottoms < td))
-        return bool(counted > 1 and self.envelope.vibration_energy(td) >= self.envelope.floor)
+        counted = np.count_nonzero(
+            (self.bottoms > self.comparable_since(td)) & (self.bottoms < td)
+        )
+        return bool(
+            counted > 1 and self.envelope.vibration_energy(td) >= self.envelope.floor
+        )
 
     def profile(self, td: float) -> Profile:
         """Lock-in errors at the times before ``td`` whose sign can be compared with that at td."""
         since = np.searchsorted(self.time, self.comparable_since(td))
-        return Profile.of(self, self.time[since:], td)  # a copy for each td would fill the memory
+        return Profile.of(
+            self, self.time[since:], td
+        )  # a copy for each td would fill the memory
 
-    def residual_band(self, stated: Samples, tr: Samples, td: float) -> tuple[Samples, Samples, Samples]:
+    def residual_band(
+        self, stated: Samples, tr: Samples, td: float
+    ) -> tuple[Samples, Samples, Samples]:
         """Residual of each tr (n,) as it is stated, which is the least one, and the largest [-]."""
         return measures.band_up_to(self.residual_bound, stated, tr, td)
 
     def residual_bound(self, residual: Samples, tr: Samples, td: float) -> Samples:
         """Largest residual of each tr (n,): of any spring, with what may hide in the floor at its worst [-]."""
-        hidden = np.minimum(_OF_THE_FLOOR * np.sqrt(self.unseen(tr, td)), wrong_sign(0.0))
+        hidden = np.minimum(
+            _OF_THE_FLOOR * np.sqrt(self.unseen(tr, td)), wrong_sign(0.0)
+        )
         return np.asarray(np.hypot(_OF_ANY_SPRING * residual, hidden))
 
     def unseen(self, tr: Samples | float, td: float) -> Samples:
@@ -112,7 +124,9 @@ class Swings(SignedAmplitudes):
         first = np.clip(np.searchsorted(self.bottoms, np.atleast_1d(tr)) - 1, 0, None)
         last = int(np.searchsorted(self.bottoms, td)) + 1
         around = [self.floor[min(at, last - 1) : last] for at in first.tolist()]
-        energies = np.array([min(float(np.ptp(one)), float(np.abs(one).max())) for one in around])
+        energies = np.array(
+            [min(float(np.ptp(one)), float(np.abs(one).max())) for one in around]
+        )
         return energies / float(self.vibration_energy(td))
 
 
@@ -133,7 +147,9 @@ def count_swings(time: Samples, energy: Samples) -> Swings | None:
     >>> count_swings(t, np.sin(8.0 * t) ** 2 + np.sin(13.0 * t) ** 2)
     """
     at, open_end = _turns(energy)
-    low = energy[at] < energy[np.roll(at, 1)] if at.size > 1 else np.zeros(0, dtype=bool)
+    low = (
+        energy[at] < energy[np.roll(at, 1)] if at.size > 1 else np.zeros(0, dtype=bool)
+    )
     low[:1] = ~low[1:2]
     if np.count_nonzero(low) < _FEWEST:
         return None
@@ -151,7 +167,9 @@ def count_swings(time: Samples, energy: Samples) -> Swings | None:
         return None
     turned = np.searchsorted(bottom, time) % 2 == 1
     deformation = np.where(turned, -np.sqrt(elastic), np.sqrt(elastic))
-    unclear = np.sort(np.concatenate([bottom[off], time[[1, open_end]]]))  # next to the ends a minimum is not seen
+    unclear = np.sort(
+        np.concatenate([bottom[off], time[[1, open_end]]])
+    )  # next to the ends a minimum is not seen
     return Swings(time, deformation, unclear, whole, bottom, floor)
 
 
@@ -169,7 +187,10 @@ def _is_beat(bottom: Samples, floor: Samples, top: Samples, peak: Samples) -> bo
         The maxima between them [time], and the energy there.
     """
     middle = (bottom[1:] + bottom[:-1]) / 2
-    lasting, height = np.diff(bottom), np.interp(middle, top, peak) - np.interp(middle, bottom, floor)
+    lasting, height = (
+        np.diff(bottom),
+        np.interp(middle, top, peak) - np.interp(middle, bottom, floor),
+    )
     longer, higher = np.diff(lasting), np.diff(height)
     uneven = np.abs(longer) > _UNEVEN * (lasting[1:] + lasting[:-1])
     opposed = uneven & (longer * higher < 0)
@@ -192,23 +213,33 @@ def _turns(energy: Samples) -> tuple[NDArray[np.intp], int]:
             found.append(at)
             swing, before = abs(extreme - before) or swing, extreme
             extreme, at, direction = value, place, -direction
-    return np.array([one for one in found if one > 0], dtype=np.intp), last if direction > 0 else min(at, last)
+    return np.array(
+        [one for one in found if one > 0], dtype=np.intp
+    ), last if direction > 0 else min(at, last)
 
 
 def _along(time: Samples, x: Samples, y: Samples) -> Samples:
     """Straight lines through points, and on beyond the first and the last two of them."""
     first, last = (
-        y[i] + (y[j] - y[i]) / (x[j] - x[i]) * (t - x[i]) for i, j, t in ((0, 1, time[0]), (-1, -2, time[-1]))
+        y[i] + (y[j] - y[i]) / (x[j] - x[i]) * (t - x[i])
+        for i, j, t in ((0, 1, time[0]), (-1, -2, time[-1]))
     )
-    return np.asarray(np.interp(time, np.array([time[0], *x, time[-1]]), np.array([first, *y, last])))
+    return np.asarray(
+        np.interp(time, np.array([time[0], *x, time[-1]]), np.array([first, *y, last]))
+    )
 
 
 def _off_line(x: Samples, y: Samples) -> Samples:
     """How far each of n >= 3 values lies off the straight line through its neighbours, or next two at an end."""
     middle = np.clip(np.arange(x.size), 1, x.size - 2)
     ends = np.arange(x.size) != middle
-    left, right = np.where(ends, middle, middle - 1), np.where(ends, 2 * middle - np.arange(x.size), middle + 1)
-    return np.asarray(y - y[left] - (y[right] - y[left]) / (x[right] - x[left]) * (x - x[left]))
+    left, right = (
+        np.where(ends, middle, middle - 1),
+        np.where(ends, 2 * middle - np.arange(x.size), middle + 1),
+    )
+    return np.asarray(
+        y - y[left] - (y[right] - y[left]) / (x[right] - x[left]) * (x - x[left])
+    )
 
 
 # Of the highest energy: a solver errs by a tenth of it at any time, so that nothing below is sure to be vibration.
@@ -232,7 +263,9 @@ class Envelope(NamedTuple):
 
     def vibration_energy(self, t: Samples | float) -> Samples:
         """Estimate of V(t) [energy]."""
-        return np.asarray(self.energy * np.exp(-self.rate * (np.asarray(t) - self.origin)))
+        return np.asarray(
+            self.energy * np.exp(-self.rate * (np.asarray(t) - self.origin))
+        )
 
 
 def upper_envelope(time: Samples, energy: Samples) -> Envelope | None:
@@ -276,5 +309,7 @@ def upper_envelope(time: Samples, energy: Samples) -> Envelope | None:
     return Envelope(float(np.exp(top0)), rate, t0, floor)
 
 
-def _turns_left(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> bool:
+def _turns_left(
+    a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]
+) -> bool:
     return (b[0] - a[0]) * (c[1] - a[1]) >= (b[1] - a[1]) * (c[0] - a[0])

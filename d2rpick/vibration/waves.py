@@ -58,7 +58,9 @@ class Waves(NamedTuple):
     @property
     def alpha(self) -> float:
         """Damping, the mean of the waves by their energies [1/time]."""
-        return float(-2 * np.average(self.rates.real, weights=np.abs(self.weights) ** 2))
+        return float(
+            -2 * np.average(self.rates.real, weights=np.abs(self.weights) ** 2)
+        )
 
     def amplitudes(self, t: Samples | float) -> Samples:
         """Signed deformations of all waves, of the shape of ``t`` with an axis before it [sqrt(energy)]."""
@@ -79,7 +81,9 @@ class Waves(NamedTuple):
 
     def vibration_energy(self, t: Samples | float) -> Samples:
         """Internal and kinetic energy of the modes [energy]."""
-        return np.asarray((self.amplitudes(t) ** 2).sum(axis=0) + self.kinetic_energy(t))
+        return np.asarray(
+            (self.amplitudes(t) ** 2).sum(axis=0) + self.kinetic_energy(t)
+        )
 
     def _each(self, t: Samples | float) -> Complex:
         s = np.multiply.outer(self.rates, np.asarray(t, dtype=np.float64) - self.origin)
@@ -111,27 +115,43 @@ def fit_waves(time: Samples, deformation: Samples) -> Waves | None:
         return None
     inner = time[:: -(-time.size // _MOST_SAMPLES)]
     even = np.linspace(inner[0], inner[-1], inner.size)
-    windows = np.lib.stride_tricks.sliding_window_view(np.interp(even, time, deformation), 2 * even.size // 3)
+    windows = np.lib.stride_tricks.sliding_window_view(
+        np.interp(even, time, deformation), 2 * even.size // 3
+    )
     space = np.linalg.svd(windows, full_matrices=False)[2]
-    fits = (_fit(space[: 2 * count].T, even[1] - even[0], time, deformation) for count in range(1, _MOST + 1))
+    fits = (
+        _fit(space[: 2 * count].T, even[1] - even[0], time, deformation)
+        for count in range(1, _MOST + 1)
+    )
     found = [fit for fit in fits if fit]
     if not found:
         return None
-    most = max(_AS_GOOD * min(left for left, _ in found), _ROUNDING * float(deformation @ deformation))
+    most = max(
+        _AS_GOOD * min(left for left, _ in found),
+        _ROUNDING * float(deformation @ deformation),
+    )
     return next(waves for left, waves in found if left <= most)
 
 
-def _fit(space: Samples, step: float, time: Samples, deformation: Samples) -> tuple[float, Waves] | None:
+def _fit(
+    space: Samples, step: float, time: Samples, deformation: Samples
+) -> tuple[float, Waves] | None:
     """Sum of squares that is left, and the waves whose windows span ``space``, an orthonormal basis in columns."""
     rates = np.log(factors_of(space)) / step
     rates = rates[rates.imag > np.abs(rates.real)]  # what decays faster is no vibration
     if not rates.size:
         return None
-    rates = np.minimum(rates.real, 0.0) + 1j * rates.imag  # noise lets a free vibration grow
+    rates = (
+        np.minimum(rates.real, 0.0) + 1j * rates.imag
+    )  # noise lets a free vibration grow
     waves = np.exp(np.multiply.outer(time - time[0], rates))
     basis = np.hstack([waves.real, -waves.imag])
-    weight = np.abs(deformation)  # what is off in an energy is off by so much less in its root
-    found = np.linalg.lstsq(basis * weight[:, np.newaxis], deformation * weight, rcond=None)[0]
+    weight = np.abs(
+        deformation
+    )  # what is off in an energy is off by so much less in its root
+    found = np.linalg.lstsq(
+        basis * weight[:, np.newaxis], deformation * weight, rcond=None
+    )[0]
     rest = deformation - basis @ found
     weights = found[: rates.size] + 1j * found[rates.size :]
     return float(rest @ rest), Waves(rates, weights, float(time[0]))
@@ -171,9 +191,13 @@ def _zeros(time: Samples, roots: Samples) -> list[Zeros]:
     while unsure.size:
         coarse = roots[unsure, ::stride]
         minima = _minima(coarse)
-        apart = coarse.shape[1] >= _LEAST_APART * np.maximum(1, np.count_nonzero(minima, axis=1))
+        apart = coarse.shape[1] >= _LEAST_APART * np.maximum(
+            1, np.count_nonzero(minima, axis=1)
+        )
         rows = unsure[apart].tolist()
-        for row, coarser in zip(rows, _zeros_of(time[::stride], coarse[apart], minima[apart]), strict=True):
+        for row, coarser in zip(
+            rows, _zeros_of(time[::stride], coarse[apart], minima[apart]), strict=True
+        ):
             best[row] = min(best[row], coarser, key=lambda found: found.doubtful.size)
         unsure, stride = _unsure(best, rows), 2 * stride
     return best
@@ -190,18 +214,29 @@ def _zeros_of(time: Samples, roots: Samples, minima: NDArray[np.bool_]) -> list[
     early, late = at < 2, at >= time.size - 2
     own, middle = row[~early & ~late], at[~early & ~late]
     around = middle[:, np.newaxis] + np.arange(-2, 3)
-    plain, before, after = _bends(time[around], roots[own[:, np.newaxis], around] * _TURNS[:, np.newaxis])
+    plain, before, after = _bends(
+        time[around], roots[own[:, np.newaxis], around] * _TURNS[:, np.newaxis]
+    )
     turned = np.minimum(before, after)
     zero = plain > _SMOOTHER * turned
     doubt = ~zero & (turned <= _SMOOTHER * plain)
     left = np.where(before < after, middle - 1, middle)[zero]
     low, high = roots[own[zero], left], roots[own[zero], left + 1]
-    share = np.divide(low, low + high, out=np.full(left.shape, 0.5), where=low + high > 0)
+    share = np.divide(
+        low, low + high, out=np.full(left.shape, 0.5), where=low + high > 0
+    )
     sure = time[left] + share * (time[left + 1] - time[left])
     # a zero beside a minimum near an end may lie one sample further inwards
-    ends, unseen = np.append(row[early], row[late]), np.append(time[at[early] + 1], time[at[late] - 1])
+    ends, unseen = (
+        np.append(row[early], row[late]),
+        np.append(time[at[early] + 1], time[at[late] - 1]),
+    )
     order = np.argsort(ends, kind="stable")
-    tables = (sure, own[zero]), (time[middle[doubt]], own[doubt]), (unseen[order], ends[order])
+    tables = (
+        (sure, own[zero]),
+        (time[middle[doubt]], own[doubt]),
+        (unseen[order], ends[order]),
+    )
     parted = (_by_row(times, owners, len(roots)) for times, owners in tables)
     return [Zeros(*one) for one in zip(*parted, strict=True)]
 
@@ -221,7 +256,9 @@ def _minima(values: Samples) -> NDArray[np.bool_]:
 def _bends(times: Samples, values: Samples) -> Samples:
     """Largest second difference of the slopes in each row of five samples, of any number of tables of such rows."""
     slopes = (values[..., 1:] - values[..., :-1]) / (times[:, 1:] - times[:, :-1])
-    return np.asarray(np.abs(slopes[..., 1:] - slopes[..., :-1]).max(axis=-1, initial=0.0))
+    return np.asarray(
+        np.abs(slopes[..., 1:] - slopes[..., :-1]).max(axis=-1, initial=0.0)
+    )
 
 
 # Of the energy, what waves may leave of a deformation: a sign that is wrong at one of thirty minima leaves ten times as
@@ -233,7 +270,9 @@ _MOST_HIDDEN: Final = 0.01
 # noise, and the sign is unclear.
 _OFF: Final = 0.2
 _MOST_OFF: Final = 0.5  # of the samples
-_ROUNDS: Final = 4  # in which the stretch that is fitted comes to hold all that is clear
+_ROUNDS: Final = (
+    4  # in which the stretch that is fitted comes to hold all that is clear
+)
 
 
 class PartMotion(NamedTuple):
@@ -261,7 +300,11 @@ def followed(time: Samples, tracked: Samples, zeros: Zeros) -> PartMotion | None
     PartMotion or None
         None where no waves follow it.
     """
-    root, deformation, width = np.abs(tracked), tracked, max(3, time.size // (2 * zeros.sure.size))
+    root, deformation, width = (
+        np.abs(tracked),
+        tracked,
+        max(3, time.size // (2 * zeros.sure.size)),
+    )
     edges = np.sort(np.concatenate([time[[0, -1]], zeros.doubtful, zeros.unseen]))
     longest = int(np.argmax(np.diff(edges)))
     stretch = slice(*np.searchsorted(time, edges[longest : longest + 2]).tolist())
@@ -275,11 +318,21 @@ def followed(time: Samples, tracked: Samples, zeros: Zeros) -> PartMotion | None
         missed = _means(miss, width) > _OFF * waves.vibration_energy(time)
         # and beside it, where the mean still holds much that is right
         off = _means(missed.astype(np.float64), width) * width > 0.5
-        fitted, stretch = stretch, max(stretches(~off), key=lambda one: one.stop - one.start, default=slice(0, 0))
+        fitted, stretch = (
+            stretch,
+            max(
+                stretches(~off),
+                key=lambda one: one.stop - one.start,
+                default=slice(0, 0),
+            ),
+        )
         if stretch == fitted:
             break
         deformation = np.copysign(root, modelled)
-    if np.mean(off) > _MOST_OFF or miss[~off].sum() > _MOST_LEFT * (root[~off] ** 2).sum():
+    if (
+        np.mean(off) > _MOST_OFF
+        or miss[~off].sum() > _MOST_LEFT * (root[~off] ** 2).sum()
+    ):
         return None
     hidden = hidden_share(time[fitted], root[fitted] ** 2, waves)
     return PartMotion(waves, time[off], hidden) if hidden <= _MOST_HIDDEN else None

@@ -48,7 +48,10 @@ def test_a_row_comes_back_to_the_last_digit(tmp_path: Path, curve: bool) -> None
 
 def test_a_row_is_found_under_another_name_of_its_file(here: Path) -> None:
     _, ledger, row = kept(here)
-    assert values(Ledger(ledger, QUESTION).find("./run.csv")) == {**values(row), "source": "./run.csv"}
+    assert values(Ledger(ledger, QUESTION).find("./run.csv")) == {
+        **values(row),
+        "source": "./run.csv",
+    }
 
 
 @pytest.mark.parametrize(
@@ -62,11 +65,15 @@ def test_a_row_is_found_under_another_name_of_its_file(here: Path) -> None:
         replace(QUESTION, tool_version="0.0.1"),
     ],
 )
-def test_a_row_of_another_question_is_not_taken(tmp_path: Path, question: Question) -> None:
+def test_a_row_of_another_question_is_not_taken(
+    tmp_path: Path, question: Question
+) -> None:
     name, ledger, _ = kept(tmp_path)
     again = Ledger(ledger, question)
     assert again.find(name) is None
-    assert again.told(1).endswith("; 1 have changed, or were computed with other options")
+    assert again.told(1).endswith(
+        "; 1 have changed, or were computed with other options"
+    )
 
 
 def test_a_figure_changes_no_answer_but_needs_the_outline(tmp_path: Path) -> None:
@@ -80,7 +87,12 @@ def test_a_figure_changes_no_answer_but_needs_the_outline(tmp_path: Path) -> Non
 def test_a_row_of_changed_files_is_not_taken(tmp_path: Path, change: str) -> None:
     folder = tmp_path / "run"
     folder.mkdir()
-    glstat = put(folder / "glstat", (Path(variants.__file__).parents[1] / "sample_data" / "energy.glstat").read_bytes())
+    glstat = put(
+        folder / "glstat",
+        (
+            Path(variants.__file__).parents[1] / "sample_data" / "energy.glstat"
+        ).read_bytes(),
+    )
     ledger = Ledger(str(tmp_path / "ledger.ndjson"), QUESTION)
     ledger.add(ask(QUESTION, str(folder)))
     assert Ledger(ledger.name, QUESTION).find(str(folder))
@@ -109,7 +121,9 @@ def test_what_could_not_be_read_is_asked_again(tmp_path: Path) -> None:
     assert values(Ledger(ledger.name, QUESTION).find(short))["status"] == "out-of-range"
 
 
-def test_a_line_that_was_cut_anywhere_is_passed_over_and_the_next_one_is_whole(tmp_path: Path) -> None:
+def test_a_line_that_was_cut_anywhere_is_passed_over_and_the_next_one_is_whole(
+    tmp_path: Path,
+) -> None:
     name, ledger, row = kept(tmp_path)
     whole = Path(ledger).read_bytes()
     other = variants.write(tmp_path / "other.csv", variants.variant(1.01))
@@ -122,15 +136,22 @@ def test_a_line_that_was_cut_anywhere_is_passed_over_and_the_next_one_is_whole(t
         assert values(again.find(other)) == values(next_row)
 
 
-@pytest.mark.parametrize("content", ["time,energy\n0,1\n", '{"schema": "d2rpick/study/1"}\n', "\n", '{"a": 1}\n'])
-def test_another_file_is_refused_and_stays_as_it_is(tmp_path: Path, content: str) -> None:
+@pytest.mark.parametrize(
+    "content",
+    ["time,energy\n0,1\n", '{"schema": "d2rpick/study/1"}\n', "\n", '{"a": 1}\n'],
+)
+def test_another_file_is_refused_and_stays_as_it_is(
+    tmp_path: Path, content: str
+) -> None:
     file = put(tmp_path / "file", content)
     with pytest.raises(FormatError, match="not a run of a study"):
         Ledger(str(file), QUESTION)
     assert file.read_text() == content
 
 
-def test_a_ledger_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path) -> None:
+def test_a_ledger_that_cannot_be_written_is_refused_before_the_work(
+    tmp_path: Path,
+) -> None:
     for name in (tmp_path, tmp_path / "absent" / "ledger"):
         with pytest.raises(FormatError, match="cannot be written"):
             Ledger(str(name), QUESTION)

@@ -24,7 +24,9 @@ def test_every_function_has_an_example_its_errors_and_its_arguments() -> None:
     for function in filter(isfunction, (getattr(d2, name) for name in d2.__all__)):
         text = function.__doc__ or ""
         assert ">>> " in text, function.__name__
-        assert all(part in text for part in ("Parameters\n", "Raises\n", "Returns\n")), function.__name__
+        assert all(
+            part in text for part in ("Parameters\n", "Raises\n", "Returns\n")
+        ), function.__name__
 
 
 def test_the_public_names_are_all_that_is_shown() -> None:
@@ -32,7 +34,11 @@ def test_the_public_names_are_all_that_is_shown() -> None:
 
 
 def test_what_the_docs_call_public_is_there_and_every_function_is_in_the_docs() -> None:
-    named = {name for page in PAGES for name in re.findall(r"\bd2\.([A-Za-z_]\w*)", text_of(page))}
+    named = {
+        name
+        for page in PAGES
+        for name in re.findall(r"\bd2\.([A-Za-z_]\w*)", text_of(page))
+    }
     assert named <= {*d2.__all__}
     assert {name for name in d2.__all__ if isfunction(getattr(d2, name))} <= named
 
@@ -43,9 +49,23 @@ def test_what_a_function_takes_can_be_made_by_public_names() -> None:
     for function in filter(isfunction, (getattr(d2, name) for name in d2.__all__)):
         hints += [one.annotation for one in signature(function).parameters.values()]
     words = {
-        word for hint in hints for word in re.findall(r"(?<!\.)\b[A-Z]\w+", getattr(hint, "__forward_arg__", hint))
+        word
+        for hint in hints
+        for word in re.findall(
+            r"(?<!\.)\b[A-Z]\w+", getattr(hint, "__forward_arg__", hint)
+        )
     }
-    others = {"IO", "Choosing", "Judging", "Iterable", "Mapping", "None", "Parts", "Path", "Unpack"}
+    others = {
+        "IO",
+        "Choosing",
+        "Judging",
+        "Iterable",
+        "Mapping",
+        "None",
+        "Parts",
+        "Path",
+        "Unpack",
+    }
     assert words - others <= {*d2.__all__}
     assert {"Weights", "Oscillator", "Run"} <= words
 
@@ -73,4 +93,7 @@ def test_types_hold_for_a_stranger() -> None:
     assert_type(answer.to_frame(), pd.DataFrame)
     assert answer.recommended is not None
     assert_type(answer.recommended.tr, float)
-    assert_type(d2.verify(d2.read(ENERGY), tr=answer.recommended.tr, td=answer.td).verified, bool)
+    assert_type(
+        d2.verify(d2.read(ENERGY), tr=answer.recommended.tr, td=answer.td).verified,
+        bool,
+    )

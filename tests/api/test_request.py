@@ -15,10 +15,22 @@ ONE = {"stiffness": 2.0, "mass": 3.0, "beta": 2.0, "alpha": 0.5, "v0": 1.0}
 @pytest.mark.parametrize(
     ("asked", "typed"),
     [
-        ({"tolerance": 0.1, "part": ("3", "roof")}, ["--part", "3", "--part", "roof", "--tolerance", "0.1"]),
-        ({"fit_window": (0.5, 1.0), "strict": True}, ["--fit-window", "0.5", "1.0", "--strict"]),
-        ({"strict": False, "tolerance": 0.2, "given": {"strict", "tolerance"}}, ["--tolerance", "0.2"]),
-        ({"deck": "a.k", "weights": Weights({"BT": 1.0})}, ["--deck", "a.k", "--weights", "<weights in memory>"]),
+        (
+            {"tolerance": 0.1, "part": ("3", "roof")},
+            ["--part", "3", "--part", "roof", "--tolerance", "0.1"],
+        ),
+        (
+            {"fit_window": (0.5, 1.0), "strict": True},
+            ["--fit-window", "0.5", "1.0", "--strict"],
+        ),
+        (
+            {"strict": False, "tolerance": 0.2, "given": {"strict", "tolerance"}},
+            ["--tolerance", "0.2"],
+        ),
+        (
+            {"deck": "a.k", "weights": Weights({"BT": 1.0})},
+            ["--deck", "a.k", "--weights", "<weights in memory>"],
+        ),
         ({"history": ("a.csv",)}, []),
     ],
 )

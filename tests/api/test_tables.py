@@ -11,7 +11,9 @@ import d2rpick as d2
 
 TIME = np.arange(50) * 0.01
 ENERGY = 1 - np.cos(20 * TIME)
-FRAME = pd.DataFrame({"time": TIME, "internal_energy": ENERGY, "kinetic_energy": 5 - ENERGY})
+FRAME = pd.DataFrame(
+    {"time": TIME, "internal_energy": ENERGY, "kinetic_energy": 5 - ENERGY}
+)
 loose: Any = d2
 
 
@@ -32,7 +34,9 @@ def dataset(frame: pd.DataFrame) -> Any:
 
 def data_array(frame: pd.DataFrame) -> Any:
     library: Any = pytest.importorskip("xarray")
-    return library.DataArray(frame["internal_energy"].to_numpy(), coords={"time": TIME}, dims="time")
+    return library.DataArray(
+        frame["internal_energy"].to_numpy(), coords={"time": TIME}, dims="time"
+    )
 
 
 class Polars:
@@ -88,7 +92,9 @@ class DataArray:
         self._frame = frame
 
     def to_dataframe(self, name: str) -> pd.DataFrame:
-        return self._frame.set_index("time")[["internal_energy"]].set_axis([name], axis=1)
+        return self._frame.set_index("time")[["internal_energy"]].set_axis(
+            [name], axis=1
+        )
 
 
 MADE: dict[str, Callable[[pd.DataFrame], Any]] = {
@@ -97,7 +103,9 @@ MADE: dict[str, Callable[[pd.DataFrame], Any]] = {
     "a mapping": lambda frame: {name: frame[name].to_list() for name in frame},
     "records of numpy": lambda frame: frame.to_records(index=False),
     "rows and columns": lambda frame: frame[["time", "internal_energy"]].to_numpy(),
-    **{function.__name__: function for function in (polars, arrow, dataset, data_array)},
+    **{
+        function.__name__: function for function in (polars, arrow, dataset, data_array)
+    },
     **{kind.__name__: kind for kind in (Polars, Lazy, Arrow, Dataset, DataArray)},
 }
 
@@ -109,7 +117,10 @@ def test_a_table_of_any_library_is_taken_and_read_says_what_to_call(name: str) -
     np.testing.assert_array_equal(found.index, TIME)
     np.testing.assert_array_equal(found["internal_energy"], ENERGY)
     if not isinstance(table, Lazy):
-        with pytest.raises(TypeError, match=r"source is a table of type \w+; give it to d2rpick.from_frame\(...\)"):
+        with pytest.raises(
+            TypeError,
+            match=r"source is a table of type \w+; give it to d2rpick.from_frame\(...\)",
+        ):
             loose.read(table)
 
 
@@ -117,7 +128,9 @@ def test_columns_without_names_are_named_by_number() -> None:
     found = d2.from_frame(FRAME.to_numpy(), energy=2, channels={"kinetic_energy": 3})
     np.testing.assert_array_equal(found.to_frame()["internal_energy"], ENERGY)
     assert found.files.databases[0].quantities == {"kinetic_energy": "column 3"}
-    with pytest.raises(d2.FormatError, match="choose with `energy`: 2 'column 2', 3 'column 3'"):
+    with pytest.raises(
+        d2.FormatError, match="choose with `energy`: 2 'column 2', 3 'column 3'"
+    ):
         d2.from_frame(FRAME.to_numpy()).to_frame()
 
 

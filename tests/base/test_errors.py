@@ -11,7 +11,12 @@ from d2rpick.base.errors import listing, printable
 def test_what_is_shown_holds_no_line_end_and_no_control_character(text: str) -> None:
     shown = printable(text)
     assert len(shown.splitlines()) <= 1
-    assert not {unicodedata.category(letter) for letter in shown} & {"Cc", "Cf", "Zl", "Zp"}
+    assert not {unicodedata.category(letter) for letter in shown} & {
+        "Cc",
+        "Cf",
+        "Zl",
+        "Zp",
+    }
 
 
 @given(st.text(st.characters(exclude_categories=["Cc", "Cf", "Zl", "Zp"])))
@@ -20,10 +25,15 @@ def test_every_other_name_is_shown_as_it_is(text: str) -> None:
 
 
 def test_an_escape_code_is_spelled_out() -> None:
-    assert printable("\x1b[2Jbox\u202e\u2028é\udce9") == "\\x1b[2Jbox\\u202e\\u2028é\udce9"
+    assert (
+        printable("\x1b[2Jbox\u202e\u2028é\udce9") == "\\x1b[2Jbox\\u202e\\u2028é\udce9"
+    )
 
 
 def test_a_listing_is_one_line_and_counts_what_it_leaves_out() -> None:
-    assert listing([f"box\n{i}" for i in range(4)], most=2) == "box\\n0, box\\n1 and 2 more"
+    assert (
+        listing([f"box\n{i}" for i in range(4)], most=2)
+        == "box\\n0, box\\n1 and 2 more"
+    )
     assert listing([3, 7], most=2, between=",") == "3,7"
     assert listing([]) == ""

@@ -23,23 +23,42 @@ MEGABYTE = 10**6
         *((MOMENT, 0, 0.05, may_grow) for may_grow in (False, True)),
         (-HOUR, 0, 0.05, True),  # the clock of a server is ahead
         (200 * MOMENT, MEGABYTE, None, False),
-        (200 * MOMENT, 100 * MEGABYTE, 0.55, False),  # the write of so much may have begun then
+        (
+            200 * MOMENT,
+            100 * MEGABYTE,
+            0.55,
+            False,
+        ),  # the write of so much may have begun then
         (200 * MOMENT, 100 * MEGABYTE, 0.05, True),  # but little at a time is appended
-        *((WHOLE, 0, 2.05, may_grow) for may_grow in (False, True)),  # times in whole seconds
+        *(
+            (WHOLE, 0, 2.05, may_grow) for may_grow in (False, True)
+        ),  # times in whole seconds
         (WHOLE + 10**9, 0, 2.05, True),
         (WHOLE + 3 * 10**9, 0, None, True),
     ],
 )
 def test_a_file_is_waited_for_as_long_as_it_may_change_unseen(
-    ago: int, size: int, pause: float | None, may_grow: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ago: int,
+    size: int,
+    pause: float | None,
+    may_grow: bool,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     pauses: list[float] = []
     times = dict.fromkeys(("st_mtime_ns", "st_ctime_ns"), NOW - ago)
     monkeypatch.setattr(time, "sleep", pauses.append)
     monkeypatch.setattr(time, "time_ns", lambda: NOW)
     (tmp_path / "deck.k").touch()
-    with (tmp_path / "deck.k").open("rb", buffering=0) as file, monkeypatch.context() as made_up:
-        made_up.setattr(os, "fstat", lambda _: SimpleNamespace(st_dev=1, st_ino=2, st_size=size, **times))
+    with (
+        (tmp_path / "deck.k").open("rb", buffering=0) as file,
+        monkeypatch.context() as made_up,
+    ):
+        made_up.setattr(
+            os,
+            "fstat",
+            lambda _: SimpleNamespace(st_dev=1, st_ino=2, st_size=size, **times),
+        )
         found = settled_state(file, may_grow=may_grow)
     assert found
     assert found.size == size
@@ -64,14 +83,20 @@ def test_a_file_behind_a_link_keeps_its_mode(tmp_path: Path) -> None:
     assert stat.S_IMODE(file.stat().st_mode) == 0o600
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root gives files away")
+@pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root gives files away"
+)
 def test_a_file_that_is_replaced_keeps_its_owner(tmp_path: Path) -> None:
     file = tmp_path / "a"
     file.touch(mode=0o600)
     os.chown(file, 12345, 23456)
     write_whole(file, b"new")
     found = file.stat()
-    assert (found.st_uid, found.st_gid, stat.S_IMODE(found.st_mode)) == (12345, 23456, 0o600)
+    assert (found.st_uid, found.st_gid, stat.S_IMODE(found.st_mode)) == (
+        12345,
+        23456,
+        0o600,
+    )
 
 
 def test_a_new_file_has_the_mode_of_any_new_file(tmp_path: Path) -> None:
@@ -81,7 +106,9 @@ def test_a_new_file_has_the_mode_of_any_new_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("letter", ["x", "é", "\udcff"])
-def test_a_name_may_be_as_long_as_the_file_system_allows(tmp_path: Path, letter: str) -> None:
+def test_a_name_may_be_as_long_as_the_file_system_allows(
+    tmp_path: Path, letter: str
+) -> None:
     most = os.pathconf(tmp_path, "PC_NAME_MAX")
     file = tmp_path / (letter * (most // len(os.fsencode(letter))))
     for content in (b"old", b"new"):
@@ -91,9 +118,13 @@ def test_a_name_may_be_as_long_as_the_file_system_allows(tmp_path: Path, letter:
         write_whole(tmp_path / f"{file.name}{letter}", b"")
 
 
-def test_what_cannot_be_written_leaves_the_file_and_nothing_beside_it(tmp_path: Path) -> None:
+def test_what_cannot_be_written_leaves_the_file_and_nothing_beside_it(
+    tmp_path: Path,
+) -> None:
     file = tmp_path / "a"
     file.write_bytes(b"old")
     with pytest.raises(TypeError):
         write_whole(file, ["no bytes"])  # type: ignore[arg-type]
-    assert [(one.name, one.read_bytes()) for one in tmp_path.iterdir()] == [("a", b"old")]
+    assert [(one.name, one.read_bytes()) for one in tmp_path.iterdir()] == [
+        ("a", b"old")
+    ]

@@ -42,7 +42,10 @@ class Wide(Measure, Record):
 
 
 def test_fields_defaults_and_names_are_those_of_typing() -> None:
-    assert (Ours._fields, Ours._field_defaults) == (Theirs._fields, Theirs._field_defaults)
+    assert (Ours._fields, Ours._field_defaults) == (
+        Theirs._fields,
+        Theirs._field_defaults,
+    )
     assert (Ours.__module__, Ours.__doc__) == (Theirs.__module__, Theirs.__doc__)
     assert repr(Ours(1)) == repr(Theirs(1)).replace("Theirs", "Ours")
 
@@ -56,6 +59,10 @@ def test_it_is_a_tuple_with_what_its_class_defines() -> None:
 
 def test_a_record_has_the_fields_of_its_base_behind_those_that_must_be_given() -> None:
     assert Wide._fields == ("name", "share", "kind")
-    assert Wide(name="x", share=0.5)._asdict() == {"name": "x", "share": 0.5, "kind": "any"}
+    assert Wide(name="x", share=0.5)._asdict() == {
+        "name": "x",
+        "share": 0.5,
+        "kind": "any",
+    }
     assert [*cast("tuple[object, ...]", Wide(name="x"))] == ["x", None, "any"]
     assert pickle.loads(pickle.dumps(Wide(name="x"))) == Wide(name="x")

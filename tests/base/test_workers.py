@@ -30,7 +30,9 @@ def square(number: int) -> int:
 @pytest.mark.parametrize("farm", FARMS)
 def test_every_item_is_answered_once_by_its_number(farm: Callable[[], Farm]) -> None:
     with farm() as place:
-        found = {answer.number: answer.result for answer in place.answers(square, range(12))}
+        found = {
+            answer.number: answer.result for answer in place.answers(square, range(12))
+        }
     assert found == {i: i**2 for i in range(12)}
 
 
@@ -51,25 +53,39 @@ def test_a_process_that_dies_is_told_for_its_item_alone() -> None:
     assert sorted(dead) == [8, 13]
     assert all(isinstance(found[number].error, D2RPickError) for number in dead)
     assert "memory" in str(found[8].error)
-    assert [found[n].result for n in sorted(found) if n not in dead] == [i**2 for i in range(13)]
+    assert [found[n].result for n in sorted(found) if n not in dead] == [
+        i**2 for i in range(13)
+    ]
 
 
 def children_of(process: int) -> dict[str, list[int]]:
     """Ids of the processes below one, by what they are; of those that are forked the command is that of the first."""
-    listed = check_output(["ps", "-e", "-ww", "-o", "pid=,ppid=,args="], text=True).splitlines()
+    listed = check_output(
+        ["ps", "-e", "-ww", "-o", "pid=,ppid=,args="], text=True
+    ).splitlines()
     rows = [line.split(maxsplit=2) for line in listed]
-    kinds: dict[str, list[int]] = {"resource_tracker": [], "forkserver": [], "worker": []}
+    kinds: dict[str, list[int]] = {
+        "resource_tracker": [],
+        "forkserver": [],
+        "worker": [],
+    }
     for pid, parent, command in rows:
         kind = next((kind for kind in kinds if kind in command), "")
         if int(parent) == process and kind:
             kinds[kind].append(int(pid))
-    kinds["worker"] = [int(pid) for pid, parent, _ in rows if int(parent) in kinds["forkserver"]]
+    kinds["worker"] = [
+        int(pid) for pid, parent, _ in rows if int(parent) in kinds["forkserver"]
+    ]
     return kinds
 
 
-@pytest.mark.skipif(not Path("/proc").exists(), reason="processes are listed as on Linux")
+@pytest.mark.skipif(
+    not Path("/proc").exists(), reason="processes are listed as on Linux"
+)
 @pytest.mark.parametrize("victim", ["forkserver", "worker", "resource_tracker"])
-@pytest.mark.parametrize("after", [1, *(pytest.param(done, marks=pytest.mark.slow) for done in (0, 5))])
+@pytest.mark.parametrize(
+    "after", [1, *(pytest.param(done, marks=pytest.mark.slow) for done in (0, 5))]
+)
 def test_any_process_may_be_killed_without_a_loss(victim: str, after: int) -> None:
     code = (
         "from d2rpick.base.workers import Cores\n"
@@ -80,7 +96,9 @@ def test_any_process_may_be_killed_without_a_loss(victim: str, after: int) -> No
         f"        if done == {after}: print(flush=True); input()\n"
         "print(done)\n"
     )
-    with Popen([sys.executable, "-c", code], cwd=ROOT, stdin=PIPE, stdout=PIPE, text=True) as process:
+    with Popen(
+        [sys.executable, "-c", code], cwd=ROOT, stdin=PIPE, stdout=PIPE, text=True
+    ) as process:
         assert process.stdout
         assert process.stdout.readline() == "\n"
         os.kill(children_of(process.pid)[victim][0], signal.SIGKILL)
@@ -107,9 +125,13 @@ def test_there_is_a_core() -> None:
     assert cores() >= 1
 
 
-def test_an_interrupt_while_the_first_process_imports_is_no_traceback(tmp_path: Path) -> None:
+def test_an_interrupt_while_the_first_process_imports_is_no_traceback(
+    tmp_path: Path,
+) -> None:
     """A parent that goes on after the interrupt starts the process anew."""
-    (tmp_path / "slow.py").write_text("import sys; print('importing', flush=True); sys.stdin.readline()")
+    (tmp_path / "slow.py").write_text(
+        "import sys; print('importing', flush=True); sys.stdin.readline()"
+    )
     code = (
         "import signal; from d2rpick.base.workers import Cores, begin\n"
         "signal.signal(signal.SIGINT, lambda *_: None)\n"  # an ignored one would be inherited
@@ -118,7 +140,13 @@ def test_an_interrupt_while_the_first_process_imports_is_no_traceback(tmp_path: 
     )
     command = [sys.executable, "-c", code]
     with Popen(
-        command, cwd=tmp_path, stdin=PIPE, stdout=PIPE, stderr=PIPE, text=True, start_new_session=True
+        command,
+        cwd=tmp_path,
+        stdin=PIPE,
+        stdout=PIPE,
+        stderr=PIPE,
+        text=True,
+        start_new_session=True,
     ) as process:
         assert process.stdout
         assert process.stdout.readline() == "importing\n"

@@ -40,10 +40,15 @@ class Run(NamedTuple):
     impulse: Samples
 
 
-def integrated(chains: Chains, force: Force, weight: Force, end: float, states: int, steps: int) -> Iterator[Run]:
+def integrated(
+    chains: Chains, force: Force, weight: Force, end: float, states: int, steps: int
+) -> Iterator[Run]:
     """Integrate chains up to ``end`` under a force and their weight, with so many ``steps`` from state to state."""
     mass, dt = chains.masses[..., np.newaxis], end / (states * steps)
-    stiffness, damping = chains.stiffness[..., np.newaxis], chains.damping[..., np.newaxis]
+    stiffness, damping = (
+        chains.stiffness[..., np.newaxis],
+        chains.damping[..., np.newaxis],
+    )
     strength, count = chains.strength[..., np.newaxis], len(chains.masses)
     places, velocities = chains.places.copy(), chains.velocities.copy()
     yielded = np.diff(places, axis=1) * 0
@@ -51,20 +56,46 @@ def integrated(chains: Chains, force: Force, weight: Force, end: float, states: 
     damped, hardened = np.zeros(count), np.zeros((count, 2))
     rows = []
     for step in range(states * steps + 1):
-        outer, heavy = force(step * dt, places, velocities), weight(step * dt, places, velocities)
+        outer, heavy = (
+            force(step * dt, places, velocities),
+            weight(step * dt, places, velocities),
+        )
         stretch = np.diff(places, axis=1) - yielded
         pull = stiffness * stretch
         size = np.linalg.norm(pull, axis=2, keepdims=True)
         yields = (step * dt < chains.yields_until)[:, np.newaxis, np.newaxis]
-        beyond = np.where(yields, np.maximum(0.0, 1 - strength / np.maximum(size, 1e-300)), 0.0)
-        hardened += (np.minimum(size, strength) * np.linalg.norm(beyond * stretch, axis=2, keepdims=True))[..., 0]
-        yielded, stretch, pull = yielded + beyond * stretch, stretch * (1 - beyond), pull * (1 - beyond)
+        beyond = np.where(
+            yields, np.maximum(0.0, 1 - strength / np.maximum(size, 1e-300)), 0.0
+        )
+        hardened += (
+            np.minimum(size, strength)
+            * np.linalg.norm(beyond * stretch, axis=2, keepdims=True)
+        )[..., 0]
+        yielded, stretch, pull = (
+            yielded + beyond * stretch,
+            stretch * (1 - beyond),
+            pull * (1 - beyond),
+        )
         if step % steps == 0:
-            kinetic, elastic = (mass * velocities**2).sum(axis=2) / 2, (stiffness * stretch**2).sum(axis=2) / 2
-            rows.append((mass * velocities, kinetic, elastic + hardened, impulse.copy(), work.copy(), damped.copy()))
+            kinetic, elastic = (
+                (mass * velocities**2).sum(axis=2) / 2,
+                (stiffness * stretch**2).sum(axis=2) / 2,
+            )
+            rows.append(
+                (
+                    mass * velocities,
+                    kinetic,
+                    elastic + hardened,
+                    impulse.copy(),
+                    work.copy(),
+                    damped.copy(),
+                )
+            )
         rates = np.diff(velocities, axis=1)
         damped += dt * (damping * rates**2).sum(axis=(1, 2))
-        inner = np.diff(np.pad(pull + damping * rates, ((0, 0), (1, 1), (0, 0))), axis=1)
+        inner = np.diff(
+            np.pad(pull + damping * rates, ((0, 0), (1, 1), (0, 0))), axis=1
+        )
         before = velocities
         velocities = velocities + dt * (inner + outer + heavy) / mass
         work += dt * ((outer + heavy) * (before + velocities) / 2).sum(axis=(1, 2))
@@ -72,9 +103,15 @@ def integrated(chains: Chains, force: Force, weight: Force, end: float, states: 
         impulse += dt * outer.sum(axis=1)
     columns = [np.stack(column, axis=1) for column in zip(*rows, strict=True)]
     time = np.linspace(0, end, states + 1)
-    for momentum, kinetic, springs, changed, worked, lost, masses in zip(*columns, chains.masses, strict=True):
-        internal = np.column_stack([springs[:, 0] / 2, springs.sum(axis=1) / 2, springs[:, 1] / 2])
-        yield Run(Written(time, momentum, kinetic, internal, worked, masses, lost), changed)
+    for momentum, kinetic, springs, changed, worked, lost, masses in zip(
+        *columns, chains.masses, strict=True
+    ):
+        internal = np.column_stack(
+            [springs[:, 0] / 2, springs.sum(axis=1) / 2, springs[:, 1] / 2]
+        )
+        yield Run(
+            Written(time, momentum, kinetic, internal, worked, masses, lost), changed
+        )
 
 
 def directions(random: np.random.Generator, count: int) -> Samples:

@@ -31,7 +31,13 @@ _ROUNDS = 3
 _PART_STATES = 2000
 _RUNS, _RUN_STATES, _RUN_TD = 1000, 10_000, 0.0687534
 # Cycles in the record, shares of the energy and phases of the five modes.
-_MODES = ((15.5, 1.0, 0.0), (28.5, 0.7, 1.0), (46.5, 0.5, 2.0), (69.5, 0.4, 3.0), (106.0, 0.3, 4.0))
+_MODES = (
+    (15.5, 1.0, 0.0),
+    (28.5, 0.7, 1.0),
+    (46.5, 0.5, 2.0),
+    (69.5, 0.4, 3.0),
+    (106.0, 0.3, 4.0),
+)
 _THREE = ((12.5, 1.0, 0.0), (19.3, 0.6, 1.0), (31.7, 0.4, 2.0))
 # Of the largest energy: with 1e5 states some 15,000 candidates.
 _NOISE = 0.003
@@ -57,14 +63,18 @@ MATSUM = (
 def noisy_to_pandas() -> float:
     """`suggest --td` of 1e5 noisy states over pandas, which reads that csv and does nothing else."""
     file = str(_noisy(100_000))
-    found = json.loads(output("-m", "d2rpick", "suggest", "--td", str(_TD), "-f", "json", file))
+    found = json.loads(
+        output("-m", "d2rpick", "suggest", "--td", str(_TD), "-f", "json", file)
+    )
     assert 10_000 < len(found["candidates"]) < 20_000, len(found["candidates"])
     return _ratio(_suggest(file), ("-c", PANDAS, file))
 
 
 def noisy_growth() -> float:
     """`suggest --td` of 1e6 noisy states over the same of 1e5."""
-    return _ratio(_suggest(str(_noisy(1_000_000))), _suggest(str(_noisy(100_000))), rounds=1)
+    return _ratio(
+        _suggest(str(_noisy(1_000_000))), _suggest(str(_noisy(100_000))), rounds=1
+    )
 
 
 def drowned_growth() -> float:
@@ -87,21 +97,30 @@ def window_to_td(kind: str, width: str, *options: str) -> float:
         options = (*options, "--energy", "IE_left", "--energy", "IE_right")
         found = json.loads(output(*_suggest(file, *options, "-f", "json")))
         assert found["basis"] == "parts"
-    return _ratio(_suggest(file, *options, window=_WINDOWS[width]), _suggest(file, *options))
+    return _ratio(
+        _suggest(file, *options, window=_WINDOWS[width]), _suggest(file, *options)
+    )
 
 
 def open_window_to_td() -> float:
     """The same where the end of the load is left to be found."""
     file = str(_noisy(100_000))
     suggest = ("-m", "d2rpick", "suggest", "--exit-zero", file)
-    return _ratio((*suggest, "--td-window", *map(str, _WINDOWS["narrow"])), (*suggest, "--td", str(_TD)))
+    return _ratio(
+        (*suggest, "--td-window", *map(str, _WINDOWS["narrow"])),
+        (*suggest, "--td", str(_TD)),
+    )
 
 
 def explore_to_td(file: str, td: str, *options: str) -> float:
     """`explore` of 200 td over `suggest --td`: processes; a file of the samples, or "noisy" for 1e5 noisy states."""
     name = str(_noisy(100_000)) if file == "noisy" else f"sample_data/{file}"
     rest = ("--exit-zero", "-q", "-f", "json", *options, name)
-    return _ratio(("-m", "d2rpick", "explore", *rest), ("-m", "d2rpick", "suggest", "--td", td, *rest), rounds=1)
+    return _ratio(
+        ("-m", "d2rpick", "explore", *rest),
+        ("-m", "d2rpick", "suggest", "--td", td, *rest),
+        rounds=1,
+    )
 
 
 def clean_growth(command: str) -> float:
@@ -109,8 +128,20 @@ def clean_growth(command: str) -> float:
 
     def build(file: str) -> tuple[str, ...]:
         if command == "verify":
-            return "-m", "d2rpick", "verify", "--tr", "0.4", "--td", str(_TD), "--exit-zero", file
-        return _suggest(file, window=_WINDOWS["wide"] if command == "--td-window" else None)
+            return (
+                "-m",
+                "d2rpick",
+                "verify",
+                "--tr",
+                "0.4",
+                "--td",
+                str(_TD),
+                "--exit-zero",
+                file,
+            )
+        return _suggest(
+            file, window=_WINDOWS["wide"] if command == "--td-window" else None
+        )
 
     return _ratio(build(str(_clean(1_000_000))), build(str(_clean(100_000))))
 
@@ -118,13 +149,19 @@ def clean_growth(command: str) -> float:
 def plan_to_pandas(trouble: str) -> float:
     """`plan` of 1e5 states of some `_trouble` over pandas, which reads that csv and does nothing else."""
     file = str(_trouble(trouble, 100_000))
-    return _ratio(("-m", "d2rpick", "plan", "--exit-zero", file), ("-c", PANDAS, file), rounds=1)
+    return _ratio(
+        ("-m", "d2rpick", "plan", "--exit-zero", file), ("-c", PANDAS, file), rounds=1
+    )
 
 
 def search_to_td(trouble: str, states: int, *command: str) -> float:
     """A command that looks for td over `suggest --td` where nobody says when the load ends."""
     rest = ("--exit-zero", "-q", str(_trouble(trouble, states)))
-    return _ratio(("-m", "d2rpick", *command, *rest), ("-m", "d2rpick", "suggest", "--td", str(_TD), *rest), rounds=1)
+    return _ratio(
+        ("-m", "d2rpick", *command, *rest),
+        ("-m", "d2rpick", "suggest", "--td", str(_TD), *rest),
+        rounds=1,
+    )
 
 
 def wait(trouble: str, states: int, *command: str) -> float:
@@ -146,7 +183,19 @@ def wait_for_parts(parts: int) -> float:
 def explore_memory() -> float:
     """Peak memory of `explore` of three impacts, 1e5 states [MB]."""
     file = str(_trouble("several flights", 100_000))
-    return float(output("-c", PEAK, sys.executable, "-m", "d2rpick", "explore", "--exit-zero", "-q", file))
+    return float(
+        output(
+            "-c",
+            PEAK,
+            sys.executable,
+            "-m",
+            "d2rpick",
+            "explore",
+            "--exit-zero",
+            "-q",
+            file,
+        )
+    )
 
 
 def study_of_small_runs() -> float:
@@ -162,14 +211,26 @@ def study_of_small_runs() -> float:
 def parts_to_matsum(parts: int) -> float:
     """`suggest --part` of so many parts and 2000 states over reading that matsum: processes."""
     file = str(_matsum(parts))
-    choosing = ("-m", "d2rpick", "suggest", "--td", "0.16", "--part", f"2001-{2000 + parts}", "--exit-zero", file)
+    choosing = (
+        "-m",
+        "d2rpick",
+        "suggest",
+        "--td",
+        "0.16",
+        "--part",
+        f"2001-{2000 + parts}",
+        "--exit-zero",
+        file,
+    )
     return _ratio(choosing, ("-c", MATSUM, file))
 
 
 def study_to_loop() -> float:
     """`study` of runs of 1e4 states, one process, over `suggest` of the library on each: per run, start-up in both."""
     names = _runs()
-    return _ratio(("-m", "d2rpick", *_study(names, "1")), ("-c", LOOP, *names), rounds=1)
+    return _ratio(
+        ("-m", "d2rpick", *_study(names, "1")), ("-c", LOOP, *names), rounds=1
+    )
 
 
 def study_speed_up() -> float | None:
@@ -180,24 +241,67 @@ def study_speed_up() -> float | None:
 def scan_speed_up() -> float | None:
     """Wall time of `rollover --scan` in one process over that in two; None on one core."""
     return _speed_up(
-        lambda jobs: ("rollover", "--scan", "--mesh", "6", "--jobs", jobs, "-q", "--exit-zero"), rounds=_ROUNDS
+        lambda jobs: (
+            "rollover",
+            "--scan",
+            "--mesh",
+            "6",
+            "--jobs",
+            jobs,
+            "-q",
+            "--exit-zero",
+        ),
+        rounds=_ROUNDS,
     )
 
 
 def report_to_matplotlib() -> float:
     """`suggest --report` of a sample over importing matplotlib and drawing one Figure to svg."""
     page = str(Path(_folder.name) / "report.html")
-    ours = ("-m", "d2rpick", "suggest", "--td", "0.064", "--report", page, "--overwrite", "sample_data/energy.csv")
+    ours = (
+        "-m",
+        "d2rpick",
+        "suggest",
+        "--td",
+        "0.064",
+        "--report",
+        page,
+        "--overwrite",
+        "sample_data/energy.csv",
+    )
     return _ratio(ours, ("-c", FIGURE), rounds=9)
 
 
-def _suggest(file: str, *options: str, window: tuple[float, float] | None = None) -> tuple[str, ...]:
+def _suggest(
+    file: str, *options: str, window: tuple[float, float] | None = None
+) -> tuple[str, ...]:
     when = ("--td", str(_TD)) if window is None else ("--td-window", *map(str, window))
-    return "-m", "d2rpick", "suggest", *when, "--after", str(_AFTER), "--exit-zero", *options, file
+    return (
+        "-m",
+        "d2rpick",
+        "suggest",
+        *when,
+        "--after",
+        str(_AFTER),
+        "--exit-zero",
+        *options,
+        file,
+    )
 
 
 def _study(names: Sequence[str], jobs: str) -> tuple[str, ...]:
-    return "study", "-q", "--exit-zero", "--td", str(_RUN_TD), "--jobs", jobs, "-f", "json", *names
+    return (
+        "study",
+        "-q",
+        "--exit-zero",
+        "--td",
+        str(_RUN_TD),
+        "--jobs",
+        jobs,
+        "-f",
+        "json",
+        *names,
+    )
 
 
 def _noisy(states: int) -> Path:
@@ -210,18 +314,42 @@ def _trouble(name: str, states: int) -> Path:
     rng = np.random.default_rng(14)
     if name == "random walk":
         steps = rng.standard_normal(states)
-        return _written(f"{name}{states}.csv", np.linspace(0.0, 1.0, states), 100.0 + np.cumsum(steps))
+        return _written(
+            f"{name}{states}.csv",
+            np.linspace(0.0, 1.0, states),
+            100.0 + np.cumsum(steps),
+        )
     if name == "a vibration on heat":
         time = np.linspace(0.02, 1.2, states)
         energy = 10 * time + 0.8 * (np.exp(-1.5 * time) * np.cos(60 * time)) ** 2
         return _written(f"{name}{states}.csv", time, energy)
-    many = zip(rng.uniform(8, 40, 200), rng.uniform(0.3, 1, 200), rng.uniform(0, np.pi, 200), strict=True)
+    many = zip(
+        rng.uniform(8, 40, 200),
+        rng.uniform(0.3, 1, 200),
+        rng.uniform(0, np.pi, 200),
+        strict=True,
+    )
     rise = {"a rise": 3.0, "a rise and a vibration": 3.0}.get(name, 0.0)
     level = {"noise alone": 4.0, "below zero": -4.0}.get(name, 0.0)
-    impacts = {"several flights": [(0.05, 6.0), (0.35, 4.0), (0.7, 3.0)], "chaotic contact": _chaotic(40)}
-    modes = {"200 modes": tuple(many), "chaotic contact": _MODES, "a rise": (), "noise alone": ()}.get(name, _THREE)
+    impacts = {
+        "several flights": [(0.05, 6.0), (0.35, 4.0), (0.7, 3.0)],
+        "chaotic contact": _chaotic(40),
+    }
+    modes = {
+        "200 modes": tuple(many),
+        "chaotic contact": _MODES,
+        "a rise": (),
+        "noise alone": (),
+    }.get(name, _THREE)
     noise = {"noise 1 %": 0.01, "noise 10 %": 0.1, "noise alone": 0.01}.get(name, 0.0)
-    return _ringing(f"{name}{states}.csv", states, modes, noise, impacts.get(name, ()), (level, rise))
+    return _ringing(
+        f"{name}{states}.csv",
+        states,
+        modes,
+        noise,
+        impacts.get(name, ()),
+        (level, rise),
+    )
 
 
 def _chaotic(count: int) -> list[tuple[float, float]]:
@@ -229,7 +357,10 @@ def _chaotic(count: int) -> list[tuple[float, float]]:
     heights = [0.3]
     while len(heights) < count:
         heights.append(3.9 * heights[-1] * (1 - heights[-1]))
-    return [(0.45 * (place + height) / count, 3 * height) for place, height in enumerate(heights)]
+    return [
+        (0.45 * (place + height) / count, 3 * height)
+        for place, height in enumerate(heights)
+    ]
 
 
 def _ringing(
@@ -242,9 +373,17 @@ def _ringing(
 ) -> Path:
     """Energy of modes of one damping over a line, with white noise [of its largest] and impacts at (time, height)."""
     time = np.linspace(0.0, 1.0, states)
-    swings = (share * np.sin(2 * np.pi * cycles * time + phase) ** 2 for cycles, share, phase in modes)
-    energy = sum(swings, np.zeros(states)) * np.exp(-0.8 * time) + line[0] + line[1] * time
-    energy += sum((height * np.exp(-(((time - at) / 0.004) ** 2)) for at, height in impacts), np.zeros(states))
+    swings = (
+        share * np.sin(2 * np.pi * cycles * time + phase) ** 2
+        for cycles, share, phase in modes
+    )
+    energy = (
+        sum(swings, np.zeros(states)) * np.exp(-0.8 * time) + line[0] + line[1] * time
+    )
+    energy += sum(
+        (height * np.exp(-(((time - at) / 0.004) ** 2)) for at, height in impacts),
+        np.zeros(states),
+    )
     white = np.random.default_rng(14).standard_normal(states)
     return _written(name, time, energy + noise * energy.max() * white)
 
@@ -258,16 +397,33 @@ def _clean(states: int) -> Path:
 def _two_parts(states: int) -> Path:
     """Energies of two parts, each of which vibrates in a mode of its own: in several, noise hides the signs."""
     time = np.linspace(0.0, 1.0, states)
-    swing = [size * np.sin(2 * np.pi * cycles * time) for size, cycles in ((1.0, 8.0), (0.7, 13.7))]
+    swing = [
+        size * np.sin(2 * np.pi * cycles * time)
+        for size, cycles in ((1.0, 8.0), (0.7, 13.7))
+    ]
     energies = np.exp(-1.6 * time) * np.square(swing)
-    energies += _NOISE * energies.max() * np.random.default_rng(14).standard_normal(energies.shape)
-    return _written(f"parts{states}.csv", time, *energies, names=("IE_left", "IE_right"))
+    energies += (
+        _NOISE
+        * energies.max()
+        * np.random.default_rng(14).standard_normal(energies.shape)
+    )
+    return _written(
+        f"parts{states}.csv", time, *energies, names=("IE_left", "IE_right")
+    )
 
 
-def _written(name: str, time: Samples, *energies: Samples, names: Sequence[str] = ("internal_energy",)) -> Path:
+def _written(
+    name: str,
+    time: Samples,
+    *energies: Samples,
+    names: Sequence[str] = ("internal_energy",),
+) -> Path:
     file = Path(_folder.name) / name
     if not file.exists():
-        columns = {column: np.round(energy, 9) for column, energy in zip(names, energies, strict=True)}
+        columns = {
+            column: np.round(energy, 9)
+            for column, energy in zip(names, energies, strict=True)
+        }
         file.write_bytes(csv_table.write({"time": time, **columns}))
     return file
 
@@ -296,12 +452,16 @@ def _runs() -> list[str]:
 
 def _cost(*command: str) -> float:
     """Processor time of a command, the less of two [s]."""
-    return min(processor_seconds(lambda: output("-m", "d2rpick", *command)) for _ in range(2))
+    return min(
+        processor_seconds(lambda: output("-m", "d2rpick", *command)) for _ in range(2)
+    )
 
 
 def _ratio(one: Sequence[str], other: Sequence[str], rounds: int = _ROUNDS) -> float:
     """Processor time of the first process over that of the second, in turns."""
-    return ratio(lambda: output(*one), lambda: output(*other), rounds, cost=processor_seconds)
+    return ratio(
+        lambda: output(*one), lambda: output(*other), rounds, cost=processor_seconds
+    )
 
 
 def _speed_up(command: Callable[[str], Sequence[str]], rounds: int) -> float | None:

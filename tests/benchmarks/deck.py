@@ -34,11 +34,13 @@ def large_deck() -> Iterator[Path]:
         with path.open("w", encoding="ascii") as deck:
             deck.write(HEAD + PARTS + "*NODE\n")
             deck.writelines(
-                f"{n:8d}{n * 0.5:16.7f}{-n * 0.25:16.7f}{n % 641:16.7f}       0       0\n" for n in range(1, NODES + 1)
+                f"{n:8d}{n * 0.5:16.7f}{-n * 0.25:16.7f}{n % 641:16.7f}       0       0\n"
+                for n in range(1, NODES + 1)
             )
             deck.write("*ELEMENT_SHELL\n")
             deck.writelines(
-                f"{n:8d}{n % 2 + 1:8d}{n:8d}{n + 1:8d}{n + 641:8d}{n + 640:8d}\n" for n in range(1, ELEMENTS + 1)
+                f"{n:8d}{n % 2 + 1:8d}{n:8d}{n + 1:8d}{n + 641:8d}{n + 640:8d}\n"
+                for n in range(1, ELEMENTS + 1)
             )
             deck.write(THERE + BACK)
         assert path.stat().st_size > 49 * MEGABYTE
@@ -55,7 +57,9 @@ def find_cards(path: Path) -> None:
     """Find the cards and derive the windows."""
     deck = read_deck(str(path))
     found = find_windows(read_switching(deck), read_parts(deck)).windows
-    assert [(window.part, window.tr, window.td) for window in found] == [(1, 0.02, 0.09)]
+    assert [(window.part, window.tr, window.td) for window in found] == [
+        (1, 0.02, 0.09)
+    ]
 
 
 def number_cards(path: Path) -> None:
@@ -95,7 +99,11 @@ def dynars_parser() -> Callable[[Path], None] | None:
 
 def to_loop(what: str) -> float:
     """Finding cards, the numbers of their lines, or parts and elements of the deck over a loop over all lines."""
-    ours = {"cards": find_cards, "lines of cards": number_cards, "inventory": inventory}[what]
+    ours = {
+        "cards": find_cards,
+        "lines of cards": number_cards,
+        "inventory": inventory,
+    }[what]
     with large_deck() as path:
         return ratio(lambda: ours(path), lambda: line_loop(path), _ROUNDS)
 
@@ -104,16 +112,23 @@ def troubled_to_loop(trouble: str) -> float:
     """Checking a deck of 20,000 of something over a loop over its lines: CPU of this process."""
     numbers = range(10, 20_010)
     deck = {
-        "parts on one card": "*PART\n" + "".join(f"door\n{n:10d}{1:10d}{1:10d}\n" for n in numbers),
+        "parts on one card": "*PART\n"
+        + "".join(f"door\n{n:10d}{1:10d}{1:10d}\n" for n in numbers),
         "rigid bodies": "".join(
-            f"*CONSTRAINED_NODAL_RIGID_BODY\n{n:10d}{0:10d}{n:10d}\n*SET_NODE_LIST\n{n:10d}\n{n:10d}\n" for n in numbers
+            f"*CONSTRAINED_NODAL_RIGID_BODY\n{n:10d}{0:10d}{n:10d}\n*SET_NODE_LIST\n{n:10d}\n{n:10d}\n"
+            for n in numbers
         ),
         "boxes of comments": f"$ {'*' * 70}\n$ {'G' * 70}\n" * len(numbers),
     }[trouble]
     with TemporaryDirectory() as folder:
         path = Path(folder) / "main.k"
         path.write_text(HEAD + PARTS + THERE + deck + BACK + END, "ascii")
-        return ratio(lambda: check(path), lambda: sum(1 for _ in path.open("rb")), _ROUNDS, cost=own_seconds)
+        return ratio(
+            lambda: check(path),
+            lambda: sum(1 for _ in path.open("rb")),
+            _ROUNDS,
+            cost=own_seconds,
+        )
 
 
 def check_to_dynars() -> float | None:
@@ -122,7 +137,9 @@ def check_to_dynars() -> float | None:
     if parse is None:
         return None
     with large_deck() as path:
-        return ratio(lambda: check(path), lambda: parse(path), 5 * _ROUNDS)  # of milliseconds only
+        return ratio(
+            lambda: check(path), lambda: parse(path), 5 * _ROUNDS
+        )  # of milliseconds only
 
 
 def many_to_parse() -> float:
@@ -132,7 +149,12 @@ def many_to_parse() -> float:
         for name in names:
             Path(name).write_text(GOOD, "ascii")
             os.utime(name, (1e9, 1e9))
-        return ratio(lambda: checked(names), lambda: [*map(read_deck, names)], _ROUNDS, cost=own_seconds)
+        return ratio(
+            lambda: checked(names),
+            lambda: [*map(read_deck, names)],
+            _ROUNDS,
+            cost=own_seconds,
+        )
 
 
 def memory() -> float:

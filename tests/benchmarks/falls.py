@@ -48,9 +48,16 @@ def fallen(random: np.random.Generator, count: int, states: int) -> Iterator[Fal
     damping = stiffness * periods / np.pi * 10 ** random.uniform(-3, -1, (count, 1))
     whole = masses.sum(axis=1)
     pushed = whole * random.uniform(0.5, 4, count) / length
-    strength = pushed[:, np.newaxis] * random.choice([0.4, 0.7, 100], (count, 1)) * np.ones(2)
-    starts, ends = random.uniform(0.1, 0.3, count) * length, random.uniform(0.7, 0.95, count) * length
-    starts = np.round(starts * states / length) / states * length  # a load ends at a state: none is half in it
+    strength = (
+        pushed[:, np.newaxis] * random.choice([0.4, 0.7, 100], (count, 1)) * np.ones(2)
+    )
+    starts, ends = (
+        random.uniform(0.1, 0.3, count) * length,
+        random.uniform(0.7, 0.95, count) * length,
+    )
+    starts = (
+        np.round(starts * states / length) / states * length
+    )  # a load ends at a state: none is half in it
     still = np.zeros((count, 3, 2))
     heavy = masses[..., np.newaxis] * np.array([0.0, -GRAVITY])
     ground = whole * (2 * np.pi / (0.2 * length)) ** 2
@@ -91,16 +98,30 @@ def main(count: int = 100, seed: int = 48) -> None:
             for at, fall in enumerate(fallen(random, batch, states)):
                 td, state = (fall.start + fall.end) / 2, float(fall.run.time[1])
                 for form, write in FALL_WRITERS.items():
-                    starts = [found_start(write(fall.run, Path(folder), kinetic=has), td) for has in (True, False)]
+                    starts = [
+                        found_start(write(fall.run, Path(folder), kinetic=has), td)
+                        for has in (True, False)
+                    ]
                     for has, start in zip(("with", "without"), starts, strict=True):
-                        good = start is not None and abs(start - fall.start) <= (WITHIN + 0.01) * state
+                        good = (
+                            start is not None
+                            and abs(start - fall.start) <= (WITHIN + 0.01) * state
+                        )
                         total[f"{form} {has}"] += 1
                         right[f"{form} {has}"] += good
                         if not good:
-                            print(f"{form} {has} kinetic: {number}/{at} {start} for {fall.start}", flush=True)
+                            print(
+                                f"{form} {has} kinetic: {number}/{at} {start} for {fall.start}",
+                                flush=True,
+                            )
                     with_, without = starts
-                    if without is not None and (with_ is None or with_ > without + 0.01 * state):
-                        print(f"{form} is shorter with kinetic energy: {number}/{at} {with_} for {without}", flush=True)
+                    if without is not None and (
+                        with_ is None or with_ > without + 0.01 * state
+                    ):
+                        print(
+                            f"{form} is shorter with kinetic energy: {number}/{at} {with_} for {without}",
+                            flush=True,
+                        )
                         shorter[form] += 1
     for name, size in total.items():
         print(f"{name:20s}{size:6d} falls{right[name]:6d} right")

@@ -24,7 +24,9 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-    Force = Callable[[float, Samples, Samples], Samples]  # of time, place and speed of the first masses, (n, 2)
+    Force = Callable[
+        [float, Samples, Samples], Samples
+    ]  # of time, place and speed of the first masses, (n, 2)
 
 STATES, STEPS, DIGITS, GRAVITY = 1000, 8, 7, 9.81
 # It flies where the force, without gravity, is below this share of its peak.  A claim is wrong where more than this
@@ -47,27 +49,52 @@ class Flown(NamedTuple):
 TIME: Final = np.linspace(0, 1, STATES + 1)
 
 
-def computed(random: np.random.Generator, count: int, force: Force, *, falling: bool) -> Iterator[Flown]:
+def computed(
+    random: np.random.Generator, count: int, force: Force, *, falling: bool
+) -> Iterator[Flown]:
     """Integrate ``count`` chains in time at once."""
-    masses, stiffness = random.uniform(5, 50, (count, 3, 1)), random.uniform(5e4, 2e5, (count, 2, 1))
+    masses, stiffness = (
+        random.uniform(5, 50, (count, 3, 1)),
+        random.uniform(5e4, 2e5, (count, 2, 1)),
+    )
     damping = random.choice([0.0, 20.0], (count, 1, 1))
-    weight = masses * np.array([0.0, -GRAVITY]) * random.integers(0, 2, (count, 1, 1)) * falling
+    weight = (
+        masses
+        * np.array([0.0, -GRAVITY])
+        * random.integers(0, 2, (count, 1, 1))
+        * falling
+    )
     dt = 1 / (STATES * STEPS)
     moved = np.zeros((count, 3, 2))
-    velocity = np.repeat(random.normal(size=(count, 1, 2)) * random.uniform(0.5, 10, (count, 1, 1)), 3, axis=1)
+    velocity = np.repeat(
+        random.normal(size=(count, 1, 2)) * random.uniform(0.5, 10, (count, 1, 1)),
+        3,
+        axis=1,
+    )
     rows = []
     for step in range(STATES * STEPS + 1):
-        outer, stretch = force(step * dt, moved[:, 0], velocity[:, 0]), np.diff(moved, axis=1)
+        outer, stretch = (
+            force(step * dt, moved[:, 0], velocity[:, 0]),
+            np.diff(moved, axis=1),
+        )
         if step % STEPS == 0:
-            kinetic, internal = (masses * velocity**2).sum((1, 2)) / 2, (stiffness * stretch**2).sum((1, 2)) / 2
+            kinetic, internal = (
+                (masses * velocity**2).sum((1, 2)) / 2,
+                (stiffness * stretch**2).sum((1, 2)) / 2,
+            )
             rows.append((masses * velocity, kinetic, internal, outer))
-        pull = np.pad(stiffness * stretch + damping * np.diff(velocity, axis=1), ((0, 0), (1, 1), (0, 0)))
+        pull = np.pad(
+            stiffness * stretch + damping * np.diff(velocity, axis=1),
+            ((0, 0), (1, 1), (0, 0)),
+        )
         total = np.diff(pull, axis=1) + weight
         total[:, 0] += outer
         velocity = velocity + dt * total / masses
         moved = moved + dt * velocity
     columns = [np.stack(column, axis=1) for column in zip(*rows, strict=True)]
-    yield from (Flown(*record) for record in zip(*columns, masses[:, :, 0], strict=True))
+    yield from (
+        Flown(*record) for record in zip(*columns, masses[:, :, 0], strict=True)
+    )
 
 
 def fading(random: np.random.Generator, count: int) -> Force:
@@ -76,7 +103,11 @@ def fading(random: np.random.Generator, count: int) -> Force:
     power, vectors = random.uniform(1.5, 6, count), pushes(random, count)
 
     def force(t: float, *_: Samples) -> Samples:
-        shapes = np.exp(-3 * t / lasts), (1 + t / lasts) ** -power, np.sin(np.pi * np.minimum(t / lasts, 1))
+        shapes = (
+            np.exp(-3 * t / lasts),
+            (1 + t / lasts) ** -power,
+            np.sin(np.pi * np.minimum(t / lasts, 1)),
+        )
         return np.asarray(np.choose(kind, shapes)[:, np.newaxis] * vectors)
 
     return force
@@ -84,23 +115,36 @@ def fading(random: np.random.Generator, count: int) -> Force:
 
 def repeated(random: np.random.Generator, count: int) -> Force:
     """Two to five half-sine pushes."""
-    starts, lengths = random.uniform(0, 0.9, (5, count)), random.uniform(0.01, 0.08, (5, count))
+    starts, lengths = (
+        random.uniform(0, 0.9, (5, count)),
+        random.uniform(0.01, 0.08, (5, count)),
+    )
     vectors = np.stack([pushes(random, count) for _ in range(5)])
     vectors[random.integers(2, 6, count) <= np.arange(5)[:, np.newaxis]] = 0
 
     def force(t: float, *_: Samples) -> Samples:
         inside = (t >= starts) & (t <= starts + lengths)
-        return np.asarray(((np.sin(np.pi * (t - starts) / lengths) * inside)[..., np.newaxis] * vectors).sum(axis=0))
+        return np.asarray(
+            (
+                (np.sin(np.pi * (t - starts) / lengths) * inside)[..., np.newaxis]
+                * vectors
+            ).sum(axis=0)
+        )
 
     return force
 
 
 def wall(random: np.random.Generator, count: int) -> Force:
     """A fixed elastic wall: it throws back what hits it, and what it stores for a moment is written nowhere."""
-    at, stiffness = random.uniform(0.02, 1.0, count), 10 ** random.uniform(4, 6.5, count)
+    at, stiffness = (
+        random.uniform(0.02, 1.0, count),
+        10 ** random.uniform(4, 6.5, count),
+    )
 
     def force(_: float, moved: Samples, __: Samples) -> Samples:
-        size = -stiffness * np.maximum(moved[:, 0] - at, 0) + stiffness * np.maximum(-moved[:, 0] - at, 0)
+        size = -stiffness * np.maximum(moved[:, 0] - at, 0) + stiffness * np.maximum(
+            -moved[:, 0] - at, 0
+        )
         return np.column_stack([size, np.zeros(count)])
 
     return force
@@ -114,10 +158,17 @@ def friction(random: np.random.Generator, count: int) -> Force:
 
 def pushes(random: np.random.Generator, count: int) -> Samples:
     """Random forces, (n, 2)."""
-    return np.asarray(random.normal(size=(count, 2)) * 10 ** random.uniform(3, 5, (count, 1)))
+    return np.asarray(
+        random.normal(size=(count, 2)) * 10 ** random.uniform(3, 5, (count, 1))
+    )
 
 
-CLASSES: Final = {"fading": fading, "repeated": repeated, "wall": wall, "friction": friction}
+CLASSES: Final = {
+    "fading": fading,
+    "repeated": repeated,
+    "wall": wall,
+    "friction": friction,
+}
 
 
 def history_of(run: Flown, form: str) -> History:
@@ -126,7 +177,9 @@ def history_of(run: Flown, form: str) -> History:
     kinetic, internal = printed(run.kinetic, DIGITS), printed(run.internal, DIGITS)
     momenta: tuple[Momenta, ...] = ()
     if form != "totals":
-        values = run.momentum if form == "parts" else run.momentum.sum(axis=1, keepdims=True)
+        values = (
+            run.momentum if form == "parts" else run.momentum.sum(axis=1, keepdims=True)
+        )
         values = np.concatenate([values, np.zeros((*values.shape[:2], 1))], axis=2)
         values = printed(values.ravel(), DIGITS).reshape(values.shape)
         masses = run.masses if form == "parts" else run.masses.sum(keepdims=True)
@@ -134,24 +187,56 @@ def history_of(run: Flown, form: str) -> History:
         momenta = (Momenta(TIME, values, known, precision, chosen, masses=masses),)
     velocity = momenta[0].values[:, 0] if form == "momenta" else None
     balance = Balance(TIME, internal, kinetic, velocity=velocity, precision=precision)
-    return History(TIME, internal, ("made",), "made", "E", energy_precision=precision, evidence=Given(momenta, balance))
+    return History(
+        TIME,
+        internal,
+        ("made",),
+        "made",
+        "E",
+        energy_precision=precision,
+        evidence=Given(momenta, balance),
+    )
 
 
 def counted(run: Flown, form: str) -> Counter[str]:
     """Count flights claimed that are not graded poor, those that are wrong, true flights, and those that are missed."""
     found = flights_of(history_of(run, form), Settings(replay=False))
     claims = [(f.start or 0.0, TIME[-1] if f.end is None else f.end) for f in found]
-    believed = [claim for claim, flight in zip(claims, found, strict=True) if not flight.unknown_load]
-    impulse = np.concatenate([np.zeros((1, 2)), np.cumsum((run.force[1:] + run.force[:-1]) / 2, axis=0) / STATES])
+    believed = [
+        claim
+        for claim, flight in zip(claims, found, strict=True)
+        if not flight.unknown_load
+    ]
+    impulse = np.concatenate(
+        [
+            np.zeros((1, 2)),
+            np.cumsum((run.force[1:] + run.force[:-1]) / 2, axis=0) / STATES,
+        ]
+    )
     largest = np.linalg.norm(run.momentum.sum(axis=1), axis=1).max()
     inside = [impulse[(start <= TIME) & (end >= TIME)] for start, end in believed]
-    wrong = sum(bool(np.linalg.norm(one - one[0], axis=1).max() > LITTLE * largest) for one in inside)
+    wrong = sum(
+        bool(np.linalg.norm(one - one[0], axis=1).max() > LITTLE * largest)
+        for one in inside
+    )
     size = np.linalg.norm(run.force, axis=1)
-    edges = np.flatnonzero(np.diff(np.pad(size <= LITTLE * size.max(), 1).astype(int))).reshape(-1, 2)
-    flights = [(a / STATES, (b - 1) / STATES) for a, b in edges.tolist() if b - a > LONG * STATES]
-    flights = [one for one in flights if _steady_for(impulse, one, LITTLE * largest) > LONG]
-    missed = sum(not any(start < b and a < end for start, end in claims) for a, b in flights)
-    return Counter(claimed=len(believed), wrong=wrong, flights=len(flights), missed=missed)
+    edges = np.flatnonzero(
+        np.diff(np.pad(size <= LITTLE * size.max(), 1).astype(int))
+    ).reshape(-1, 2)
+    flights = [
+        (a / STATES, (b - 1) / STATES)
+        for a, b in edges.tolist()
+        if b - a > LONG * STATES
+    ]
+    flights = [
+        one for one in flights if _steady_for(impulse, one, LITTLE * largest) > LONG
+    ]
+    missed = sum(
+        not any(start < b and a < end for start, end in claims) for a, b in flights
+    )
+    return Counter(
+        claimed=len(believed), wrong=wrong, flights=len(flights), missed=missed
+    )
 
 
 def _steady_for(impulse: Samples, flight: tuple[float, float], most: float) -> float:
@@ -167,10 +252,14 @@ def main(count: int = 300, seed: int = 27) -> None:
     print(f"{'load':10s}{'form':10s}" + "".join(f"{name:>9s}" for name in names))
     for number, (name, load) in enumerate(CLASSES.items()):
         random = np.random.default_rng((seed, number))
-        runs = list(computed(random, count, load(random, count), falling=name != "friction"))
+        runs = list(
+            computed(random, count, load(random, count), falling=name != "friction")
+        )
         for form in FORMS:
             total = sum((counted(run, form) for run in runs), Counter[str]())
-            print(f"{name:10s}{form:10s}" + "".join(f"{total[one]:9d}" for one in names))
+            print(
+                f"{name:10s}{form:10s}" + "".join(f"{total[one]:9d}" for one in names)
+            )
 
 
 if __name__ == "__main__":

@@ -17,7 +17,16 @@ from d2rpick.histories.history import History
 from d2rpick.vibration.identify import identify
 from d2rpick.vibration.modes import Mode
 from tests.benchmarks.timing import ratio
-from tests.records import ENERGY, MODE, TIME, energy_of, level_crossings, printed, replayed_residual, vibration
+from tests.records import (
+    ENERGY,
+    MODE,
+    TIME,
+    energy_of,
+    level_crossings,
+    printed,
+    replayed_residual,
+    vibration,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -70,7 +79,11 @@ class Stated(NamedTuple):
 
 def small_second_modes(kind: str, seeds: Iterable[int]) -> list[Stated]:
     """What is stated of random records, seeded, of one of the kinds; those without a recommended pair left out."""
-    return [found for seed in seeds if (found := _stated(np.random.default_rng(seed), _SHARES[kind]))]
+    return [
+        found
+        for seed in seeds
+        if (found := _stated(np.random.default_rng(seed), _SHARES[kind]))
+    ]
 
 
 def within(found: list[Stated]) -> tuple[float, float, float]:
@@ -78,7 +91,11 @@ def within(found: list[Stated]) -> tuple[float, float, float]:
     off = [abs(one.stated - one.true) for one in found]
     beyond = [max(one.stated - one.true, one.true - one.highest, 0.0) for one in found]
     held = [one.held for one in found if one.held is not None]
-    return float(np.percentile(off, 95)), float(np.percentile(beyond, 95)), float(np.mean(held))
+    return (
+        float(np.percentile(off, 95)),
+        float(np.percentile(beyond, 95)),
+        float(np.mean(held)),
+    )
 
 
 def _stated(rng: np.random.Generator, least: float) -> Stated | None:
@@ -86,7 +103,11 @@ def _stated(rng: np.random.Generator, least: float) -> Stated | None:
     energy = energy_of(truth, time)
     energy = energy + noise * energy.max() * rng.standard_normal(time.size)
     td = float(time[-1] * rng.uniform(0.5, 0.9))
-    answer = suggest(History(time, energy, source=("made",), format="csv", channel="E"), td, Settings(after=0.0))
+    answer = suggest(
+        History(time, energy, source=("made",), format="csv", channel="E"),
+        td,
+        Settings(after=0.0),
+    )
     best = next((one for one in answer.candidates if one.recommended), None)
     if best is None or best.residual is None:
         return None
@@ -95,17 +116,29 @@ def _stated(rng: np.random.Generator, least: float) -> Stated | None:
     assert best.tr_high is not None
     crossings = level_crossings(truth, td, -0.2)
     seen = best.kind == "crossing" and bool(np.any(np.abs(crossings - best.tr) < _NEAR))
-    held = bool(np.any((best.tr_low <= crossings) & (crossings <= best.tr_high))) if seen else None
+    held = (
+        bool(np.any((best.tr_low <= crossings) & (crossings <= best.tr_high)))
+        if seen
+        else None
+    )
     true = float(replayed_residual(truth, np.array([best.tr]), td)[0])
     return Stated(best.residual, best.residual_high, true, held)
 
 
-def _random_modes(rng: np.random.Generator, share: float) -> tuple[list[Mode], Samples, float]:
+def _random_modes(
+    rng: np.random.Generator, share: float
+) -> tuple[list[Mode], Samples, float]:
     """Modes of one damping, the first with period 1, the other with that share of the energy; times, and noise."""
     alpha, periods = rng.uniform(0, 0.5), rng.uniform(3, 12)
-    rates = 2 * np.pi * np.array([1.0, rng.choice([rng.uniform(1.3, 4), rng.uniform(0.35, 0.75)])])
+    rates = (
+        2
+        * np.pi
+        * np.array([1.0, rng.choice([rng.uniform(1.3, 4), rng.uniform(0.35, 0.75)])])
+    )
     roots, phases = np.sqrt([1 - share, share]), rng.uniform(0, 2 * np.pi, 2)
-    table = np.stack([rates, roots * np.cos(phases), roots * np.sin(phases)], axis=1)[: 2 if share else 1].tolist()
+    table = np.stack([rates, roots * np.cos(phases), roots * np.sin(phases)], axis=1)[
+        : 2 if share else 1
+    ].tolist()
     time = np.arange(0, periods, 1 / np.exp(rng.uniform(np.log(15), np.log(200))))
     noise = rng.choice([0.0, np.exp(rng.uniform(np.log(1e-4), np.log(0.03)))])
     modes = [Mode(rate, alpha, cosine, sine, 0.0) for rate, cosine, sine in table]
@@ -116,4 +149,6 @@ if __name__ == "__main__":
     for name, count in (("one", 600), ("small", 200), ("large", 200)):
         records = small_second_modes(name, range(count))
         residual, beyond, crossing = within(records)
-        print(f"{name}: {len(records)} of {count}, 95 % within {residual:.3g}, {beyond:.3g}; tr held {crossing:.3f}")
+        print(
+            f"{name}: {len(records)} of {count}, 95 % within {residual:.3g}, {beyond:.3g}; tr held {crossing:.3f}"
+        )

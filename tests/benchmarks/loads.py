@@ -19,7 +19,14 @@ from d2rpick.base.errors import D2RPickError
 from d2rpick.choice.answers import suggest_of
 from d2rpick.choice.flights import flights_of
 from d2rpick.choice.question import Settings, read
-from tests.benchmarks.chains import Chains, Run, directions, half_sine, integrated, on_first
+from tests.benchmarks.chains import (
+    Chains,
+    Run,
+    directions,
+    half_sine,
+    integrated,
+    on_first,
+)
 from tests.written_runs import WRITERS
 
 if TYPE_CHECKING:
@@ -61,7 +68,9 @@ def friction(random: np.random.Generator, count: int) -> Load:
 
     def force(_: float, masses: Samples, __: Samples, velocity: Samples) -> Samples:
         whole = masses.sum(axis=1, keepdims=True)
-        carried = np.where(only_first, whole * (np.arange(3) == 0), masses)[..., np.newaxis]
+        carried = np.where(only_first, whole * (np.arange(3) == 0), masses)[
+            ..., np.newaxis
+        ]
         speed = np.linalg.norm(velocity, axis=2, keepdims=True)
         return np.asarray(-size * carried * velocity / np.maximum(speed, 0.01))
 
@@ -70,7 +79,10 @@ def friction(random: np.random.Generator, count: int) -> Load:
 
 def drag(random: np.random.Generator, count: int) -> Load:
     """Drag by the square of the speed, on the first mass or on two of them."""
-    size, on_first = 10 ** random.uniform(-2.5, 0, (count, 1, 1)), random.uniform(0.5, 2.0, (count, 1, 1)).clip(max=1)
+    size, on_first = (
+        10 ** random.uniform(-2.5, 0, (count, 1, 1)),
+        random.uniform(0.5, 2.0, (count, 1, 1)).clip(max=1),
+    )
     shares = np.concatenate([on_first, 1 - on_first, 0 * on_first], axis=1)
 
     def force(_: float, masses: Samples, __: Samples, velocity: Samples) -> Samples:
@@ -83,11 +95,16 @@ def drag(random: np.random.Generator, count: int) -> Load:
 
 def late_contact(random: np.random.Generator, count: int) -> Load:
     """A light contact late in the record, at the first mass."""
-    start, length = random.uniform(0.4, 0.85, count), 10 ** random.uniform(-2, -0.7, count)
+    start, length = (
+        random.uniform(0.4, 0.85, count),
+        10 ** random.uniform(-2, -0.7, count),
+    )
     size, along = 10 ** random.uniform(-1.5, 1, count), directions(random, count)
 
     def force(time: float, masses: Samples, _: Samples, __: Samples) -> Samples:
-        pushed = (size * masses.sum(axis=1) * half_sine(time, start, length))[:, np.newaxis] * along
+        pushed = (size * masses.sum(axis=1) * half_sine(time, start, length))[
+            :, np.newaxis
+        ] * along
         return on_first(pushed)
 
     return Load(force)
@@ -108,7 +125,10 @@ def airbag(random: np.random.Generator, count: int) -> Load:
 
 def rope(random: np.random.Generator, count: int) -> Load:
     """A rope to the ground that is slack up to its length."""
-    length, pull = random.uniform(0.3, 3, (count, 1)), 10 ** random.uniform(1, 4, (count, 1))
+    length, pull = (
+        random.uniform(0.3, 3, (count, 1)),
+        10 ** random.uniform(1, 4, (count, 1)),
+    )
 
     def force(_: float, __: Samples, places: Samples, ___: Samples) -> Samples:
         distance = np.linalg.norm(places[:, 0], axis=1, keepdims=True)
@@ -124,7 +144,9 @@ def couple(random: np.random.Generator, count: int) -> Load:
     size, along = 10 ** random.uniform(-1, 1, count), directions(random, count)
 
     def force(time: float, masses: Samples, _: Samples, __: Samples) -> Samples:
-        pushed = (size * masses.sum(axis=1) * half_sine(time, start, length))[:, np.newaxis] * along
+        pushed = (size * masses.sum(axis=1) * half_sine(time, start, length))[
+            :, np.newaxis
+        ] * along
         return np.stack([pushed, -pushed, np.zeros_like(pushed)], axis=1)
 
     return Load(force)
@@ -135,12 +157,20 @@ def other_gravity(random: np.random.Generator, count: int) -> Load:
     size = random.choice(OTHER_GRAVITIES, count)[:, np.newaxis, np.newaxis]
 
     def force(_: float, masses: Samples, places: Samples, __: Samples) -> Samples:
-        return np.asarray(masses[..., np.newaxis] * size * np.array([0.0, -1.0]) * np.ones_like(places))
+        return np.asarray(
+            masses[..., np.newaxis]
+            * size
+            * np.array([0.0, -1.0])
+            * np.ones_like(places)
+        )
 
     return Load(force, falling=False)
 
 
-CLASSES: Final = {one.__name__: one for one in (friction, drag, late_contact, airbag, rope, couple, other_gravity)}
+CLASSES: Final = {
+    one.__name__: one
+    for one in (friction, drag, late_contact, airbag, rope, couple, other_gravity)
+}
 
 
 def computed(random: np.random.Generator, count: int, load: Load) -> Iterator[Run]:
@@ -149,18 +179,27 @@ def computed(random: np.random.Generator, count: int, load: Load) -> Iterator[Ru
     Every other one has a single spring and moves along x: one oscillator describes its energy.
     """
     masses = random.uniform(5, 50, (count, 3))
-    stiffness = masses.mean(axis=1)[:, np.newaxis] * random.uniform(30, 150, (count, 2)) ** 2
+    stiffness = (
+        masses.mean(axis=1)[:, np.newaxis] * random.uniform(30, 150, (count, 2)) ** 2
+    )
     masses[::2, 2], stiffness[::2, 1] = _NO_MASS, 0.0
     damping = stiffness * random.choice([0.0, 2e-5, 2e-4], (count, 1))
     falls = (random.integers(0, 2, count) * load.falling)[:, np.newaxis, np.newaxis]
     heavy = masses[..., np.newaxis] * np.array([0.0, -GRAVITY]) * falls
     speed = directions(random, count) * random.uniform(1, 12, (count, 1))
-    places = random.normal(size=(count, 3, 2)) * random.uniform(1e-3, 2e-2, (count, 1, 1))
+    places = random.normal(size=(count, 3, 2)) * random.uniform(
+        1e-3, 2e-2, (count, 1, 1)
+    )
     places[::2, :, 1] = 0
     velocities, never = np.repeat(speed[:, np.newaxis], 3, axis=1), np.zeros(count)
-    chains = Chains(masses, stiffness, damping, 0 * stiffness, never, places, velocities)
+    chains = Chains(
+        masses, stiffness, damping, 0 * stiffness, never, places, velocities
+    )
     whole, lasts = masses.sum(axis=1), random.uniform(0.02, 0.1, count)
-    pushed = directions(random, count) * (whole * random.uniform(5, 50, count))[:, np.newaxis]
+    pushed = (
+        directions(random, count)
+        * (whole * random.uniform(5, 50, count))[:, np.newaxis]
+    )
 
     def force(time: float, moved: Samples, velocity: Samples) -> Samples:
         push = on_first(pushed * half_sine(time, 0 * lasts, lasts)[:, np.newaxis])
@@ -192,22 +231,32 @@ def counted(reference: Reference, run: Run) -> Counter[str]:
         counts["wrong"] += changes(impulse, time, pair.tr, pair.td) > WRONG * largest
     true = list(_true_flights(impulse, time, STEADY * largest))
     try:
-        shown = [one.within(time) for one in flights_of(reference.history, Settings(replay=False))]
+        shown = [
+            one.within(time)
+            for one in flights_of(reference.history, Settings(replay=False))
+        ]
     except D2RPickError:
         shown = []
     counts["flights"] += len(true)
-    counts["missed"] += sum(not any(start < b and a < end for start, end in shown) for a, b in true)
+    counts["missed"] += sum(
+        not any(start < b and a < end for start, end in shown) for a, b in true
+    )
     return counts
 
 
-def _true_flights(impulse: Samples, time: Samples, room: float) -> Iterator[tuple[float, float]]:
+def _true_flights(
+    impulse: Samples, time: Samples, room: float
+) -> Iterator[tuple[float, float]]:
     """Give the longest stretches in which an impulse changes by at most ``room``, one after the other."""
     first = 0
     while first < time.size - 1:
         last = first
         low = high = impulse[first]
         while last < time.size - 1:
-            low, high = np.minimum(low, impulse[last + 1]), np.maximum(high, impulse[last + 1])
+            low, high = (
+                np.minimum(low, impulse[last + 1]),
+                np.maximum(high, impulse[last + 1]),
+            )
             if np.linalg.norm(high - low) > room:
                 break
             last += 1
@@ -229,7 +278,11 @@ def main(count: int = 60, seed: int = 48) -> None:
                 total: Counter[str] = Counter()
                 for run in runs:
                     total += counted(read([write(run.written, Path(folder))]), run)
-                print(f"{name:15s}{form:10s}" + "".join(f"{total[one]:9d}" for one in names), flush=True)
+                print(
+                    f"{name:15s}{form:10s}"
+                    + "".join(f"{total[one]:9d}" for one in names),
+                    flush=True,
+                )
 
 
 if __name__ == "__main__":

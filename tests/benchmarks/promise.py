@@ -97,14 +97,21 @@ def tabulate(name: str, trials: Sequence[Trial]) -> pd.DataFrame:
     for number, trial in enumerate(trials):
         pair = trial.pair._asdict() if trial.pair else dict.fromkeys(Pair._fields)
         rows.append({"class": name, "number": number} | trial._asdict() | pair)
-    return pd.DataFrame(rows).drop(columns="pair").astype(dict.fromkeys(_NUMBERS, float))
+    return (
+        pd.DataFrame(rows).drop(columns="pair").astype(dict.fromkeys(_NUMBERS, float))
+    )
 
 
 def write_record(record: Record, folder: Path) -> Path:
     """Write the file of a record."""
     path = folder / "record.csv"
-    names, values = list(record.columns), np.stack(list(record.columns.values()), axis=1)
-    np.savetxt(path, values, f"%.{record.digits}g", ",", header=",".join(names), comments="")
+    names, values = (
+        list(record.columns),
+        np.stack(list(record.columns.values()), axis=1),
+    )
+    np.savetxt(
+        path, values, f"%.{record.digits}g", ",", header=",".join(names), comments=""
+    )
     return path
 
 
@@ -117,8 +124,13 @@ def ask_for_pair(record: Record, folder: Path) -> Pair | None:
         If the record is refused.
     """
     path = write_record(record, folder)
-    answer = d2rpick.suggest(d2rpick.read(str(path), **record.read), **record.suggest).to_dict()
-    best = next((candidate for candidate in answer["candidates"] if candidate["recommended"]), None)
+    answer = d2rpick.suggest(
+        d2rpick.read(str(path), **record.read), **record.suggest
+    ).to_dict()
+    best = next(
+        (candidate for candidate in answer["candidates"] if candidate["recommended"]),
+        None,
+    )
     if best is None:
         return None
     tr, td, residual = best["tr"], answer["recommended"]["td"], best["residual"]
@@ -181,7 +193,9 @@ def count_group(rows: pd.DataFrame) -> dict[str, object]:
         "in band": _share(off <= _ROUNDING),
         "+-0.05": _share(off <= WITHIN),
         "worst above": f"{above.max():.2f}" if len(above) else "-",
-        "by basis": ", ".join(f"{basis} {count}" for basis, count in pairs["basis"].value_counts().items()),
+        "by basis": ", ".join(
+            f"{basis} {count}" for basis, count in pairs["basis"].value_counts().items()
+        ),
     }
 
 
@@ -197,13 +211,18 @@ def _compare(pairs: pd.DataFrame) -> str:
     """Return the median of the true residuals, that of the oracle in brackets, and the number of pairs."""
     if pairs.empty:
         return "-"
-    return f"{pairs['true'].median():.2f} ({pairs['oracle'].median():.2f}) n={len(pairs)}"
+    return (
+        f"{pairs['true'].median():.2f} ({pairs['oracle'].median():.2f}) n={len(pairs)}"
+    )
 
 
 def print_tables(rows: pd.DataFrame) -> None:
     """Print a line for each class and all, then one for each basis of a recommendation."""
     for key in ("class", "basis"):
-        counts = {str(name): count_group(group) for name, group in rows.groupby(key, sort=False)}
+        counts = {
+            str(name): count_group(group)
+            for name, group in rows.groupby(key, sort=False)
+        }
         if key == "class":
             counts["all"] = count_group(rows)
         table = pd.DataFrame.from_dict(counts, orient="index").rename_axis(columns=key)
@@ -217,16 +236,38 @@ def try_class(name: str, count: int, seed: int) -> list[Trial]:
     """Try so many records of a class."""
     with TemporaryDirectory() as folder:
         numbers = range(count)
-        return [try_record(CLASSES[name](np.random.default_rng([seed, number])), Path(folder)) for number in numbers]
+        return [
+            try_record(
+                CLASSES[name](np.random.default_rng([seed, number])), Path(folder)
+            )
+            for number in numbers
+        ]
 
 
-def run_benchmark(classes: Mapping[str, Any], try_records: TryClass, description: str) -> None:
+def run_benchmark(
+    classes: Mapping[str, Any], try_records: TryClass, description: str
+) -> None:
     """Try the classes that the command line names, and print what became of them."""
     parser = argparse.ArgumentParser(description=description)
-    parser.add_argument("records", nargs="?", type=int, default=100, help="number of records in a class [default: 100]")
-    parser.add_argument("seed", nargs="?", type=int, default=1, help="seed of the records [default: 1]")
-    parser.add_argument("names", nargs="*", metavar="CLASS", help="part of the name of a class [default: all classes]")
-    parser.add_argument("--csv", type=Path, metavar="FILE", help="write a row for each record to FILE")
+    parser.add_argument(
+        "records",
+        nargs="?",
+        type=int,
+        default=100,
+        help="number of records in a class [default: 100]",
+    )
+    parser.add_argument(
+        "seed", nargs="?", type=int, default=1, help="seed of the records [default: 1]"
+    )
+    parser.add_argument(
+        "names",
+        nargs="*",
+        metavar="CLASS",
+        help="part of the name of a class [default: all classes]",
+    )
+    parser.add_argument(
+        "--csv", type=Path, metavar="FILE", help="write a row for each record to FILE"
+    )
     options = parser.parse_args()
     tables = []
     for name in classes:
@@ -234,8 +275,15 @@ def run_benchmark(classes: Mapping[str, Any], try_records: TryClass, description
             continue
         start = time.perf_counter()
         trials = try_records(name, options.records, options.seed)
-        taken, asking = time.perf_counter() - start, sum(trial.seconds for trial in trials)
-        print(f"{name}: {taken:.0f} s, of these {asking:.0f} s asking", file=sys.stderr, flush=True)
+        taken, asking = (
+            time.perf_counter() - start,
+            sum(trial.seconds for trial in trials),
+        )
+        print(
+            f"{name}: {taken:.0f} s, of these {asking:.0f} s asking",
+            file=sys.stderr,
+            flush=True,
+        )
         tables.append(tabulate(name, trials).assign(seed=options.seed))
         if options.csv:  # after each class, since all take an hour
             pd.concat(tables, ignore_index=True).to_csv(options.csv, index=False)
@@ -246,4 +294,8 @@ def run_benchmark(classes: Mapping[str, Any], try_records: TryClass, description
 
 
 if __name__ == "__main__":
-    run_benchmark(CLASSES, try_class, "What a recommended pair, its stated residual and its grade are worth.")
+    run_benchmark(
+        CLASSES,
+        try_class,
+        "What a recommended pair, its stated residual and its grade are worth.",
+    )

@@ -12,7 +12,13 @@ from scipy.special import ellipj
 
 from d2rpick.histories.history import Samples
 from tests.benchmarks.promise_modes import Load, Modes, Parts, Stretch
-from tests.benchmarks.promise_records import Make, Record, add_evidence, ask_for_times, draw_log
+from tests.benchmarks.promise_records import (
+    Make,
+    Record,
+    add_evidence,
+    ask_for_times,
+    draw_log,
+)
 from tests.benchmarks.promise_truth import Truth
 
 # A longer record would only take longer.
@@ -78,9 +84,13 @@ def make_linear(
     if stretch is not None:
         first_period = np.linspace(flight_start, flight_start + period, 400)
         swings = np.abs(modes.compute_states(first_period)[0]).max(axis=0)
-        modes = modes._replace(stretch=stretch(random, Surroundings(period, flight_start, swings)))
+        modes = modes._replace(
+            stretch=stretch(random, Surroundings(period, flight_start, swings))
+        )
     flight_end = flight_start + random.uniform(4, 15) * period
-    time = _draw_times(random, modes.fastest_period / 2, flight_end, irregular=irregular, coarse=coarse)
+    time = _draw_times(
+        random, modes.fastest_period / 2, flight_end, irregular=irregular, coarse=coarse
+    )
 
     elastic, kinetic = modes.compute_energies(time)
     part_count = elastic.shape[1]
@@ -91,25 +101,35 @@ def make_linear(
     worked = work * np.clip(time / flight_start, 0, 1) ** 2
     scatter = noise * swing * random.standard_normal(elastic.shape)
     # The parts share the work, and the noise of their sum is that of one record.
-    energies = elastic + worked[:, np.newaxis] / part_count + scatter / np.sqrt(part_count)
+    energies = (
+        elastic + worked[:, np.newaxis] / part_count + scatter / np.sqrt(part_count)
+    )
 
     names = list(PART_COLUMNS) if part_count > 1 else ["internal_energy"]
     columns = {"time": time}
     columns |= dict(zip(names, unit * energies.T, strict=True))
-    columns |= add_evidence(random, time, _add_impulses(modes.loads, time), unit * kinetic)
+    columns |= add_evidence(
+        random, time, _add_impulses(modes.loads, time), unit * kinetic
+    )
     suggest = ask_for_times(random, flight_start, flight_end)
     if random.random() < 1 / 4:
         suggest["after"] = flight_start
     read = {"energy": names} if part_count > 1 else {}
-    return Record(columns, Truth(modes, (flight_start, flight_end)), read=read, suggest=suggest)
+    return Record(
+        columns, Truth(modes, (flight_start, flight_end)), read=read, suggest=suggest
+    )
 
 
 def _add_impulses(loads: Sequence[Load], time: Samples) -> Samples:
     """Return what the loads have given until the times, shape (n,); a short kick may lie between two of them."""
-    return np.asarray(sum(np.abs(load.heights).max() * load.integrate(time) for load in loads))
+    return np.asarray(
+        sum(np.abs(load.heights).max() * load.integrate(time) for load in loads)
+    )
 
 
-def _draw_loads(random: np.random.Generator, shape: Shapes, period: float, *, fading: bool) -> list[Load]:
+def _draw_loads(
+    random: np.random.Generator, shape: Shapes, period: float, *, fading: bool
+) -> list[Load]:
     """Draw up to three pushes, and a kick behind them in most records, or a load that fades."""
     scale = shape.loaded * np.exp(random.uniform(np.log(0.2), 0.0, shape.ratios.size))
 
@@ -121,22 +141,40 @@ def _draw_loads(random: np.random.Generator, shape: Shapes, period: float, *, fa
     kicked = random.random() < 3 / 4
     for _ in range(int(random.integers(0 if kicked or fading else 1, 4))):
         start += random.uniform(0, 1.0) * period
-        height = 0.4 if kicked else 1.0  # slow modes are not to drown what a kick leaves of the fast ones
-        loads.append(Load(start, draw_log(random, 0.1, 1.5) * period, height * draw_heights()))
+        height = (
+            0.4 if kicked else 1.0
+        )  # slow modes are not to drown what a kick leaves of the fast ones
+        loads.append(
+            Load(start, draw_log(random, 0.1, 1.5) * period, height * draw_heights())
+        )
     pushed_until = max((load.end for load in loads), default=0.0)
     take_off = pushed_until + random.uniform(0.1, 0.8) * period
     fastest_period = period / shape.ratios.max()
     if fading:
-        loads.append(Load(take_off, draw_log(random, 0.05, 0.6) * period, 2 * draw_heights(), fades=True))
+        loads.append(
+            Load(
+                take_off,
+                draw_log(random, 0.05, 0.6) * period,
+                2 * draw_heights(),
+                fades=True,
+            )
+        )
     elif kicked:
         duration = random.uniform(0.2, 0.8) * fastest_period
-        impulse = 1 / (4 * shape.ratios * duration / period)  # a short push: speed over undamped frequency
+        impulse = 1 / (
+            4 * shape.ratios * duration / period
+        )  # a short push: speed over undamped frequency
         loads.append(Load(take_off, duration, impulse * draw_heights()))
     return loads
 
 
 def _draw_times(
-    random: np.random.Generator, fastest_period: float, end: float, *, irregular: bool, coarse: bool
+    random: np.random.Generator,
+    fastest_period: float,
+    end: float,
+    *,
+    irregular: bool,
+    coarse: bool,
 ) -> Samples:
     """Draw the times of states, some in each period of the fastest line of the energy."""
     density = draw_log(random, 2.2, 8.0) if coarse else draw_log(random, 10.0, 50.0)
@@ -146,7 +184,9 @@ def _draw_times(
         return np.arange(0.0, end, step)
     steps = step * random.uniform(0.4, 1.6, int(3 * end / step) + 2)
     if random.random() < 0.5:
-        restart = random.integers(0, int(end / step))  # a restart with another interval of output
+        restart = random.integers(
+            0, int(end / step)
+        )  # a restart with another interval of output
         steps[restart:] *= random.choice([0.5, 2.0])
     time = np.cumsum(steps)
     return np.asarray(np.append(0.0, time[time < end]))
@@ -178,16 +218,24 @@ def damp_each(random: np.random.Generator, ratios: Samples) -> Samples:
 # Frequencies of modes.
 
 
-def draw_modes(random: np.random.Generator, fewest: int, most: int, highest: float) -> Shapes:
+def draw_modes(
+    random: np.random.Generator, fewest: int, most: int, highest: float
+) -> Shapes:
     """Draw so many modes, between a first frequency and the ``highest``."""
     gaps = random.uniform(0.3, 1.7, int(random.integers(fewest, most + 1)) - 1)
-    return _keep_apart(np.append(1.0, 1 + (highest - 1) * np.cumsum(gaps) / gaps.sum()) if gaps.size else np.ones(1))
+    return _keep_apart(
+        np.append(1.0, 1 + (highest - 1) * np.cumsum(gaps) / gaps.sum())
+        if gaps.size
+        else np.ones(1)
+    )
 
 
 def draw_close(random: np.random.Generator) -> Shapes:
     """Draw one or two pairs of modes whose frequencies differ by 0.3 to 6 %, and perhaps another mode."""
     first = np.array([1.0, random.uniform(1.3, 3.5)])[: random.integers(1, 3)]
-    second = first * (1 + np.exp(random.uniform(np.log(0.003), np.log(0.06), first.size)))
+    second = first * (
+        1 + np.exp(random.uniform(np.log(0.003), np.log(0.06), first.size))
+    )
     other = random.uniform(1.3, 3.5, random.integers(0, 2))
     return _keep_apart(np.concatenate([first, second, other]))
 
@@ -207,7 +255,9 @@ def _keep_apart(ratios: Samples) -> Shapes:
 def draw_exchange(random: np.random.Generator) -> Shapes:
     """Draw two parts with energies of their own, which a weak spring couples at nearly equal frequencies."""
     frame = np.append(1.0, random.uniform(1.3, 3.0, random.integers(0, 2)))
-    cabin = np.append(1 + random.uniform(-0.05, 0.05), random.uniform(1.3, 3.0, random.integers(0, 2)))
+    cabin = np.append(
+        1 + random.uniform(-0.05, 0.05), random.uniform(1.3, 3.0, random.integers(0, 2))
+    )
     places = np.concatenate([frame, cabin])
     owners = np.repeat([0, 1], [frame.size, cabin.size])
     springs = [(0, frame.size, draw_log(random, 0.01, 0.15))]
@@ -224,10 +274,14 @@ def draw_leak(random: np.random.Generator) -> Shapes:
     springs: list[tuple[int, int, float]] = []
     for place, frequency in enumerate(recorded):
         for _ in range(int(random.integers(2, 6))):
-            springs.append((place, len(places), draw_log(random, 0.0005, 0.01) * frequency**2))
+            springs.append(
+                (place, len(places), draw_log(random, 0.0005, 0.01) * frequency**2)
+            )
             places.append(frequency * (1 + random.uniform(-0.05, 0.05)))
     is_recorded = np.arange(len(places)) < recorded.size
-    return _couple(np.array(places), springs, np.zeros(recorded.size, dtype=int), is_recorded)
+    return _couple(
+        np.array(places), springs, np.zeros(recorded.size, dtype=int), is_recorded
+    )
 
 
 def _couple(
@@ -248,10 +302,14 @@ def _couple(
     squares, vectors = np.linalg.eigh(stretches.T @ stretches)
     frequencies = np.sqrt(squares)
     unit = frequencies[0]
-    in_modes = vectors / frequencies  # of the masses, so that the elastic energy is the sum of q^2
+    in_modes = (
+        vectors / frequencies
+    )  # of the masses, so that the elastic energy is the sum of q^2
     recorded = stretches if is_recorded.all() else stretches[: places.size][is_recorded]
     parts = Parts(recorded @ in_modes, in_modes[is_recorded] * unit, owners)
-    return Shapes(frequencies / unit, in_modes.T * places, is_recorded.astype(float), parts)
+    return Shapes(
+        frequencies / unit, in_modes.T * places, is_recorded.astype(float), parts
+    )
 
 
 # Slow deformations.
@@ -265,9 +323,17 @@ def draw_spin(random: np.random.Generator, around: Surroundings) -> Stretch:
         return np.asarray((1 - np.cos(np.pi * np.clip(time / until, 0, 1))) / 2)
 
     def rate(time: Samples) -> Samples:
-        return np.asarray(np.where(time < until, np.pi / 2 / until * np.sin(np.pi * time / until), 0.0))
+        return np.asarray(
+            np.where(
+                time < until, np.pi / 2 / until * np.sin(np.pi * time / until), 0.0
+            )
+        )
 
-    heights = draw_log(random, 0.05, 3.0) * around.swings * random.normal(size=around.swings.size)
+    heights = (
+        draw_log(random, 0.05, 3.0)
+        * around.swings
+        * random.normal(size=around.swings.size)
+    )
     return Stretch(heights, course, rate)
 
 
@@ -288,7 +354,12 @@ def draw_hinge(random: np.random.Generator, around: Surroundings) -> Stretch:
         sine, cosine, delta, _ = ellipj(slow * time + shift, depth**2)
         return np.asarray(-12 * depth**2 * slow * sine * cosine * delta)
 
-    heights = draw_log(random, 0.003, 0.3) / (1 + 4 * depth**2) * around.swings * random.normal(size=around.swings.size)
+    heights = (
+        draw_log(random, 0.003, 0.3)
+        / (1 + 4 * depth**2)
+        * around.swings
+        * random.normal(size=around.swings.size)
+    )
     return Stretch(heights, course, rate)
 
 
@@ -298,7 +369,9 @@ several_modes: Final = partial(draw_modes, fewest=2, most=5, highest=4.0)
 
 _ALSO_NOISY: Final = {
     "damping by mode": partial(make_linear, shapes=several_modes, damping=damp_each),
-    "stiffness damping": partial(make_linear, shapes=several_modes, damping=damp_by_stiffness),
+    "stiffness damping": partial(
+        make_linear, shapes=several_modes, damping=damp_by_stiffness
+    ),
     "exchange": partial(make_linear, shapes=draw_exchange),
     "10 modes": partial(make_linear, shapes=ten_modes),
 }
@@ -311,8 +384,12 @@ LINEAR: Final[dict[str, Make]] = {
     },
     "close modes": partial(make_linear, shapes=draw_close),
     "harmonic": partial(make_linear, shapes=draw_harmonic),
-    "5 modes": partial(make_linear, shapes=partial(draw_modes, fewest=5, most=5, highest=5.0)),
-    "30 modes": partial(make_linear, shapes=partial(draw_modes, fewest=30, most=30, highest=12.0)),
+    "5 modes": partial(
+        make_linear, shapes=partial(draw_modes, fewest=5, most=5, highest=5.0)
+    ),
+    "30 modes": partial(
+        make_linear, shapes=partial(draw_modes, fewest=30, most=30, highest=12.0)
+    ),
     "coarse": partial(make_linear, shapes=few_modes, coarse=True),
     "irregular": partial(make_linear, shapes=few_modes, irregular=True),
     "leak": partial(make_linear, shapes=draw_leak),

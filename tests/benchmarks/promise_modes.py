@@ -39,7 +39,9 @@ class Load(NamedTuple):
         """Return the impulse from the start of the record to these times [time], shape (n,)."""
         phase = np.pi * np.clip((time - self.start) / self.duration, 0.0, 1.0)
         if self.fades:
-            return np.minimum(time, self.start) + self.duration / (2 * np.pi) * (phase + np.sin(phase))
+            return np.minimum(time, self.start) + self.duration / (2 * np.pi) * (
+                phase + np.sin(phase)
+            )
         return self.duration / np.pi * (1 - np.cos(phase))
 
 
@@ -109,7 +111,9 @@ class Modes(NamedTuple):
         if self.stretch is None:
             return deformation, velocity
         course, rate = self.stretch.course(time), self.stretch.rate(time)
-        return deformation + np.outer(course, self.stretch.heights), velocity + np.outer(rate, self.stretch.heights)
+        return deformation + np.outer(
+            course, self.stretch.heights
+        ), velocity + np.outer(rate, self.stretch.heights)
 
     def compute_energies(self, time: Samples) -> tuple[Samples, Samples]:
         """Return the recorded elastic energy of each part, shape (n, p), and the recorded kinetic energy, (n,)."""
@@ -118,10 +122,15 @@ class Modes(NamedTuple):
         if self.parts is None:
             return np.sum(deformation**2, axis=1)[:, np.newaxis], kinetic
         owners = self.parts.owners
-        elastic = [np.sum(deformation[:, owners == part] ** 2, axis=1) for part in np.unique(owners)]
+        elastic = [
+            np.sum(deformation[:, owners == part] ** 2, axis=1)
+            for part in np.unique(owners)
+        ]
         return np.stack(elastic, axis=1), kinetic
 
-    def _project(self, deformation: Samples, velocity: Samples) -> tuple[Samples, Samples]:
+    def _project(
+        self, deformation: Samples, velocity: Samples
+    ) -> tuple[Samples, Samples]:
         """Return the roots of the recorded energies, each of shape (n, d/2)."""
         if self.parts is None:
             return deformation, velocity / self.undamped

@@ -42,7 +42,9 @@ class Motion(NamedTuple):
         angle, half = np.multiply.outer(time, self.rate) + self.phase, self.alpha / 2
         decay = np.exp(-half * np.asarray(time))[..., np.newaxis]
         own = np.hypot(self.rate, half)
-        return decay * np.cos(angle), -decay * (self.rate * np.sin(angle) + half * np.cos(angle)) / own
+        return decay * np.cos(angle), -decay * (
+            self.rate * np.sin(angle) + half * np.cos(angle)
+        ) / own
 
     def energies(self, time: Samples) -> Samples:
         """Energies of the parts, shape (n, k)."""
@@ -72,7 +74,9 @@ class Record(NamedTuple):
 def one_each(rng: np.random.Generator) -> Motion:
     """Two or three parts with a mode each."""
     count = int(rng.integers(2, 4))
-    return _planes(rng, [(i, energy) for i, energy in enumerate(rng.uniform(0.1, 1, count))])
+    return _planes(
+        rng, [(i, energy) for i, energy in enumerate(rng.uniform(0.1, 1, count))]
+    )
 
 
 def mixed(rng: np.random.Generator) -> Motion:
@@ -82,9 +86,14 @@ def mixed(rng: np.random.Generator) -> Motion:
     """
     if rng.uniform() < 1 / 3:
         modes = int(rng.integers(2, 4))
-        rows, rate = rng.uniform(-1, 1, (2, modes)), 2 * np.pi * rng.uniform(1, 3.5, modes)
+        rows, rate = (
+            rng.uniform(-1, 1, (2, modes)),
+            2 * np.pi * rng.uniform(1, 3.5, modes),
+        )
         forms = np.einsum("pi,pj->pij", rows, rows)
-        return Motion(rng.uniform(0, 0.5), rate, rng.uniform(0, 2 * np.pi, modes), forms)
+        return Motion(
+            rng.uniform(0, 0.5), rate, rng.uniform(0, 2 * np.pi, modes), forms
+        )
     count = int(rng.integers(2, 6))
     mass, spring = rng.uniform(0.3, 3, count + 1), rng.uniform(0.3, 3, count)
     stretch = np.diff(np.eye(count + 1), axis=0) / np.sqrt(mass)
@@ -96,13 +105,23 @@ def mixed(rng: np.random.Generator) -> Motion:
     if rng.uniform() < 1 / 3:
         forms = np.stack([forms[:-1].sum(axis=0), forms[-1]])
     alpha = rng.uniform(0, 0.5)
-    return Motion(alpha, np.sqrt(own**2 - alpha**2 / 4), rng.uniform(0, 2 * np.pi, count), forms)
+    return Motion(
+        alpha, np.sqrt(own**2 - alpha**2 / 4), rng.uniform(0, 2 * np.pi, count), forms
+    )
 
 
 def two_planes(rng: np.random.Generator) -> Motion:
     """A part whose second plane holds 0.3 to 50 % of its energy, beside one with a mode, or with two planes too."""
-    modes = [(0, 1 - (share := 10 ** rng.uniform(-2.5, -0.3))), (0, share), (1, rng.uniform(0.1, 1))]
-    second = [(1, modes[-1][1] * 10 ** rng.uniform(-2.5, -0.3))] if rng.uniform() < 0.3 else []
+    modes = [
+        (0, 1 - (share := 10 ** rng.uniform(-2.5, -0.3))),
+        (0, share),
+        (1, rng.uniform(0.1, 1)),
+    ]
+    second = (
+        [(1, modes[-1][1] * 10 ** rng.uniform(-2.5, -0.3))]
+        if rng.uniform() < 0.3
+        else []
+    )
     return _planes(rng, [*modes, *second])
 
 
@@ -110,11 +129,19 @@ def _planes(rng: np.random.Generator, modes: list[tuple[int, float]]) -> Motion:
     """Modes that belong to a part, by its number, and have an energy."""
     part, energy = (np.array(column) for column in zip(*modes, strict=True))
     rate = 2 * np.pi * rng.uniform(1, 3.5, len(modes))
-    forms = np.array([np.diag(np.where(part == one, energy, 0.0)) for one in range(part.max() + 1)])
-    return Motion(rng.uniform(0, 0.5), rate, rng.uniform(0, 2 * np.pi, len(modes)), forms)
+    forms = np.array(
+        [np.diag(np.where(part == one, energy, 0.0)) for one in range(part.max() + 1)]
+    )
+    return Motion(
+        rng.uniform(0, 0.5), rate, rng.uniform(0, 2 * np.pi, len(modes)), forms
+    )
 
 
-CLASSES: Final = {"parts with one mode each": one_each, "parts with mixed modes": mixed, "two planes": two_planes}
+CLASSES: Final = {
+    "parts with one mode each": one_each,
+    "parts with mixed modes": mixed,
+    "two planes": two_planes,
+}
 
 
 def records(kind: str, seed: int, number: int) -> Iterator[Record]:
@@ -126,12 +153,19 @@ def records(kind: str, seed: int, number: int) -> Iterator[Record]:
         time = np.arange(0, last, 2 * np.pi / motion.rate.max() / states)
         energies = motion.energies(time)
         spread = rng.choice([0.0, 0.0, 10 ** rng.uniform(-4, -2.3)])
-        energies = np.maximum(energies + spread * energies.max() * rng.standard_normal(energies.shape), 0.0)
+        energies = np.maximum(
+            energies + spread * energies.max() * rng.standard_normal(energies.shape),
+            0.0,
+        )
         digits = int(rng.choice([5, 8, 15]))
-        energies = np.array([float(f"{value:.{digits}g}") for value in energies.ravel()]).reshape(energies.shape)
+        energies = np.array(
+            [float(f"{value:.{digits}g}") for value in energies.ravel()]
+        ).reshape(energies.shape)
         first = float(time[-1] * rng.uniform(0.4, 0.9))
         last = float(time[-1] * 0.95) if rng.uniform() < 0.5 else first
-        yield Record(history(time, energies), Settings(after=0.0), (first, last), motion.residual)
+        yield Record(
+            history(time, energies), Settings(after=0.0), (first, last), motion.residual
+        )
 
 
 def history(time: Samples, energies: Samples) -> History:
@@ -146,7 +180,11 @@ def history(time: Samples, energies: Samples) -> History:
 def stated(record: Record) -> Pair | None:
     """Ask for a pair; None where none is recommended."""
     first, last = record.window
-    ask = partial(suggest, td=first) if first == last else partial(suggest_in_window, window=record.window)
+    ask = (
+        partial(suggest, td=first)
+        if first == last
+        else partial(suggest_in_window, window=record.window)
+    )
     answer = ask(record.history, settings=record.settings)
     best, quality = answer.chosen, answer.quality
     if best is None or quality is None:

@@ -54,20 +54,32 @@ def make_integrated(
     period of the energy; ``units`` of time and energy; ``join`` chooses a joint for a structure and its free states.
     """
     period = np.exp(random.uniform(np.log(0.005), np.log(0.05)))
-    rates = np.cumprod(np.append(1.0, random.uniform(1.25, 2.2, modes - 1))) * 2 * np.pi / period
+    rates = (
+        np.cumprod(np.append(1.0, random.uniform(1.25, 2.2, modes - 1)))
+        * 2
+        * np.pi
+        / period
+    )
     scale = np.append(1.0, np.exp(random.uniform(np.log(0.03), np.log(0.8), modes - 1)))
     starts = np.cumsum(random.uniform(0, 1.5, random.integers(1, 4))) * period
     lasts = np.exp(random.uniform(np.log(0.15), np.log(2.5), starts.size)) * period
     heights = random.normal(size=(starts.size, 1)) * scale * rates**2
     pushes = np.column_stack([starts, starts + lasts, heights])
-    structure = Structure(rates, random.choice([0.0, random.uniform(0, 0.3)]) / period, np.zeros(modes), pushes)
+    structure = Structure(
+        rates,
+        random.choice([0.0, random.uniform(0, 0.3)]) / period,
+        np.zeros(modes),
+        pushes,
+    )
     begin = structure.loaded_until
     end = begin + random.uniform(4, 15) * period
     density = states or np.exp(random.uniform(np.log(15), np.log(80)))
     time = np.arange(0.0, end, np.pi / rates[-1] / density)
     rest = np.zeros(2 * modes)
     if stiffening:
-        highest = np.abs(structure.move(0.0, begin + period, rest)(time[time < begin + period])[0]).max()
+        highest = np.abs(
+            structure.move(0.0, begin + period, rest)(time[time < begin + period])[0]
+        ).max()
         structure = structure._replace(stiffening=np.array([stiffening / highest**2]))
     if join is not None:
         first_periods = np.linspace(begin, begin + 2 * period, 400)
@@ -75,7 +87,9 @@ def make_integrated(
         structure = structure._replace(joint=join(random, structure, free_states))
     motion = structure.move(0.0, end, rest)
     states_of = motion(time)
-    elastic, kinetic = (energies.sum(axis=0) for energies in structure.compute_energies(states_of))
+    elastic, kinetic = (
+        energies.sum(axis=0) for energies in structure.compute_energies(states_of)
+    )
     if structure.joint is not None:
         elastic = elastic + structure.joint.compute_energy(np.split(states_of, 2)[0])
     vibration = elastic + kinetic
@@ -89,15 +103,28 @@ def make_integrated(
     energy = unit * (elastic + worked + heat * lost + drifted + scatter)
     by_time, by_energy = units
     columns = {"time": time * by_time, "internal_energy": energy * by_energy}
-    impulse = np.cumsum(np.abs(structure.compute_push(time)).max(axis=1) * np.gradient(time))
+    impulse = np.cumsum(
+        np.abs(structure.compute_push(time)).max(axis=1) * np.gradient(time)
+    )
     columns |= add_evidence(random, time, impulse, unit * kinetic, units)
     truth = Truth(IntegratedRun(structure, motion), (begin, end), by_time)
-    return Record(columns, truth, digits, suggest=ask_for_times(random, begin * by_time, end * by_time))
+    return Record(
+        columns,
+        truth,
+        digits,
+        suggest=ask_for_times(random, begin * by_time, end * by_time),
+    )
 
 
-def ask_for_times(random: np.random.Generator, begin: float, end: float) -> dict[str, object]:
+def ask_for_times(
+    random: np.random.Generator, begin: float, end: float
+) -> dict[str, object]:
     """Ask for both times, or for a td in the flight."""
-    return {} if random.random() < 2 / 3 else {"td": float(random.uniform(begin + 0.4 * (end - begin), end))}
+    return (
+        {}
+        if random.random() < 2 / 3
+        else {"td": float(random.uniform(begin + 0.4 * (end - begin), end))}
+    )
 
 
 def add_evidence(
@@ -119,10 +146,15 @@ def add_evidence(
     speed[:, 2] -= GRAVITY * time * (kind == 3)
     by_time, by_energy = units
     unit = by_energy * by_time  # of a momentum whose unit of length is the metre
-    momenta = {f"{axis}_momentum": MASS * speed[:, place] * unit for place, axis in enumerate("xyz")}
+    momenta = {
+        f"{axis}_momentum": MASS * speed[:, place] * unit
+        for place, axis in enumerate("xyz")
+    }
     if kind == 2:
         return momenta
-    return momenta | {"kinetic_energy": (MASS / 2 * (speed**2).sum(axis=1) + kinetic) * by_energy}
+    return momenta | {
+        "kinetic_energy": (MASS / 2 * (speed**2).sum(axis=1) + kinetic) * by_energy
+    }
 
 
 def draw_log(random: np.random.Generator, low: float, high: float) -> float:
@@ -134,14 +166,20 @@ def make_stiffening(random: np.random.Generator) -> Record:
     """Make one spring that stiffens, plastic work under the vibration, or both."""
     which = random.integers(1, 4)
     stiffening = draw_log(random, 0.03, 2.0) if which != 2 else 0.0
-    return make_integrated(random, stiffening=stiffening, plastic=draw_log(random, 0.1, 50.0) if which > 1 else 0.0)
+    return make_integrated(
+        random,
+        stiffening=stiffening,
+        plastic=draw_log(random, 0.1, 50.0) if which > 1 else 0.0,
+    )
 
 
 def make_drifting(random: np.random.Generator) -> Record:
     """Make an energy that drifts in flight, or keeps what damping takes of the vibration."""
     which = random.integers(1, 4)
     return make_integrated(
-        random, drift=draw_log(random, 0.01, 0.5) * (which != 2), heat=random.uniform(0.1, 1.0) * (which > 1)
+        random,
+        drift=draw_log(random, 0.01, 0.5) * (which != 2),
+        heat=random.uniform(0.1, 1.0) * (which > 1),
     )
 
 
@@ -154,20 +192,28 @@ def make_units(random: np.random.Generator) -> Record:
 def make_noisy(random: np.random.Generator) -> Record:
     """Make three to five modes, half of them with noise."""
     modes = int(random.integers(3, 6))
-    return make_integrated(random, modes=modes, noise=random.choice([0.0, draw_log(random, 1e-4, 0.02)]))
+    return make_integrated(
+        random, modes=modes, noise=random.choice([0.0, draw_log(random, 1e-4, 0.02)])
+    )
 
 
 def make_coarse(random: np.random.Generator) -> Record:
     """Make one or two modes of few states."""
-    return make_integrated(random, modes=int(random.integers(1, 3)), states=random.uniform(5, 15))
+    return make_integrated(
+        random, modes=int(random.integers(1, 3)), states=random.uniform(5, 15)
+    )
 
 
 def make_rubbing(random: np.random.Generator) -> Record:
     """Make modes that dry friction slows, whose heat the energy does not hold: 1 to 20 % of the swing each period."""
-    return make_integrated(random, modes=int(random.integers(1, 4)), join=_choose_friction)
+    return make_integrated(
+        random, modes=int(random.integers(1, 4)), join=_choose_friction
+    )
 
 
-def _choose_friction(random: np.random.Generator, structure: Structure, states: Samples) -> Joint:
+def _choose_friction(
+    random: np.random.Generator, structure: Structure, states: Samples
+) -> Joint:
     row = _draw_row(random, structure)
     q, speed = np.split(states, 2)
     force = 2 * draw_log(random, 0.0025, 0.05) * float(np.abs(row @ q).max())
@@ -179,11 +225,15 @@ def make_rattling(random: np.random.Generator) -> Record:
     return make_integrated(random, modes=int(random.integers(2, 4)), join=_choose_gap)
 
 
-def _choose_gap(random: np.random.Generator, structure: Structure, states: Samples) -> Joint:
+def _choose_gap(
+    random: np.random.Generator, structure: Structure, states: Samples
+) -> Joint:
     row = _draw_row(random, structure)
     swing = float(np.abs(row @ np.split(states, 2)[0]).max())
     stiffness, gap = draw_log(random, 2.0, 40.0), random.uniform(0.2, 0.9) * swing
-    return Joint(row, stiffness=stiffness, gap=gap, recorded=bool(random.random() < 0.5))
+    return Joint(
+        row, stiffness=stiffness, gap=gap, recorded=bool(random.random() < 0.5)
+    )
 
 
 def _draw_row(random: np.random.Generator, structure: Structure) -> Samples:

@@ -20,7 +20,11 @@ COMPARED: Final = 2.0
 _COMPARED_AT: Final = 200
 _EXACT: Final[dict[str, Any]] = {"method": "DOP853", "rtol": 1e-7, "atol": 1e-10}
 # A joint has kinks, at which a high order is of no use.
-_EXACT_WITH_KINKS: Final[dict[str, Any]] = {"method": "RK45", "rtol": 1e-6, "atol": 1e-9}
+_EXACT_WITH_KINKS: Final[dict[str, Any]] = {
+    "method": "RK45",
+    "rtol": 1e-6,
+    "atol": 1e-9,
+}
 # For the search among hundreds of runs that are integrated at once: R within 0.001, with contacts within 0.01.
 _MANY: Final[dict[str, Any]] = {"method": "RK45", "rtol": 1e-4, "atol": 1e-6}
 
@@ -83,13 +87,19 @@ class Structure(NamedTuple):
         """How exactly scipy integrates one run."""
         return _EXACT if self.joint is None else _EXACT_WITH_KINKS
 
-    def move(self, start: float, end: float, state: Samples) -> Callable[[Samples], Samples]:
+    def move(
+        self, start: float, end: float, state: Samples
+    ) -> Callable[[Samples], Samples]:
         """Integrate from a state, q and q' in one; give both at any times, shape (2 k, n)."""
-        stops = np.unique(np.clip([start, *self.pushes[:, :2].ravel(), end], start, end))
+        stops = np.unique(
+            np.clip([start, *self.pushes[:, :2].ravel(), end], start, end)
+        )
         pieces: list[OdeSolution] = []
         for first, last in pairwise(stops.tolist()):  # a push begins with a kink
             moving = self if first < self.loaded_until else self.release_loads()
-            answer = solve_ivp(moving._slope, (first, last), state, dense_output=True, **self._settings)
+            answer = solve_ivp(
+                moving._slope, (first, last), state, dense_output=True, **self._settings
+            )
             pieces.append(answer.sol)
             state = answer.y[:, -1]
 
@@ -118,30 +128,45 @@ class Structure(NamedTuple):
         """Return where free runs from states of shape (2 k, n) go, as points in the energy norm, shape (n, d)."""
         free = self.release_loads()
         if self.is_linear:
-            return np.asarray(states.T @ free._integrate_paths(np.eye(2 * self.omega.size), _EXACT))
-        return free._integrate_paths(states, self._settings if states.shape[1] == 1 else _MANY)
+            return np.asarray(
+                states.T @ free._integrate_paths(np.eye(2 * self.omega.size), _EXACT)
+            )
+        return free._integrate_paths(
+            states, self._settings if states.shape[1] == 1 else _MANY
+        )
 
     def _integrate_paths(self, states: Samples, settings: Mapping[str, Any]) -> Samples:
         """Integrate all states at once, of shape (2 k, n); give points of shape (n, d)."""
         end = COMPARED * 2 * np.pi / float(self.omega.min())
         times = np.linspace(0.0, end, _COMPARED_AT)
-        answer = solve_ivp(self._slope, (0.0, end), states.ravel(), t_eval=times, **settings)
+        answer = solve_ivp(
+            self._slope, (0.0, end), states.ravel(), t_eval=times, **settings
+        )
         deformation, velocity = np.split(answer.y.reshape(*states.shape, times.size), 2)
-        points = np.stack([deformation, velocity / self.omega[:, np.newaxis, np.newaxis]])
+        points = np.stack(
+            [deformation, velocity / self.omega[:, np.newaxis, np.newaxis]]
+        )
         return np.moveaxis(points, 2, 0).reshape(states.shape[1], -1)
 
     def compute_energies(self, states: Samples) -> tuple[Samples, Samples]:
         """Return elastic energy, without that of the joint, and kinetic energy of states (2 k, n), each (k, n)."""
         q, speed = np.split(states, 2)
-        return q**2 + self.stiffening[:, np.newaxis] * q**4 / 2, (speed / self.omega[:, np.newaxis]) ** 2
+        return q**2 + self.stiffening[:, np.newaxis] * q**4 / 2, (
+            speed / self.omega[:, np.newaxis]
+        ) ** 2
 
     def _slope(self, t: float, state: Samples) -> Samples:
         """Return the time derivative of one state or of many, raveled from shape (2 k, n)."""
         count = self.omega.size
         states = state.reshape(2 * count, -1)
-        q, speed = states[:count], states[count:]  # np.split would take a fifth of the time
+        q, speed = (
+            states[:count],
+            states[count:],
+        )  # np.split would take a fifth of the time
         square = self.omega[:, np.newaxis] ** 2
-        force = -square * (q + self.stiffening[:, np.newaxis] * q**3) - self.alpha * speed
+        force = (
+            -square * (q + self.stiffening[:, np.newaxis] * q**3) - self.alpha * speed
+        )
         if self.joint is not None:
             force -= square / 2 * self.joint.compute_force(q, speed)
         if self.pushes.size:
@@ -173,4 +198,6 @@ class IntegratedRun(NamedTuple):
     def release(self, time: Samples) -> Samples:
         """Return the points of runs from rest with the deformation of these times, shape (n, d)."""
         deformation, velocity = np.split(self.states(time), 2)
-        return self.structure.compute_paths(np.concatenate([deformation, np.zeros_like(velocity)]))
+        return self.structure.compute_paths(
+            np.concatenate([deformation, np.zeros_like(velocity)])
+        )

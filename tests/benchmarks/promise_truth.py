@@ -63,7 +63,9 @@ class Truth(NamedTuple):
 
     def compute_residual(self, tr: float, td: float) -> float:
         """Return the true R of one pair, whose times are those of the file."""
-        errors = self._compute_errors(np.array([tr]) / self.unit, np.array([td]) / self.unit)
+        errors = self._compute_errors(
+            np.array([tr]) / self.unit, np.array([td]) / self.unit
+        )
         return float(errors[0, 0])
 
     def find_least_residual(self, td: float | None, shortest: float = 0.0) -> float:
@@ -78,12 +80,18 @@ class Truth(NamedTuple):
         ends = grid if td is None else np.array([td]) / self.unit
         least_time = min(shortest / self.unit, end - start) if td is None else 0.0
         errors = self._compute_allowed(grid, ends, least_time)
-        valleys = np.argwhere((errors == minimum_filter(errors, size=3)) & np.isfinite(errors))
+        valleys = np.argwhere(
+            (errors == minimum_filter(errors, size=3)) & np.isfinite(errors)
+        )
         depths = errors[tuple(valleys.T)]
         deepest = valleys[np.argsort(depths)[:_VALLEYS]]
         nearby = (grid[1] - grid[0]) * np.linspace(-1, 1, 2 * _FINER + 1)
         finer_tr = _surround(grid[deepest[:, 0]], nearby, self.flight)
-        finer_td = ends if td is not None else _surround(grid[deepest[:, 1]], nearby, self.flight)
+        finer_td = (
+            ends
+            if td is not None
+            else _surround(grid[deepest[:, 1]], nearby, self.flight)
+        )
         finer = self._compute_allowed(finer_tr, finer_td, least_time)
         least = min(errors.min(), finer.min(initial=np.inf))
         return float(least) if np.isfinite(least) else float("nan")
@@ -97,9 +105,13 @@ class Truth(NamedTuple):
         """Return R of all pairs of times of shapes (m,) and (n,), shape (m, n)."""
         released = self.vibration.release(tr)
         followed, sizes = self.vibration.follow(td)
-        squares = np.sum(released**2, axis=1)[:, np.newaxis] + np.sum(followed**2, axis=1)
+        squares = np.sum(released**2, axis=1)[:, np.newaxis] + np.sum(
+            followed**2, axis=1
+        )
         distances = np.sqrt(np.maximum(squares - 2 * released @ followed.T, 0.0))
-        return np.asarray(np.divide(distances, sizes, out=np.zeros_like(distances), where=sizes > 0))
+        return np.asarray(
+            np.divide(distances, sizes, out=np.zeros_like(distances), where=sizes > 0)
+        )
 
 
 def _surround(times: Samples, nearby: Samples, flight: tuple[float, float]) -> Samples:

@@ -22,7 +22,15 @@ import numpy as np
 
 from d2rpick.histories.formats import csv_table, hdf5_file
 from d2rpick.histories.opening import Selection, open_run
-from tests.benchmarks.timing import ROOT, environment, output, own_seconds, processor_seconds, ratio, seconds
+from tests.benchmarks.timing import (
+    ROOT,
+    environment,
+    output,
+    own_seconds,
+    processor_seconds,
+    ratio,
+    seconds,
+)
 from tests.made_binout import GLSTAT, LsdaWriter, values
 from tests.made_d3plot import END, D3plotWriter, states as made_states
 from tests.text_files import glstat_text, matsum_text
@@ -60,7 +68,12 @@ def glstat_to_bare_read() -> float:
 @cache
 def _first() -> Path | None:
     """Folder of version 0.6.0, compiled, as the git history has it; None without that."""
-    packed = subprocess.run(["git", "archive", _FIRST, "d2rpick"], cwd=ROOT, capture_output=True, check=False)
+    packed = subprocess.run(
+        ["git", "archive", _FIRST, "d2rpick"],
+        cwd=ROOT,
+        capture_output=True,
+        check=False,
+    )
     if packed.returncode:
         return None
     then = Path(_folder.name, "then")
@@ -75,12 +88,16 @@ def suggest_to_first() -> float | None:
     then, time = _first(), np.linspace(0, 9, _STATES)
     if then is None:
         return None
-    file = _made("oscillator", glstat_text(time, (np.exp(-0.1 * time) * np.cos(20 * time)) ** 2))
+    file = _made(
+        "oscillator", glstat_text(time, (np.exp(-0.1 * time) * np.cos(20 * time)) ** 2)
+    )
 
     def suggesting(root: Path) -> Callable[[], object]:
         command = [sys.executable, "-m", "d2rpick", "suggest", "--td", "8", str(file)]
         clean = {**environment(), "PYTHONPATH": str(root)}
-        return lambda: subprocess.run(command, check=True, capture_output=True, cwd=root, env=clean)
+        return lambda: subprocess.run(
+            command, check=True, capture_output=True, cwd=root, env=clean
+        )
 
     return ratio(suggesting(ROOT), suggesting(then), _ROUNDS, cost=processor_seconds)
 
@@ -134,12 +151,16 @@ def lasso_to_binout() -> float | None:
         "    times.append(time.perf_counter() - start)\n"
         "print(sorted(times)[1], *(float(column.sum()) for column in numbers))"
     )
-    found = subprocess.run([LASSO, "-c", code, str(file)], capture_output=True, text=True, check=False)
+    found = subprocess.run(
+        [LASSO, "-c", code, str(file)], capture_output=True, text=True, check=False
+    )
     if "ModuleNotFoundError" in found.stderr:
         return None
     taken, *sums = map(float, found.stdout.split())
     history = _read(file)
-    np.testing.assert_allclose([history.time.sum(), history.energy.sum()], sums, rtol=1e-4)  # lasso adds in singles
+    np.testing.assert_allclose(
+        [history.time.sum(), history.energy.sum()], sums, rtol=1e-4
+    )  # lasso adds in singles
     return taken / median(seconds(lambda: _read(file)) for _ in range(_ROUNDS))
 
 
@@ -163,7 +184,9 @@ def binout_to_dynars() -> float | None:
 
 def memory_over_limit(kind: str) -> float:
     """Anonymous memory of a process at its peak while it reads, over twice the answer plus 64 MB."""
-    return _memory({"glstat": _glstat, "matsum": _matsum, "binout": _binout}[kind](), times=2)
+    return _memory(
+        {"glstat": _glstat, "matsum": _matsum, "binout": _binout}[kind](), times=2
+    )
 
 
 def _memory(file: Path, times: int) -> float:
@@ -187,7 +210,12 @@ def _memory(file: Path, times: int) -> float:
         "peak = max(peak, anonymous()); done = True; watcher.join()\n"
         "print(peak - before, answer.nbytes / 2**20)"
     )
-    found = subprocess.run([sys.executable, "-c", code, str(file)], capture_output=True, text=True, check=True)
+    found = subprocess.run(
+        [sys.executable, "-c", code, str(file)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     taken, answer = map(float, found.stdout.split())
     return taken / (times * answer + _ROOM)
 
@@ -222,7 +250,9 @@ def csv_to_pandas(columns: int) -> float:
     import pandas as pd
 
     file = _csv(_ROWS, columns)
-    return ratio(lambda: _read(file), lambda: pd.read_csv(file), _ROUNDS, cost=own_seconds)
+    return ratio(
+        lambda: _read(file), lambda: pd.read_csv(file), _ROUNDS, cost=own_seconds
+    )
 
 
 def suggest_memory() -> float:
@@ -231,7 +261,16 @@ def suggest_memory() -> float:
         "import resource, subprocess, sys; subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL);"
         "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024)"
     )
-    suggest = ("-m", "d2rpick", "suggest", "--td", "0.9", "--exit-zero", "-q", str(_csv(_ROWS, 2)))
+    suggest = (
+        "-m",
+        "d2rpick",
+        "suggest",
+        "--td",
+        "0.9",
+        "--exit-zero",
+        "-q",
+        str(_csv(_ROWS, 2)),
+    )
     return float(output("-c", code, sys.executable, *suggest))
 
 
@@ -240,7 +279,11 @@ def hdf5_to_h5py() -> float:
     file = _hdf5()
     ours = "import sys; from d2rpick.choice.question import read; read(sys.argv[1:])"
     alone = "import sys, h5py; file = h5py.File(sys.argv[1]); file['time'][()], file['internal_energy'][()]"
-    return ratio(lambda: output("-c", ours, str(file)), lambda: output("-c", alone, str(file)), _ROUNDS)
+    return ratio(
+        lambda: output("-c", ours, str(file)),
+        lambda: output("-c", alone, str(file)),
+        _ROUNDS,
+    )
 
 
 def hdf5_to_h5py_here() -> float:
@@ -278,7 +321,9 @@ def write_to_pandas() -> float:
     columns = {"time": time, "internal_energy": energy}
     frame = pd.DataFrame(columns)
     assert csv_table.write(columns).decode() == frame.to_csv(index=False)
-    return ratio(lambda: csv_table.write(columns), lambda: frame.to_csv(index=False), _ROUNDS)
+    return ratio(
+        lambda: csv_table.write(columns), lambda: frame.to_csv(index=False), _ROUNDS
+    )
 
 
 def csv_memory_over_limit() -> float:
@@ -301,7 +346,9 @@ def _csv(rows: int, columns: int) -> Path:
     file = _folder_file(f"{columns}.csv")
     if not file.exists():
         names = ["time", "internal_energy", *(f"column {i}" for i in range(2, columns))]
-        file.write_bytes(csv_table.write(dict(zip(names, _rows(rows, columns).T, strict=True))))
+        file.write_bytes(
+            csv_table.write(dict(zip(names, _rows(rows, columns).T, strict=True)))
+        )
     return file
 
 
@@ -370,7 +417,11 @@ def _matsum() -> Path:
 @cache
 def _d3plot(files: int, states: int) -> tuple[Path, int, int]:
     """A family of sparse files, what of each state is not nodes and elements written: its name, bytes of both."""
-    made = D3plotWriter(ids=range(1, 101), titles=(), control={"numnp": 0, "nel2": 0, "nelt": 0, "nv2d": 1_250_000})
+    made = D3plotWriter(
+        ids=range(1, 101),
+        titles=(),
+        control={"numnp": 0, "nel2": 0, "nelt": 0, "nv2d": 1_250_000},
+    )
     first = _made(f"of_{files}.d3plot", made.filled(made.head()))
     some = made_states((0.001 * np.arange(files * states)).tolist(), 100)
     size, head = len(made.state(some[0])), len(some[0].values()) * made.width

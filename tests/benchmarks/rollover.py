@@ -54,7 +54,10 @@ def line(number: int, one: Rehearsal) -> tuple[str, bool]:
 def saving(mesh: int) -> str:
     """Bar updates and wall time of a switched run over those of the run without switching."""
     parameters = Parameters(mesh=mesh)
-    pairs = [(simulate(parameters, 0.42), simulate(parameters, 0.42, WINDOW)) for _ in range(3)]
+    pairs = [
+        (simulate(parameters, 0.42), simulate(parameters, 0.42, WINDOW))
+        for _ in range(3)
+    ]
     seconds = [np.median([pair[i].seconds for pair in pairs]) for i in (0, 1)]
     work = pairs[0][1].bar_updates / pairs[0][0].bar_updates
     return f"{mesh:4d}  {pairs[0][0].dt:.2g}  {work:12.2f}  {seconds[1] / seconds[0]:10.2f}  {seconds[0]:8.2f}"
@@ -69,7 +72,9 @@ def main() -> int:
             text, good = line(number, one)
             missed += not good
             print(text, flush=True)
-    print(f"\nrigid from {WINDOW.tr} to {WINDOW.td} of 0.42 s: shares of the run without switching")
+    print(
+        f"\nrigid from {WINDOW.tr} to {WINDOW.td} of 0.42 s: shares of the run without switching"
+    )
     print("mesh  step     bar updates   wall time  seconds")
     for mesh in (8, 16, 32, 64):
         print(saving(mesh), flush=True)
@@ -77,7 +82,9 @@ def main() -> int:
     start = perf_counter()
     suggest(history_of(run), 0.37, Settings())
     ratio = run.seconds / (perf_counter() - start)
-    print(f"\none run of 400 ms costs {ratio:.1f} runs of suggest on its history, at most 100")
+    print(
+        f"\none run of 400 ms costs {ratio:.1f} runs of suggest on its history, at most 100"
+    )
     return int(missed > 0 or ratio > 100)
 
 

@@ -49,12 +49,25 @@ def write_runs(folder: Path, number: int, states: int, noise: float = 0.0) -> li
     time = np.linspace(0.0, 0.15, states)
     names = []
     for i in range(number):
-        mode = type(MODE)(OMEGA_2 * (1 + 1e-3 * rng.standard_normal()), MODE.alpha, MODE.cosine, MODE.sine, MODE.origin)
+        mode = type(MODE)(
+            OMEGA_2 * (1 + 1e-3 * rng.standard_normal()),
+            MODE.alpha,
+            MODE.cosine,
+            MODE.sine,
+            MODE.origin,
+        )
         names.append(str(folder / f"run{i:04}.csv"))
         energy = mode.energy(time)
         energy += noise * energy.max() * rng.standard_normal(states)
         table = np.stack([time, energy], axis=1)
-        np.savetxt(names[-1], table, delimiter=",", header="time,internal_energy", comments="", fmt="%.7g")
+        np.savetxt(
+            names[-1],
+            table,
+            delimiter=",",
+            header="time,internal_energy",
+            comments="",
+            fmt="%.7g",
+        )
     return names
 
 
@@ -74,7 +87,9 @@ def cluster_overhead(workers: int) -> float | None:
         client.wait_for_workers(workers)
         for _ in range(ROUNDS):
             start = perf_counter()
-            assert {answer.result for answer in farm.answers(abs, range(RUNS))} == set(range(RUNS))
+            assert {answer.result for answer in farm.answers(abs, range(RUNS))} == set(
+                range(RUNS)
+            )
             seconds.append(perf_counter() - start)
     return 1e3 * median(seconds) / RUNS
 
@@ -99,7 +114,18 @@ def process(*args: str) -> tuple[float, float, bytes]:
 
 def study(names: list[str], *options: str) -> tuple[float, float]:
     """Seconds and peak memory of a study in which every run has a tr and all share one."""
-    args = ("-m", "d2rpick", "study", "-q", "--td", str(TD), "-f", "json", *options, *names)
+    args = (
+        "-m",
+        "d2rpick",
+        "study",
+        "-q",
+        "--td",
+        str(TD),
+        "-f",
+        "json",
+        *options,
+        *names,
+    )
     seconds, memory, text = process(*args)
     found = json.loads(text)
     assert [run["status"] for run in found["runs"]] == ["ok"] * len(names)
@@ -112,7 +138,10 @@ def main() -> int:
     everything = str(len(os.sched_getaffinity(0)))
     with TemporaryDirectory() as place:
         names = write_runs(Path(place), RUNS, STATES)
-        jobs = {f"study --jobs {number}": ("--jobs", number) for number in ("1", "2", everything)}
+        jobs = {
+            f"study --jobs {number}": ("--jobs", number)
+            for number in ("1", "2", everything)
+        }
         load = os.getloadavg()[0]
         loops: list[float] = []
         studies: dict[str, list[float]] = {name: [] for name in jobs}
@@ -122,18 +151,29 @@ def main() -> int:
                 studies[name].append(study(names, *options)[0])
         loop = median(loops)
         after = os.getloadavg()[0]
-        print(f"{RUNS} runs of {STATES} states, {everything} cores, load {load:.1f} before, {after:.1f} after")
-        for name, seconds in {"plain loop over the library call": loops, **studies}.items():
+        print(
+            f"{RUNS} runs of {STATES} states, {everything} cores, load {load:.1f} before, {after:.1f} after"
+        )
+        for name, seconds in {
+            "plain loop over the library call": loops,
+            **studies,
+        }.items():
             print(
                 f"{name:34} {median(seconds) / RUNS * 1e3:6.2f} ms per run, {median(seconds) / loop:4.2f} of the loop"
             )
         grown = []
         for extra in ((), ("--plot", f"{place}/runs.png", "--overwrite")):
-            few, many = (study(some, "--jobs", "2", *extra)[1] for some in (names[:FEW], names))
+            few, many = (
+                study(some, "--jobs", "2", *extra)[1] for some in (names[:FEW], names)
+            )
             grown.append((many - few) / (RUNS - FEW) * 1e3)
             what = f"peak memory of study {' '.join(extra[:1])}".strip()
-            print(f"{what}: {few:.1f} MB with {FEW} runs, {many:.1f} MB with {RUNS}: {grown[-1]:.1f} kB per run more")
-    return int(median(studies["study --jobs 1"]) > MOST * loop or max(grown) > MOST_GROWN)
+            print(
+                f"{what}: {few:.1f} MB with {FEW} runs, {many:.1f} MB with {RUNS}: {grown[-1]:.1f} kB per run more"
+            )
+    return int(
+        median(studies["study --jobs 1"]) > MOST * loop or max(grown) > MOST_GROWN
+    )
 
 
 if __name__ == "__main__":

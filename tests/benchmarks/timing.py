@@ -61,7 +61,13 @@ def ratio(
 
 def output(*command: str) -> bytes:
     """What a process of this Python prints, in the folder of the project."""
-    result = subprocess.run([sys.executable, *command], check=True, capture_output=True, cwd=ROOT, env=environment())
+    result = subprocess.run(
+        [sys.executable, *command],
+        check=True,
+        capture_output=True,
+        cwd=ROOT,
+        env=environment(),
+    )
     return result.stdout
 
 
@@ -69,6 +75,15 @@ def output(*command: str) -> bytes:
 def environment() -> dict[str, str]:
     """Environment of the processes, for which the package is compiled: an installed one is, a working copy may not."""
     own = "PYTHONDONTWRITEBYTECODE"
-    clean = {name: value for name, value in os.environ.items() if name != own and not name.startswith("D2RPICK_")}
-    subprocess.run([sys.executable, "-m", "compileall", "-q", "d2rpick"], check=True, cwd=ROOT, env=clean)
+    clean = {
+        name: value
+        for name, value in os.environ.items()
+        if name != own and not name.startswith("D2RPICK_")
+    }
+    subprocess.run(
+        [sys.executable, "-m", "compileall", "-q", "d2rpick"],
+        check=True,
+        cwd=ROOT,
+        env=clean,
+    )
     return clean

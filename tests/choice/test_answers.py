@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from d2rpick.choice.answers import suggest, suggest_at, suggest_of, verify, verify_at, verify_of
+from d2rpick.choice.answers import (
+    suggest,
+    suggest_at,
+    suggest_of,
+    verify,
+    verify_at,
+    verify_of,
+)
 from d2rpick.choice.candidates import Pair
 from d2rpick.choice.judged_card import CardRequest, judged_card
 from d2rpick.choice.question import Reference, Settings, read
@@ -30,22 +37,37 @@ def test_the_rollover_is_switched_after_the_trip() -> None:
     """By the contact energy the trip ends at 90.8 ms."""
     answer = suggest(rollover(), 0.37, PLAIN)
     flight = answer.situation.flight
-    assert (answer.situation.basis, flight.source, flight.certain) == ("energy", "energy", False)
+    assert (answer.situation.basis, flight.source, flight.certain) == (
+        "energy",
+        "energy",
+        False,
+    )
     assert flight.settled == pytest.approx(0.0850, abs=0.002)
     assert 0.0908 < sure(flight.start) <= sure(answer.recommended).tr <= 0.185
     assert "flight-from-energy" in codes(answer)
     assert answer.situation.kinetic_share is None
     for c in answer.candidates:
-        assert (c.sign_match, c.lock_in_error, c.residual, c.timing_tolerance) == (None, None, None, None)
+        assert (c.sign_match, c.lock_in_error, c.residual, c.timing_tolerance) == (
+            None,
+            None,
+            None,
+            None,
+        )
     early = [c for c in answer.candidates if c.tr < sure(flight.start)]
     assert early
-    assert all(not c.acceptable and "before the end of the load" in c.notes[0] for c in early)
+    assert all(
+        not c.acceptable and "before the end of the load" in c.notes[0] for c in early
+    )
 
 
 @pytest.mark.parametrize("seed", [5, 6])
-def test_no_peak_of_noise_that_is_nearer_than_the_better_pair_saves_anything(seed: int) -> None:
+def test_no_peak_of_noise_that_is_nearer_than_the_better_pair_saves_anything(
+    seed: int,
+) -> None:
     time = np.linspace(0, 1, 400)
-    energy = 20 * np.exp(-8 * time) + np.random.default_rng(seed).standard_normal(time.size)
+    energy = 20 * np.exp(-8 * time) + np.random.default_rng(seed).standard_normal(
+        time.size
+    )
     answer = suggest(of(energy, time), 0.9, Settings(replay=False))
     own, better = answer.situation, sure(answer.better_pair).td
     nearer = [td for td in own.peaks(sure(own.earliest_tr), own.td) if td > better]
@@ -56,19 +78,29 @@ def test_no_peak_of_noise_that_is_nearer_than_the_better_pair_saves_anything(see
 
 
 @pytest.mark.slow
-@given(st.floats(-50, 50), st.sampled_from([1e-3, 1.0, 1e3]), st.sampled_from([1e-6, 1.0, 1e6]))
+@given(
+    st.floats(-50, 50),
+    st.sampled_from([1e-3, 1.0, 1e3]),
+    st.sampled_from([1e-6, 1.0, 1e6]),
+)
 def test_units_do_not_matter(shift: float, unit: float, joule: float) -> None:
     plain = vibration(decay=0.3)
     there = of(joule * plain.energy, unit * (plain.time + shift))
     expected = suggest(plain, 3.1, PLAIN)
     found = suggest(there, float(unit * (3.1 + shift)), PLAIN)
-    assert sure(found.recommended).tr / unit - shift == pytest.approx(sure(expected.recommended).tr, abs=1e-7)
-    assert sure(found.recommended).residual == pytest.approx(sure(expected.recommended).residual, abs=1e-6)
+    assert sure(found.recommended).tr / unit - shift == pytest.approx(
+        sure(expected.recommended).tr, abs=1e-7
+    )
+    assert sure(found.recommended).residual == pytest.approx(
+        sure(expected.recommended).residual, abs=1e-6
+    )
 
 
 def test_a_vibration_that_has_died_down_to_nothing_at_td_has_no_sign_there() -> None:
     time = np.linspace(0.0, 0.01, 400)
-    answer = suggest(of(np.exp(-8e4 * time) * np.sin(3000.0 * time) ** 2, time), 0.01, Settings())
+    answer = suggest(
+        of(np.exp(-8e4 * time) * np.sin(3000.0 * time) ** 2, time), 0.01, Settings()
+    )
     assert answer.situation.basis == "energy"
     assert answer.recommended is None
 
@@ -86,7 +118,9 @@ def test_without_a_known_flight_the_verdict_is_unknown() -> None:
 
 
 def test_the_sign_is_judged_before_the_tolerance() -> None:
-    judged = verify(paper.history(), 0.0122658849405802, paper.TD, Settings(tolerance=1.0))
+    judged = verify(
+        paper.history(), 0.0122658849405802, paper.TD, Settings(tolerance=1.0)
+    )
     assert judged.tr_ok is False
     assert judged.reasons == ("opposite sign of the deformation",)
 
@@ -94,8 +128,18 @@ def test_the_sign_is_judged_before_the_tolerance() -> None:
 def test_verify_measures_what_suggest_measures() -> None:
     best = suggest(paper.history(), paper.TD, PLAIN).candidates[0]
     judged = verify(paper.history(), best.tr, paper.TD, PLAIN)
-    for name in ["energy", "energy_ratio", "lock_in_error", "residual", "sign_match", "rigid_time", "timing_tolerance"]:
-        assert getattr(judged.candidate, name) == pytest.approx(getattr(best, name), rel=1e-9, abs=1e-9)
+    for name in [
+        "energy",
+        "energy_ratio",
+        "lock_in_error",
+        "residual",
+        "sign_match",
+        "rigid_time",
+        "timing_tolerance",
+    ]:
+        assert getattr(judged.candidate, name) == pytest.approx(
+            getattr(best, name), rel=1e-9, abs=1e-9
+        )
     assert judged.verified
     assert judged.td_ok is False  # a kinetic share of 0.92
 
@@ -104,8 +148,14 @@ def ringing() -> History:
     """Three modes and noise, finely sampled: of several modes a tr may be a closest match, which is off the level."""
     time = np.linspace(0, 0.5, 10_001)
     modes = [(5, 4, 300, 0.3), (2, 6, 777, 1), (1, 9, 1500, 2)]
-    energy = sum(a * np.exp(-alpha * time) * np.sin(omega * time + phase) ** 2 for a, alpha, omega, phase in modes)
-    return of(energy + 0.01 * np.abs(np.random.default_rng(5).standard_normal(time.size)), time)
+    energy = sum(
+        a * np.exp(-alpha * time) * np.sin(omega * time + phase) ** 2
+        for a, alpha, omega, phase in modes
+    )
+    return of(
+        energy + 0.01 * np.abs(np.random.default_rng(5).standard_normal(time.size)),
+        time,
+    )
 
 
 @pytest.mark.slow
@@ -117,7 +167,9 @@ def test_verify_remarks_what_suggest_remarks_on_every_tr() -> None:
     for one in found:
         judged = verify_at(situation, one.tr).candidate
         assert judged.notes == one.notes
-        assert (judged.tr_low, judged.tr_high) == pytest.approx((one.tr_low, one.tr_high), rel=1e-9)
+        assert (judged.tr_low, judged.tr_high) == pytest.approx(
+            (one.tr_low, one.tr_high), rel=1e-9
+        )
 
 
 LIMITS = st.none() | st.floats(0.0, 1.2)
@@ -135,14 +187,26 @@ OPTIONS = st.builds(
 @st.composite
 def histories(draw: st.DrawFn) -> History:
     """A load that falls, then one or two modes, damped or not, with noise, sampled finely or coarsely."""
-    count, rng = draw(st.integers(12, 90)), np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    count, rng = (
+        draw(st.integers(12, 90)),
+        np.random.default_rng(draw(st.integers(0, 2**32 - 1))),
+    )
     steps = rng.uniform(0.2, 1.8, count) if draw(st.booleans()) else np.ones(count)
     time = np.cumsum(steps) * 10 / steps.sum()
-    omega, alpha, second = draw(st.floats(1.0, 12.0)), draw(st.floats(0.0, 0.4)), draw(st.sampled_from([0.0, 0.5]))
+    omega, alpha, second = (
+        draw(st.floats(1.0, 12.0)),
+        draw(st.floats(0.0, 0.4)),
+        draw(st.sampled_from([0.0, 0.5])),
+    )
     decay = np.exp(-alpha * time)
-    energy = decay * np.sin(omega * time) ** 2 + second * decay * np.cos(1.7 * omega * time) ** 2
+    energy = (
+        decay * np.sin(omega * time) ** 2
+        + second * decay * np.cos(1.7 * omega * time) ** 2
+    )
     energy += draw(st.sampled_from([0.0, 3.0])) * np.exp(-(((time - 1.5) / 0.6) ** 2))
-    energy += draw(st.sampled_from([0.0, 0.01, 0.2])) * np.abs(rng.standard_normal(count))
+    energy += draw(st.sampled_from([0.0, 0.01, 0.2])) * np.abs(
+        rng.standard_normal(count)
+    )
     return of(energy, time)
 
 
@@ -155,7 +219,9 @@ def holds(history: History, pair: Pair | None, asked: Settings) -> bool:
 
 @settings(max_examples=8)
 @given(histories(), st.floats(3.0, 9.9), OPTIONS)
-def test_what_is_chosen_for_a_td_is_verified(history: History, td: float, asked: Settings) -> None:
+def test_what_is_chosen_for_a_td_is_verified(
+    history: History, td: float, asked: Settings
+) -> None:
     td = min(td, float(history.time[-1]))
     answer = suggest(history, td, asked)
     assert holds(history, answer.recommended, asked)
@@ -165,8 +231,12 @@ def test_what_is_chosen_for_a_td_is_verified(history: History, td: float, asked:
 @pytest.mark.slow
 @settings(max_examples=5)
 @given(histories(), st.floats(3.0, 8.0), OPTIONS)
-def test_what_is_chosen_in_a_window_is_verified(history: History, low: float, asked: Settings) -> None:
-    answer = suggest_in_window(history, (low, min(low + 1.5, float(history.time[-1]))), asked)
+def test_what_is_chosen_in_a_window_is_verified(
+    history: History, low: float, asked: Settings
+) -> None:
+    answer = suggest_in_window(
+        history, (low, min(low + 1.5, float(history.time[-1]))), asked
+    )
     assert holds(history, answer.recommended, asked)
     assert holds(history, answer.better_pair, asked)
 
@@ -178,19 +248,32 @@ def test_a_better_td_that_does_not_verify_is_not_named(td: float) -> None:
 
 
 @pytest.mark.parametrize("limit", [{"max_kinetic_share": 0.3}, {"max_residual": 0.3}])
-def test_a_limit_on_what_is_not_known_leaves_no_td_of_a_window(limit: dict[str, Any]) -> None:
+def test_a_limit_on_what_is_not_known_leaves_no_td_of_a_window(
+    limit: dict[str, Any],
+) -> None:
     time = np.linspace(0, 10, 60)
-    energy = 3 * np.exp(-(((time - 1.5) / 0.6) ** 2)) + np.sin(3 * time) ** 2 + 0.6 * np.cos(5.1 * time) ** 2
+    energy = (
+        3 * np.exp(-(((time - 1.5) / 0.6) ** 2))
+        + np.sin(3 * time) ** 2
+        + 0.6 * np.cos(5.1 * time) ** 2
+    )
     history = of(energy, time)
     free = suggest_in_window(history, (6.0, 9.0), Settings(replay=False))
     assert free.recommended
-    assert suggest_in_window(history, (6.0, 9.0), Settings(replay=False, **limit)).recommended is None
+    assert (
+        suggest_in_window(
+            history, (6.0, 9.0), Settings(replay=False, **limit)
+        ).recommended
+        is None
+    )
 
 
 def test_too_few_states_per_period_recommend_nothing() -> None:
     time = np.linspace(0, 10, 141)
     history = of(np.exp(-0.05 * time) * np.sin(7.3 * time) ** 2, time)
-    answer = suggest(history, 8.0, Settings())  # six states in each period of the energy
+    answer = suggest(
+        history, 8.0, Settings()
+    )  # six states in each period of the energy
     assert answer.situation.basis == "energy"
     assert answer.recommended is None
     assert any("states per period" in note for note in answer.candidates[0].notes)
@@ -201,17 +284,24 @@ BOX = Selection(parts=("box",))
 
 def test_the_health_of_the_run_comes_with_every_answer() -> None:
     whole = read([T01], BOX)
-    answer, in_window = suggest_of(whole, 0.37, PLAIN), suggest_of(whole, (0.3, 0.38), PLAIN)
+    answer, in_window = (
+        suggest_of(whole, 0.37, PLAIN),
+        suggest_of(whole, (0.3, 0.38), PLAIN),
+    )
     verdict = verify_of(whole, sure(answer.recommended).tr, 0.37, PLAIN)
     assert sure(answer.health) == verdict.health
     assert sure(answer.health).window == (sure(answer.recommended).tr, 0.37)
     assert in_window.health is not None
-    assert suggest_of(read([ENERGY]), 0.064, PLAIN).health is None  # a table of two columns tells nothing of it
+    assert (
+        suggest_of(read([ENERGY]), 0.064, PLAIN).health is None
+    )  # a table of two columns tells nothing of it
 
 
 def test_the_momenta_come_with_every_history_and_know_the_chosen_part() -> None:
     opened = open_run([T01])
-    whole, box = (Reference.of(opened, selection).history for selection in (Selection(), BOX))
+    whole, box = (
+        Reference.of(opened, selection).history for selection in (Selection(), BOX)
+    )
     (of_whole, *_), (of_box, *_) = whole.momenta, box.momenta
     assert of_whole.parts == of_box.parts
     assert of_whole.chosen == tuple(range(len(sure(of_whole.parts))))
@@ -230,5 +320,10 @@ def test_a_card_is_judged_by_what_the_choice_found_in_the_record() -> None:
     before = fits.made
     assert before > 0
     judge = partial(verify_of, reference, settings=PLAIN, known=box.situation)
-    assert judged_card([sure(box.recommended)[:2]], box.situation.history, judge, CardRequest("ls-dyna"))
+    assert judged_card(
+        [sure(box.recommended)[:2]],
+        box.situation.history,
+        judge,
+        CardRequest("ls-dyna"),
+    )
     assert fits.made == before

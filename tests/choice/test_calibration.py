@@ -7,7 +7,12 @@ from pathlib import Path
 import pytest
 
 from d2rpick.base.errors import ConfigurationError, DeckError, FormatError
-from d2rpick.choice.calibration import Observation, calibrate, observations_of, observations_of_runs
+from d2rpick.choice.calibration import (
+    Observation,
+    calibrate,
+    observations_of,
+    observations_of_runs,
+)
 from d2rpick.choice.cost import MEASURED
 from tests.deck.test_radioss_inventory import BEGIN, PROPS, nodes
 from tests.decks import wide
@@ -17,15 +22,23 @@ REST, RIGID, NODES = 0.01, 0.1, 20_000
 ALL = {"QBAT": 400.0, "BT": 500.0, "solid": 300.0}
 
 
-def leg(counts: Mapping[str, float], rigid_nodes: float, *, elements: bool = True) -> Observation:
+def leg(
+    counts: Mapping[str, float], rigid_nodes: float, *, elements: bool = True
+) -> Observation:
     spent = sum(TRUE[name] * count for name, count in counts.items())
     total = spent + REST * NODES + RIGID * rigid_nodes
-    return Observation("leg", counts, NODES, rigid_nodes, total, spent if elements else None)
+    return Observation(
+        "leg", counts, NODES, rigid_nodes, total, spent if elements else None
+    )
 
 
 def legs(*, elements: bool = True) -> list[Observation]:
     one_less = [leg({**ALL, name: 0.0}, NODES // 2, elements=elements) for name in ALL]
-    return [leg(ALL, 0, elements=elements), *one_less, leg(dict.fromkeys(ALL, 0.0), NODES, elements=elements)]
+    return [
+        leg(ALL, 0, elements=elements),
+        *one_less,
+        leg(dict.fromkeys(ALL, 0.0), NODES, elements=elements),
+    ]
 
 
 @pytest.mark.parametrize("elements", [True, False])
@@ -35,7 +48,9 @@ def test_weights_of_a_made_site_are_found(elements: bool) -> None:
     for name, weight in TRUE.items():
         assert found.weights.per_element[name] == pytest.approx(weight, rel=0.1)
     assert found.weights.rigid_node == pytest.approx(RIGID, rel=0.15)
-    assert found.weights.element_share == pytest.approx(1 - REST * NODES / leg(ALL, 0).total, abs=0.03)
+    assert found.weights.element_share == pytest.approx(
+        1 - REST * NODES / leg(ALL, 0).total, abs=0.03
+    )
     assert {*TRUE} <= {*found.told}
 
 
@@ -63,8 +78,13 @@ def listing(cycles: int, elements: float, total: float) -> str:
 
 def run_folder(folder: Path) -> Path:
     """A run of two legs, in the second of which part 1 of its two shells is rigid."""
-    parts = "".join(f"/PART/{n}\np{n}\n{wide(1, 1)}/SHELL/{n}\n{wide(n, *range(4 * n - 3, 4 * n + 1))}" for n in (1, 2))
-    body = f"/GRNOD/PART/1\ng\n{wide(1)}/RBODY/1\nbody\n{wide(9)[:-1]}{' ' * 50}{wide(1)}"
+    parts = "".join(
+        f"/PART/{n}\np{n}\n{wide(1, 1)}/SHELL/{n}\n{wide(n, *range(4 * n - 3, 4 * n + 1))}"
+        for n in (1, 2)
+    )
+    body = (
+        f"/GRNOD/PART/1\ng\n{wide(1)}/RBODY/1\nbody\n{wide(9)[:-1]}{' ' * 50}{wide(1)}"
+    )
     deck = f"{BEGIN}{nodes(9)}{parts}{PROPS}{body}/END\n"
     (folder / "TEST_0000.rad").write_text(deck)
     (folder / "TEST_0001.rad").write_text("/RUN/TEST/1\n0.1\n/RBODY/OFF\n9\n")
@@ -81,7 +101,9 @@ def test_legs_of_radioss_are_read_with_what_is_rigid_in_them(tmp_path: Path) -> 
     assert (rigid.counts, rigid.rigid_nodes) == ({"QEPH": 1.0, "point": 2.0}, 4.0)
     assert [rigid.elements, rigid.total] == pytest.approx([4.0, 7.0])
     found = calibrate([free, rigid]).weights.per_element
-    assert found["QEPH"] + 2 * found["point"] == pytest.approx(4.0, rel=0.02)  # an element of three layers
+    assert found["QEPH"] + 2 * found["point"] == pytest.approx(
+        4.0, rel=0.02
+    )  # an element of three layers
 
 
 def test_a_glstat_tells_by_its_time_per_zone_cycle(tmp_path: Path) -> None:
@@ -89,14 +111,28 @@ def test_a_glstat_tells_by_its_time_per_zone_cycle(tmp_path: Path) -> None:
         "*DEFORMABLE_TO_RIGID_AUTOMATIC\n         1         0      0.02\n" + wide(0, 0, 0, 0, 1, 0) + wide(7, 0)
         + "*DEFORMABLE_TO_RIGID_AUTOMATIC\n         2         0      0.05\n" + wide(0, 0, 0, 0, 0, 1) + wide(7)
     )  # fmt: skip
-    shells = "".join(f"{n:8d}{part:8d}       1       2       3       4\n" for n, part in ((1, 7), (2, 9)))
+    shells = "".join(
+        f"{n:8d}{part:8d}       1       2       3       4\n"
+        for n, part in ((1, 7), (2, 9))
+    )
     section = "*SECTION_SHELL\n         1         2\n       1.0\n"
     parts = "".join(f"*PART\np\n{part:10d}{1:10d}{1:10d}\n" for part in (7, 9))
-    mesh = "*NODE\n" + "".join(f"{n:8d}\n" for n in range(1, 5)) + f"*ELEMENT_SHELL\n{shells}"
+    mesh = (
+        "*NODE\n"
+        + "".join(f"{n:8d}\n" for n in range(1, 5))
+        + f"*ELEMENT_SHELL\n{shells}"
+    )
     (tmp_path / "main.k").write_text(f"*KEYWORD\n{parts}{section}{mesh}{windows}*END\n")
     states = "".join(
         f" time...........................   {time:.5E}\n time per zone cycle.(nanosec)..          {zone}\n"
-        for time, zone in ((0.0, 0), (0.01, 5000), (0.02, 5000), (0.03, 3000), (0.05, 3000), (0.06, 5000))
+        for time, zone in (
+            (0.0, 0),
+            (0.01, 5000),
+            (0.02, 5000),
+            (0.03, 3000),
+            (0.05, 3000),
+            (0.06, 5000),
+        )
     )
     (tmp_path / "glstat").write_text(states)
     free, rigid = observations_of(str(tmp_path))
@@ -127,7 +163,9 @@ def test_a_run_that_is_given_twice_counts_once(tmp_path: Path) -> None:
         found, cautions = observations_of_runs([str(folder), again])
         assert found == once
         assert [one.code for one in cautions] == ["same-leg-twice"] * 2
-        assert ("has the content of" if again == str(copy) else "is given twice; it counts") in cautions[0].message
+        assert (
+            "has the content of" if again == str(copy) else "is given twice; it counts"
+        ) in cautions[0].message
     (copy / "TEST_0002.out").write_text(listing(200, 0.8e-3, 1.3e-3))
     found, cautions = observations_of_runs([str(folder), str(copy)])
     assert len(found) == 3

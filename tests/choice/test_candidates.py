@@ -17,23 +17,33 @@ PLAIN = Settings()
 
 def test_all_crossings_of_the_published_example_and_their_signs() -> None:
     answer = suggest(paper.history(), paper.TD, PLAIN)
-    found = sorted((c.tr * 1e3, c.sign_match) for c in answer.candidates if c.kind == "crossing")
+    found = sorted(
+        (c.tr * 1e3, c.sign_match) for c in answer.candidates if c.kind == "crossing"
+    )
     assert [sign for _, sign in found] == [sign for _, sign in paper.CROSSINGS]
-    assert [time for time, _ in found] == pytest.approx([time for time, _ in paper.CROSSINGS], rel=1e-9)
+    assert [time for time, _ in found] == pytest.approx(
+        [time for time, _ in paper.CROSSINGS], rel=1e-9
+    )
 
 
 def test_opposite_signs_are_worse_than_locking_in_nothing() -> None:
     answer = suggest(paper.history(), paper.TD, PLAIN)
     opposite = [c for c in answer.candidates if c.sign_match is False]
-    share = (4 * paper.ENERGY_TD + paper.KINETIC_TD) / (paper.ENERGY_TD + paper.KINETIC_TD)
-    assert [c.residual for c in opposite] == pytest.approx([np.sqrt(share)] * len(opposite), rel=1e-7)
+    share = (4 * paper.ENERGY_TD + paper.KINETIC_TD) / (
+        paper.ENERGY_TD + paper.KINETIC_TD
+    )
+    assert [c.residual for c in opposite] == pytest.approx(
+        [np.sqrt(share)] * len(opposite), rel=1e-7
+    )
     assert not any(c.acceptable for c in opposite)
 
 
 def test_residual_is_made_of_lock_in_error_and_kinetic_share() -> None:
     answer = suggest(paper.history(), 0.05, PLAIN)
     for c in answer.candidates:
-        expected = measures.residual(sure(c.lock_in_error), sure(answer.situation.kinetic_share))
+        expected = measures.residual(
+            sure(c.lock_in_error), sure(answer.situation.kinetic_share)
+        )
         assert c.residual == pytest.approx(expected, rel=1e-9)
 
 
@@ -50,7 +60,9 @@ def test_a_level_of_zero_is_met_once_by_each_passage() -> None:
     assert len(times) == len(set(times)) == 6
 
 
-def test_td_on_the_highest_peak_of_an_undamped_record_has_extrema_for_candidates() -> None:
+def test_td_on_the_highest_peak_of_an_undamped_record_has_extrema_for_candidates() -> (
+    None
+):
     history = vibration()
     answer = suggest(history, 3.25, PLAIN)
     assert {c.kind for c in answer.candidates if c.acceptable} == {"extremum"}
@@ -76,11 +88,15 @@ def test_candidates_of_many_td_are_those_of_each_also_where_few_fit_together() -
     assert list(judged_of([])) == []
 
 
-def test_a_first_td_with_few_candidates_does_not_let_all_others_be_judged_at_once() -> None:
+def test_a_first_td_with_few_candidates_does_not_let_all_others_be_judged_at_once() -> (
+    None
+):
     energy = np.r_[np.zeros(20), 4 + np.random.default_rng(1).random(4000)]
     look = looking(of(energy, np.arange(energy.size, dtype=float)), PLAIN)
     situations = [look(td) for td in (10.0, *np.linspace(3900, 4000, 40))]
-    assert max(judged.place.size for judged in judged_of(situations, most=4000)) < 40_000
+    assert (
+        max(judged.place.size for judged in judged_of(situations, most=4000)) < 40_000
+    )
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.8])

@@ -10,13 +10,22 @@ import pytest
 from hypothesis import given, strategies as st
 
 from d2rpick.base.errors import ConfigurationError
-from d2rpick.choice.cost import CostModel, Weights, read_weights, saved_share, weights_as_toml
+from d2rpick.choice.cost import (
+    CostModel,
+    Weights,
+    read_weights,
+    saved_share,
+    weights_as_toml,
+)
 from d2rpick.deck.formulations import ls_dyna, radioss
 from d2rpick.deck.mesh import Elements
 from d2rpick.deck.model import Formulation, Inventory, Material, PartData, Section
 from tests.energies import sure
 
-QBAT, UNKNOWN = Formulation("QBAT", "QBAT"), Formulation("strange", None, measured=False)
+QBAT, UNKNOWN = (
+    Formulation("QBAT", "QBAT"),
+    Formulation("strange", None, measured=False),
+)
 
 
 def inventory(
@@ -39,7 +48,9 @@ def inventory(
         for one in counts
     }  # fmt: skip
     elements = (Elements("shell", part, nodes),)
-    return Inventory(solver, parts, elements, np.zeros((4 * part.size, 3)), notes, complete=not notes)
+    return Inventory(
+        solver, parts, elements, np.zeros((4 * part.size, 3)), notes, complete=not notes
+    )
 
 
 def test_shares_of_parts_of_one_formulation_are_those_of_their_elements() -> None:
@@ -50,16 +61,23 @@ def test_shares_of_parts_of_one_formulation_are_those_of_their_elements() -> Non
 
 
 @pytest.mark.parametrize(("layers", "extra"), [(1, 0), (3, 8), (5, 16), (None, 8)])
-def test_shells_cost_more_with_more_integration_points(layers: int | None, extra: int) -> None:
+def test_shells_cost_more_with_more_integration_points(
+    layers: int | None, extra: int
+) -> None:
     """Four points in each layer, of which 3 are assumed; without a weight for points none counts."""
     of_deck = sure(radioss("shell", 12, 0, 0))
     found = inventory({1: 30, 2: 70}, formulations={2: UNKNOWN})
-    parts = {1: found.parts[1]._replace(section=Section({"shell": of_deck}, layers=layers)), 2: found.parts[2]}
+    parts = {
+        1: found.parts[1]._replace(section=Section({"shell": of_deck}, layers=layers)),
+        2: found.parts[2],
+    }
     found = replace(found, parts=parts)
     assert found.further_points(1, "shell") == extra
     model = CostModel(found, Weights({"QBAT": 1.0, "strange": 1.0, "point": 0.5}))
     assert model.of_part(1).cost == 30 * (1 + 0.5 * extra)
-    assert CostModel(found, Weights({"QBAT": 1.0, "strange": 1.0})).of_part(1).cost == 30
+    assert (
+        CostModel(found, Weights({"QBAT": 1.0, "strange": 1.0})).of_part(1).cost == 30
+    )
 
 
 def test_elements_that_are_rigid_from_the_start_cost_nothing() -> None:
@@ -68,12 +86,16 @@ def test_elements_that_are_rigid_from_the_start_cost_nothing() -> None:
     assert model.saved([2]).value == 0.0
 
 
-def test_a_formulation_without_a_weight_leaves_every_share_open_but_with_one_of_its_own_it_is_known() -> None:
+def test_a_formulation_without_a_weight_leaves_every_share_open_but_with_one_of_its_own_it_is_known() -> (
+    None
+):
     found = inventory({1: 30, 2: 70}, formulations={2: UNKNOWN})
     share = CostModel(found).saved([1])
     assert share.value is None
     assert "strange" in str(share.reason)
-    assert CostModel(found, Weights({"QBAT": 1.0, "strange": 3.0})).share_of(1).value == pytest.approx(30 / 240)
+    assert CostModel(found, Weights({"QBAT": 1.0, "strange": 3.0})).share_of(
+        1
+    ).value == pytest.approx(30 / 240)
 
 
 def test_what_the_deck_does_not_have_leaves_the_cost_open() -> None:
@@ -85,7 +107,10 @@ def test_what_the_deck_does_not_have_leaves_the_cost_open() -> None:
 
 
 def test_formulations_that_were_not_measured_are_named() -> None:
-    own = {1: QBAT, 2: Formulation("fully integrated (ELFORM 16)", "QBAT", measured=False)}
+    own = {
+        1: QBAT,
+        2: Formulation("fully integrated (ELFORM 16)", "QBAT", measured=False),
+    }
     found = inventory({1: 1, 2: 1}, formulations=own)
     assert CostModel(found).assumed == ("fully integrated (ELFORM 16)",)
     assert CostModel(found, Weights({"QBAT": 1.0, own[2].name: 1.0})).assumed == ()
@@ -102,7 +127,9 @@ def test_the_saved_share_lies_between_0_and_that_of_the_elements_and_has_no_unit
     scaled = Weights({"BT": scale}, share, 0.05 * scale)
     found = saved_share(weights, total, part * total, nodes)
     assert 0.0 <= found <= share * (1 + 1e-12)
-    assert saved_share(scaled, scale * total, scale * part * total, nodes) == pytest.approx(found, abs=1e-9)
+    assert saved_share(
+        scaled, scale * total, scale * part * total, nodes
+    ) == pytest.approx(found, abs=1e-9)
     assert saved_share(weights, total, total, 0) == pytest.approx(share)
 
 
@@ -120,7 +147,9 @@ def test_classes_of_formulations(found: Formulation, cost: str | None) -> None:
 
 
 def test_weights_read_back_as_they_were_written(tmp_path: Path) -> None:
-    weights = Weights({"BT": 0.3, 'a "strange" one': 2.5, "träge \U0001f422": 1.0}, 0.9, 0.01, "site")
+    weights = Weights(
+        {"BT": 0.3, 'a "strange" one': 2.5, "träge \U0001f422": 1.0}, 0.9, 0.01, "site"
+    )
     (tmp_path / "site.toml").write_text(weights_as_toml(weights), "utf-8")
     assert read_weights(str(tmp_path / "site.toml")) == weights
 
@@ -137,7 +166,9 @@ def test_weights_read_back_as_they_were_written(tmp_path: Path) -> None:
         ("a = " + "[" * 100_000, "cannot be read"),
     ],
 )  # fmt: skip
-def test_weights_that_make_no_sense_are_refused_with_the_file(tmp_path: Path, text: str, told: str) -> None:
+def test_weights_that_make_no_sense_are_refused_with_the_file(
+    tmp_path: Path, text: str, told: str
+) -> None:
     (tmp_path / "site.toml").write_text(text, "utf-8")
     with pytest.raises(ConfigurationError, match="site") as error:
         read_weights(str(tmp_path / "site.toml"))

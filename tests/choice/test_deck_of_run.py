@@ -44,31 +44,69 @@ def doubts(deck: str, *parts: int) -> dict[str, Caution]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("rule", "code"), [("D2R406", "body-through-wall"), ("D2R407", "body-without-velocity")])
-def test_what_ruins_a_run_is_told_in_the_words_of_the_check(tmp_path: Path, rule: str, code: str) -> None:
+@pytest.mark.parametrize(
+    ("rule", "code"),
+    [("D2R406", "body-through-wall"), ("D2R407", "body-without-velocity")],
+)
+def test_what_ruins_a_run_is_told_in_the_words_of_the_check(
+    tmp_path: Path, rule: str, code: str
+) -> None:
     deck = placed(tmp_path, RULES[rule].failing[0])
     (finding,) = [one for one in check_deck(deck).findings if one.rule == rule]
     said = f"{finding.file}:{finding.line}: {finding.message}"
     assert doubts(deck)[code].message == said
-    for args in (("suggest", *TD), ("verify", "--tr", "0.0135867", *TD), ("plan",), ("parts",)):
+    for args in (
+        ("suggest", *TD),
+        ("verify", "--tr", "0.0135867", *TD),
+        ("plan",),
+        ("parts",),
+    ):
         if args[0] != "parts":  # which asks for parts with energies
             assert warned(*args, "--deck", deck, ENERGY)[code] == said
     assert doubts(placed(tmp_path, RULES[rule].passing[0])) == {}
 
 
-def test_solids_whose_stresses_do_not_turn_are_told_of_the_parts_in_question(tmp_path: Path) -> None:
-    brick = "/BRICK/1\n" + "".join(f"{n:10d}" for n in (9, 1, 2, 3, 4, 5, 6, 7, 8)) + "\n"
+def test_solids_whose_stresses_do_not_turn_are_told_of_the_parts_in_question(
+    tmp_path: Path,
+) -> None:
+    brick = (
+        "/BRICK/1\n" + "".join(f"{n:10d}" for n in (9, 1, 2, 3, 4, 5, 6, 7, 8)) + "\n"
+    )
     good = RULES["D2R401"].passing[0]
-    deck = write(tmp_path, good.deck.replace("/END", f"/PROP/SOLID/1\nsolid\n\n{brick}/END"), good.files, good.name)
-    assert "part 1: the stresses of these solids do not turn" in doubts(deck, 1)["stresses-unturned"].message
+    deck = write(
+        tmp_path,
+        good.deck.replace("/END", f"/PROP/SOLID/1\nsolid\n\n{brick}/END"),
+        good.files,
+        good.name,
+    )
+    assert (
+        "part 1: the stresses of these solids do not turn"
+        in doubts(deck, 1)["stresses-unturned"].message
+    )
     assert doubts(deck, 7) == {}
     assert [one.rule for one in check_deck(deck).findings] == ["D2R116"]
 
 
 def test_a_card_keeps_off_what_the_run_of_the_deck_keeps_off(tmp_path: Path) -> None:
     good = RULES["D2R401"].passing[0]
-    deck = write(tmp_path, good.deck, {"box_0001.rad": "/RUN/box/1\n0.15\n/RBODY/OFF\n1808 1809\n1810\n"}, good.name)
-    asked = ("-q", "--deck", deck, "--solver", "radioss", "--node", "1808", "-f", "card", ENERGY)
+    deck = write(
+        tmp_path,
+        good.deck,
+        {"box_0001.rad": "/RUN/box/1\n0.15\n/RBODY/OFF\n1808 1809\n1810\n"},
+        good.name,
+    )
+    asked = (
+        "-q",
+        "--deck",
+        deck,
+        "--solver",
+        "radioss",
+        "--node",
+        "1808",
+        "-f",
+        "card",
+        ENERGY,
+    )
     for args in (("suggest", *TD), ("plan",)):
         printed = run(*args, *asked)
         assert printed.exit_code == 0, printed.stderr
@@ -77,13 +115,29 @@ def test_a_card_keeps_off_what_the_run_of_the_deck_keeps_off(tmp_path: Path) -> 
 
 
 def test_a_deck_is_written_and_what_ruins_it_is_an_objection(tmp_path: Path) -> None:
-    for rule, expected in (("D2R406", 1), ("D2R408", 0)):  # the latter's deck has a wheel whose main node is 1809
+    for rule, expected in (
+        ("D2R406", 1),
+        ("D2R408", 0),
+    ):  # the latter's deck has a wheel whose main node is 1809
         example = RULES[rule].failing[0]
         files = {"box_0001.rad": "/RUN/box/1\n0.15\n/RBODY/OFF\n1808 1809\n"}
         deck = write(tmp_path, example.deck, files, example.name)
         written = tmp_path / rule
-        result = run("plan", "-q", "--node", "1808", "--deck", deck, "--write-deck", str(written), ENERGY)
-        assert (result.exit_code, "error D2R406" in result.stdout) == (expected, bool(expected)), result.stderr
+        result = run(
+            "plan",
+            "-q",
+            "--node",
+            "1808",
+            "--deck",
+            deck,
+            "--write-deck",
+            str(written),
+            ENERGY,
+        )
+        assert (result.exit_code, "error D2R406" in result.stdout) == (
+            expected,
+            bool(expected),
+        ), result.stderr
         legs = sorted(path.read_text() for path in written.glob("box_000[1-9].rad"))
         assert [leg.count("1809") for leg in legs] == [1] * len(legs)
 
@@ -92,18 +146,33 @@ def test_a_deck_is_written_and_what_ruins_it_is_an_objection(tmp_path: Path) -> 
 
 
 @pytest.mark.slow
-def test_an_engine_with_wrong_energies_is_told_with_every_answer(tmp_path: Path) -> None:
+def test_an_engine_with_wrong_energies_is_told_with_every_answer(
+    tmp_path: Path,
+) -> None:
     history = str(tmp_path / "CART02.csv")
     shutil.copy(ENERGY, history)
-    (tmp_path / "CAR_0002.out").write_text(listing("1986-2025 Altair Engineering, Inc."))
+    (tmp_path / "CAR_0002.out").write_text(
+        listing("1986-2025 Altair Engineering, Inc.")
+    )
     pair = ("--tr", "0.0135867", *TD)
     deck = placed(tmp_path, RULES["D2R401"].passing[0])
     asked = (
-        *(("info", history), ("suggest", *TD, history), ("suggest", history), ("verify", *pair, history)),
-        *(("plan", history), ("verify", *pair, ENERGY, "--switched", history), ("check", deck, "--history", history)),
+        *(
+            ("info", history),
+            ("suggest", *TD, history),
+            ("suggest", history),
+            ("verify", *pair, history),
+        ),
+        *(
+            ("plan", history),
+            ("verify", *pair, ENERGY, "--switched", history),
+            ("check", deck, "--history", history),
+        ),
     )
     for args in asked:
-        assert "CAR_0002.out: built in 2025" in warned(*args)["engine-wrong-energy"], args
+        assert "CAR_0002.out: built in 2025" in warned(*args)["engine-wrong-energy"], (
+            args
+        )
     codes = [one["code"] for one in answer("plan", history)["warnings"]]
     assert codes.count("engine-wrong-energy") == 1  # however many flights there are
     assert "engine-wrong-energy" not in warned("suggest", *TD, ENERGY)
@@ -121,24 +190,44 @@ def test_a_body_that_no_leg_switches_is_judged_by_the_energy_of_its_parts(
     tmp_path: Path, part: int, found: list[str]
 ) -> None:
     example = RULES["D2R408"].failing[0]
-    text = example.deck.replace("/PART/2", f"/PART/{part}").replace("/SHELL/2", f"/SHELL/{part}")
+    text = example.deck.replace("/PART/2", f"/PART/{part}").replace(
+        "/SHELL/2", f"/SHELL/{part}"
+    )
     deck = write(tmp_path, text, example.files, example.name)
     history = str(tmp_path / "matsum")
-    assert run("replay", *OSCILLATOR, "--t-end", "0.3", "--dt", "1e-4", "-o", history).exit_code == 0
-    listed = answer("check", deck, "--history", history, "--select", "D2R408,D2R409")["findings"]
+    assert (
+        run(
+            "replay", *OSCILLATOR, "--t-end", "0.3", "--dt", "1e-4", "-o", history
+        ).exit_code
+        == 0
+    )
+    listed = answer("check", deck, "--history", history, "--select", "D2R408,D2R409")[
+        "findings"
+    ]
     assert [f"{one['rule']} {one['severity']}" for one in listed] == found
 
 
 ASKED = {
     "suggest": ("--td", "0.37", "--part", "all", "--no-verify"),
     "verify": ("--tr", "0.1", "--td", "0.37", "--part", "all", "--no-verify"),
-    "explore": ("--td-window", "0.3", "0.37", "--steps", "2", "--part", "all", "--no-verify"),
+    "explore": (
+        "--td-window",
+        "0.3",
+        "0.37",
+        "--steps",
+        "2",
+        "--part",
+        "all",
+        "--no-verify",
+    ),
     "plan": ("--part", "all", "--no-verify"),
     "parts": ("--part", "all"),
 }
 # Parts with the numbers of the box under other titles; and with its titles under other numbers.
 OTHER = {
-    "titles": DECK.read_text("utf-8").replace("\nbox\n", "\nfloor\n").replace("\nstep\n", "\nrail\n"),
+    "titles": DECK.read_text("utf-8")
+    .replace("\nbox\n", "\nfloor\n")
+    .replace("\nstep\n", "\nrail\n"),
     "numbers": f"*KEYWORD\n*INCLUDE_TRANSFORM\n{DECK}\n{0:10d}{0:10d}{10:10d}\n*END\n",
 }
 
@@ -165,7 +254,10 @@ def test_the_answer_is_that_without_a_deck(command: str, foreign: str) -> None:
 @pytest.mark.slow
 def test_pages_and_cards_are_those_without_a_deck(foreign: str, tmp_path: Path) -> None:
     asked = ("suggest", *ASKED["suggest"], MATSUM)
-    assert run(*asked, "--deck", foreign, "-f", "card").stdout == run(*asked, "-f", "card").stdout
+    assert (
+        run(*asked, "--deck", foreign, "-f", "card").stdout
+        == run(*asked, "-f", "card").stdout
+    )
     page = tmp_path / "page.html"
     run(*asked, "--deck", foreign, "--report", str(page))
     assert "nothing of the deck is used" in page.read_text("utf-8")
@@ -175,7 +267,16 @@ def test_pages_and_cards_are_those_without_a_deck(foreign: str, tmp_path: Path) 
 def test_what_needs_the_deck_is_refused(foreign: str, tmp_path: Path) -> None:
     for asked in (
         ("suggest", "--td", "0.37", "--part", "recommended", "--deck", foreign, MATSUM),
-        ("plan", "--part", "all", "--deck", foreign, "--write-deck", str(tmp_path / "next"), MATSUM),
+        (
+            "plan",
+            "--part",
+            "all",
+            "--deck",
+            foreign,
+            "--write-deck",
+            str(tmp_path / "next"),
+            MATSUM,
+        ),
     ):
         assert "nothing of the deck is used" in refused(*asked)
     assert not (tmp_path / "next").exists()
@@ -183,32 +284,61 @@ def test_what_needs_the_deck_is_refused(foreign: str, tmp_path: Path) -> None:
 
 def test_the_library_leaves_it_out_too(foreign: str) -> None:
     asked: dict[str, Any] = {"td": 0.37, "parts": "all", "replay": False}
-    found, without = d2.suggest(d2.read(MATSUM), **asked, deck=foreign), d2.suggest(d2.read(MATSUM), **asked)
+    found, without = (
+        d2.suggest(d2.read(MATSUM), **asked, deck=foreign),
+        d2.suggest(d2.read(MATSUM), **asked),
+    )
     assert told(found.to_dict()) == told(without.to_dict())
 
 
 def test_one_part_with_another_title_is_a_warning_only() -> None:
-    found = answer("suggest", "--td", "0.37", "--part", "box", "--deck", str(DECK), MATSUM)
+    found = answer(
+        "suggest", "--td", "0.37", "--part", "box", "--deck", str(DECK), MATSUM
+    )
     assert "deck-of-another-model" not in codes(found)
     assert found["candidates"][0]["run_time_share"] < 1
 
 
-@pytest.mark.parametrize(("group", "foreign"), [("/THPART/GRSHEL/2\nstep\n         7\n", False), ("", True)])
+@pytest.mark.parametrize(
+    ("group", "foreign"), [("/THPART/GRSHEL/2\nstep\n         7\n", False), ("", True)]
+)
 def test_a_group_of_elements_that_the_history_lists_is_no_missing_part(
     group: str, foreign: bool, tmp_path: Path
 ) -> None:
     (tmp_path / "TEST_0000.rad").write_text(
         f"#RADIOSS STARTER\n/BEGIN\nTEST\n/PART/1\nbox\n         1         1\n{group}/END\n"
     )
-    asked = ("suggest", "--td", "0.37", "--part", "box", "--deck", str(tmp_path / "TEST_0000.rad"))
-    assert ("deck-of-another-model" in codes(answer(*asked, MATSUM.replace(".matsum", "T01")))) == foreign
+    asked = (
+        "suggest",
+        "--td",
+        "0.37",
+        "--part",
+        "box",
+        "--deck",
+        str(tmp_path / "TEST_0000.rad"),
+    )
+    assert (
+        "deck-of-another-model"
+        in codes(answer(*asked, MATSUM.replace(".matsum", "T01")))
+    ) == foreign
 
 
-def test_titles_are_compared_without_letters_that_files_encode_in_different_ways(tmp_path: Path) -> None:
+def test_titles_are_compared_without_letters_that_files_encode_in_different_ways(
+    tmp_path: Path,
+) -> None:
     text = DECK.read_text("utf-8").replace("\nbox\n", "\nbox \u7bb1\n")
     (tmp_path / "main.k").write_bytes(text.encode("gbk"))
     assert "deck-of-another-model" not in codes(
-        answer("suggest", "--td", "0.37", "--part", "box", "--deck", str(tmp_path / "main.k"), MATSUM)
+        answer(
+            "suggest",
+            "--td",
+            "0.37",
+            "--part",
+            "box",
+            "--deck",
+            str(tmp_path / "main.k"),
+            MATSUM,
+        )
     )
 
 
@@ -216,7 +346,9 @@ TIME = np.linspace(0.0, 1.0, 1001)
 PARTS = (Part(1, "body"), Part(2, "other"))
 PUSH = np.where(TIME < 0.2, 400 * np.sin(np.pi * TIME / 0.2), 0.0).cumsum() / 1000
 PLAIN = Settings(replay=False)
-HELD = "/GRNOD/NODE/1\nnodes\n         1\n/BCS/7\nheld\n   111 000         0         1\n"
+HELD = (
+    "/GRNOD/NODE/1\nnodes\n         1\n/BCS/7\nheld\n   111 000         0         1\n"
+)
 MOVED = "/GRNOD/NODE/1\nnodes\n         1\n/IMPVEL/7\nmoved\n         1         X         0         0         1\n"
 MOVED += f"{0:20d}{1:20d}{0:20d}{{stop:20g}}\n"
 
@@ -229,7 +361,15 @@ def falling(acceleration: float, surroundings: Surroundings) -> Momenta:
     """Momentum of a part of mass 10 that is pushed, and falls."""
     values = np.zeros((TIME.size, 1, 3))
     values[:, 0, 2] = PUSH - 10.0 * acceleration * TIME
-    return Momenta(TIME, values, PARTS[:1], EXACT, (0,), masses=np.array([10.0]), surroundings=surroundings)
+    return Momenta(
+        TIME,
+        values,
+        PARTS[:1],
+        EXACT,
+        (0,),
+        masses=np.array([10.0]),
+        surroundings=surroundings,
+    )
 
 
 @pytest.mark.parametrize("acceleration", [9.81, 3.71, 1.62, 24.8])
@@ -238,28 +378,47 @@ def test_the_gravity_of_the_deck_is_what_is_believed(acceleration: float) -> Non
     known = flight_around(falling(acceleration, gravity(acceleration)), 0.6)
     assert known
     assert known.gravity == pytest.approx(acceleration, rel=1e-3)
-    assert bool(flight_around(falling(acceleration, Surroundings()), 0.6)) is (acceleration == 9.81)
+    assert bool(flight_around(falling(acceleration, Surroundings()), 0.6)) is (
+        acceleration == 9.81
+    )
     assert flight_around(falling(acceleration, gravity(0.0)), 0.6) is None
     assert flight_around(falling(acceleration, gravity(5.0)), 0.6) is None
 
 
 def test_what_keeps_its_momentum_under_gravity_is_carried() -> None:
     assert flight_around(falling(0.0, gravity(0.0)), 0.6)
-    assert flight_around(falling(0.0, gravity(0.0, 9.81)), 0.6)  # it acts for a time only
+    assert flight_around(
+        falling(0.0, gravity(0.0, 9.81)), 0.6
+    )  # it acts for a time only
     assert flight_around(falling(0.0, gravity(9.81)), 0.6) is None
-    constant = replace(falling(0.0, gravity(9.81)), values=np.full((TIME.size, 1, 3), 5.0))
+    constant = replace(
+        falling(0.0, gravity(9.81)), values=np.full((TIME.size, 1, 3), 5.0)
+    )
     assert flight_around(constant, 0.6) is None
     assert flight_around(replace(constant, surroundings=gravity(0.0)), 0.6)
 
 
-def flying_history(surroundings: Surroundings, parts: tuple[Part, ...] | None = PARTS[:1]) -> History:
+def flying_history(
+    surroundings: Surroundings, parts: tuple[Part, ...] | None = PARTS[:1]
+) -> History:
     """A part that flies from 0.2 on, and rings."""
     evidence = Given((falling(0.0, surroundings),))
     energy = 2 + np.sin(300 * TIME) ** 2
-    return History(TIME, energy, ("made",), "made", "E", parts, evidence=evidence, surroundings=surroundings)
+    return History(
+        TIME,
+        energy,
+        ("made",),
+        "made",
+        "E",
+        parts,
+        evidence=evidence,
+        surroundings=surroundings,
+    )
 
 
-def test_a_part_that_is_held_does_not_fly_also_where_the_end_of_the_load_is_given() -> None:
+def test_a_part_that_is_held_does_not_fly_also_where_the_end_of_the_load_is_given() -> (
+    None
+):
     held = Surroundings(supports={1: (Support("/BCS/7 (deck:12)"),)})
     assert suggest(flying_history(Surroundings()), 0.8, PLAIN).recommended
     for settings in (PLAIN, replace(PLAIN, after=0.3)):
@@ -271,12 +430,16 @@ def test_a_part_that_is_held_does_not_fly_also_where_the_end_of_the_load_is_give
 
 
 @pytest.mark.parametrize("settings", [PLAIN, replace(PLAIN, after=0.3)])
-def test_a_flight_begins_where_an_imposed_motion_ends_and_ends_where_one_begins(settings: Settings) -> None:
+def test_a_flight_begins_where_an_imposed_motion_ends_and_ends_where_one_begins(
+    settings: Settings,
+) -> None:
     moved = Surroundings(supports={1: (Support("a", 0.0, 0.4), Support("b", 0.9, 2.0))})
     flight = examine(flying_history(moved), 0.7, settings).flight
     assert (flight.start, flight.end) == (0.4, 0.9)
     assert examine(flying_history(moved), 0.35, settings).flight.refusal
-    assert [(one.start, one.end) for one in flights_of(flying_history(moved), settings)] == [(0.4, 0.9)]
+    assert [
+        (one.start, one.end) for one in flights_of(flying_history(moved), settings)
+    ] == [(0.4, 0.9)]
 
 
 @pytest.fixture(scope="module")
@@ -290,20 +453,33 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     header = "time,internal_energy,kinetic_energy,x_momentum,y_momentum,z_momentum"
     for name, columns in (("totals.csv", 3), ("momenta.csv", 6)):
         text = header.split(",")[:columns]
-        np.savetxt(found / name, table[:, :columns], delimiter=",", header=",".join(text), comments="")
+        np.savetxt(
+            found / name,
+            table[:, :columns],
+            delimiter=",",
+            header=",".join(text),
+            comments="",
+        )
     return found
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("asked", [("MADET01", "--part", "1"), ("totals.csv",), ("momenta.csv",)])
+@pytest.mark.parametrize(
+    "asked", [("MADET01", "--part", "1"), ("totals.csv",), ("momenta.csv",)]
+)
 def test_a_support_refuses_the_flight_in_any_form_of_input(
     folder: Path, tmp_path: Path, asked: tuple[str, ...]
 ) -> None:
     wheels = "/GRNOD/NODE/1\nnodes\n        21        31\n/BCS/7\nheld\n   111 000         0         1\n"
-    deck = made_car.starter(tmp_path, HELD + wheels.replace("/1\n", "/2\n").replace("0         1\n", "0         2\n"))
+    deck = made_car.starter(
+        tmp_path,
+        HELD + wheels.replace("/1\n", "/2\n").replace("0         1\n", "0         2\n"),
+    )
     name, *options = asked
     for command in (("suggest", "--td", "0.12"), ("explore",)):
-        found = run(*command, "--no-verify", str(folder / name), *options, "--deck", deck)
+        found = run(
+            *command, "--no-verify", str(folder / name), *options, "--deck", deck
+        )
         assert found.exit_code in (1, 2), found.stderr
         assert "held or moved by /BCS/7 (" in found.stderr
         assert "MADE_0000.rad:" in found.stderr
@@ -311,14 +487,29 @@ def test_a_support_refuses_the_flight_in_any_form_of_input(
     reference = d2.read(str(folder / name))
     with pytest.raises(D2RPickError, match=r"held or moved by /BCS/7"):
         d2.suggest(reference, parts=options[1:] or None, deck=deck, replay=False)
-    d2.suggest(reference, 0.12, parts=options[1:] or None, replay=False)  # the run that was read is as it was
+    d2.suggest(
+        reference, 0.12, parts=options[1:] or None, replay=False
+    )  # the run that was read is as it was
 
 
 @pytest.mark.slow
 def test_parts_that_nothing_holds_fly(folder: Path, tmp_path: Path) -> None:
     history, deck = str(folder / "MADET01"), made_car.starter(tmp_path, HELD)
-    assert answer("suggest", "--no-verify", "--part", "8,9", "--td", "0.05", "--deck", deck, history)["recommended"]
-    rows = {row["id"]: row for row in answer("parts", "--no-verify", "--deck", deck, history)["parts"]}
+    assert answer(
+        "suggest",
+        "--no-verify",
+        "--part",
+        "8,9",
+        "--td",
+        "0.05",
+        "--deck",
+        deck,
+        history,
+    )["recommended"]
+    rows = {
+        row["id"]: row
+        for row in answer("parts", "--no-verify", "--deck", deck, history)["parts"]
+    }
     assert "held or moved by /BCS/7" in rows[1]["reasons"][0]
     assert {rows[part]["verdict"] for part in made_car.BODY} == {"keep"}
     assert "/BCS/7" not in str(rows[8]["reasons"])
@@ -326,26 +517,49 @@ def test_parts_that_nothing_holds_fly(folder: Path, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_flight_begins_where_the_deck_lets_go(folder: Path, tmp_path: Path) -> None:
-    history, deck = str(folder / "MADET01"), made_car.starter(tmp_path, MOVED.format(stop=0.04))
+    history, deck = (
+        str(folder / "MADET01"),
+        made_car.starter(tmp_path, MOVED.format(stop=0.04)),
+    )
     asked = ("suggest", "--no-verify", "--part", "1-6", "--td", "0.12", history)
     assert answer(*asked)["flight"]["start"] == pytest.approx(0.0, abs=1e-3)
     assert answer(*asked, "--deck", deck)["flight"]["start"] == 0.04
 
 
 @pytest.mark.slow
-def test_flying_is_the_heaviest_of_the_bodies_of_the_deck(folder: Path, tmp_path: Path) -> None:
-    asked = ("suggest", "--no-verify", "--part", "flying", "--td", "0.05", str(folder / "MADET01"), "--deck")
+def test_flying_is_the_heaviest_of_the_bodies_of_the_deck(
+    folder: Path, tmp_path: Path
+) -> None:
+    asked = (
+        "suggest",
+        "--no-verify",
+        "--part",
+        "flying",
+        "--td",
+        "0.05",
+        str(folder / "MADET01"),
+        "--deck",
+    )
     for deck in (made_car.starter(tmp_path), made_car.keywords(tmp_path)):
-        assert [part["id"] for part in answer(*asked, deck)["history"]["parts"]] == list(made_car.BODY)
+        assert [
+            part["id"] for part in answer(*asked, deck)["history"]["parts"]
+        ] == list(made_car.BODY)
     held = made_car.starter(tmp_path, HELD)
-    assert {part["id"] for part in answer(*asked, held)["history"]["parts"]} == set(made_car.WHEELS)
+    assert {part["id"] for part in answer(*asked, held)["history"]["parts"]} == set(
+        made_car.WHEELS
+    )
 
 
 @pytest.mark.parametrize("rule", ["D2R406", "D2R407"])
-def test_no_pair_is_better_than_poor_where_the_deck_ruins_the_run(tmp_path: Path, rule: str) -> None:
+def test_no_pair_is_better_than_poor_where_the_deck_ruins_the_run(
+    tmp_path: Path, rule: str
+) -> None:
     example = RULES[rule].failing[0]
     deck = write(tmp_path, example.deck, example.files, example.name)
-    plain, found = (answer("suggest", "--td", "0.0687534", ENERGY, *more) for more in ((), ("--deck", deck)))
+    plain, found = (
+        answer("suggest", "--td", "0.0687534", ENERGY, *more)
+        for more in ((), ("--deck", deck))
+    )
     assert plain["quality"] != "poor"
     assert found["quality"] == "poor"
     assert rule in found["quality_reasons"][0]
@@ -355,10 +569,15 @@ def test_no_pair_is_better_than_poor_where_the_deck_ruins_the_run(tmp_path: Path
 
 
 @pytest.mark.slow
-def test_parts_that_a_deck_keeps_rigid_although_they_deform_make_a_pair_poor(folder: Path, tmp_path: Path) -> None:
+def test_parts_that_a_deck_keeps_rigid_although_they_deform_make_a_pair_poor(
+    folder: Path, tmp_path: Path
+) -> None:
     bodies = "".join(
         f"/GRNOD/PART/{number}\nparts\n{parts}\n/RBODY/{number}\nbody\n{node:10d}{'':50}{number:10d}\n"
-        for number, node, parts in ((1, 91, "         1         2"), (2, 92, "         8"))
+        for number, node, parts in (
+            (1, 91, "         1         2"),
+            (2, 92, "         8"),
+        )
     )
     deck = made_car.starter(tmp_path, bodies)
     for number, word, nodes in ((1, "OFF", "91"), (2, "ON", "91"), (3, "OFF", "91")):
@@ -368,8 +587,14 @@ def test_parts_that_a_deck_keeps_rigid_although_they_deform_make_a_pair_poor(fol
     found = answer("suggest", "--part", "1-6", "--td", "0.12", "--deck", deck, history)
     assert found["quality"] == "poor"
     assert "D2R409" in found["quality_reasons"][0]
-    (told,) = [one["message"] for one in found["warnings"] if one["code"] == "body-left-rigid"]
-    (error,) = [one for one in answer("check", deck, "--history", history)["findings"] if one["rule"] == "D2R409"]
+    (told,) = [
+        one["message"] for one in found["warnings"] if one["code"] == "body-left-rigid"
+    ]
+    (error,) = [
+        one
+        for one in answer("check", deck, "--history", history)["findings"]
+        if one["rule"] == "D2R409"
+    ]
     assert error["severity"] == "error"
     assert error["message"] in told
 
@@ -378,11 +603,16 @@ def test_parts_that_a_deck_keeps_rigid_although_they_deform_make_a_pair_poor(fol
 def test_check_and_suggest_agree_on_what_is_held(folder: Path, tmp_path: Path) -> None:
     cards = "".join(
         f"*DEFORMABLE_TO_RIGID_AUTOMATIC\n{number:10d}{0:10d}{time:10g}\n{'':40}{rigid:10d}{1 - rigid:10d}\n"
-        f"{1:10d}{0 if rigid else '':>10}{'PART':>10}\n".replace(f"{1:10d}{'':10}{'PART':>10}", f"{1:10d}{'PART':>10}")
+        f"{1:10d}{0 if rigid else '':>10}{'PART':>10}\n".replace(
+            f"{1:10d}{'':10}{'PART':>10}", f"{1:10d}{'PART':>10}"
+        )
         for number, time, rigid in ((901, 0.02, 1), (902, 0.12, 0))
     )
     for held in (False, True):
-        spc = "*BOUNDARY_SPC_NODE\n         1         0         1         1         1\n" * held
+        spc = (
+            "*BOUNDARY_SPC_NODE\n         1         0         1         1         1\n"
+            * held
+        )
         deck = made_car.keywords(tmp_path, cards + spc)
         found = run("check", deck, "--history", str(folder / "MADET01"), "-f", "json")
         assert ("held or moved by *BOUNDARY_SPC_NODE" in found.stdout) is held

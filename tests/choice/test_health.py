@@ -62,7 +62,9 @@ def test_a_healthy_run_gets_no_warning_and_keeps_all_limits() -> None:
         ("work-in-window", {"external_work": PRINTED, "precision": Precision(digits=6)}, {"external_work": PRINTED}),
     ],
 )  # fmt: skip
-def test_a_warning_comes_beyond_its_threshold_only(code: str, terms: dict[str, Any], more: dict[str, Any]) -> None:
+def test_a_warning_comes_beyond_its_threshold_only(
+    code: str, terms: dict[str, Any], more: dict[str, Any]
+) -> None:
     assert code not in warned(replace(HEALTHY, **terms))
     assert code in warned(replace(HEALTHY, **more))
 
@@ -70,22 +72,31 @@ def test_a_warning_comes_beyond_its_threshold_only(code: str, terms: dict[str, A
 @pytest.mark.parametrize(
     ("term", "measures"),
     [
-        ("internal", ["hourglass_share", "energy_ratio_min", "sliding_share", "eroded_share"]),
+        (
+            "internal",
+            ["hourglass_share", "energy_ratio_min", "sliding_share", "eroded_share"],
+        ),
         ("hourglass", ["hourglass_share"]),
         ("sliding", ["sliding_share", "negative_sliding_share", "window_sliding"]),
         ("external_work", ["energy_ratio_min", "energy_ratio_max", "window_work"]),
         ("eroded", ["eroded_share", "window_eroded"]),
     ],
 )
-def test_what_the_files_do_not_have_is_unknown_and_not_zero(term: str, measures: list[str]) -> None:
+def test_what_the_files_do_not_have_is_unknown_and_not_zero(
+    term: str, measures: list[str]
+) -> None:
     health = assess(replace(HEALTHY, **{term: None}), WINDOW)  # type: ignore[arg-type]
     assert [getattr(health, name) for name in measures] == [None] * len(measures)
-    assert [getattr(assess(HEALTHY, WINDOW), name) for name in measures].count(None) == 0
+    assert [getattr(assess(HEALTHY, WINDOW), name) for name in measures].count(
+        None
+    ) == 0
 
 
 def test_a_window_of_too_few_states_is_not_judged() -> None:
     few, enough = (0.2, 0.2 + 4.5 / 200), (0.2, 0.2 + 5.5 / 200)
-    reason = "the window holds 5 states: at least 6 are needed to tell a load from gravity"
+    reason = (
+        "the window holds 5 states: at least 6 are needed to tell a load from gravity"
+    )
     assert assess(HEALTHY, few).window_reason == reason
     assert [one.message for one in cautions_of_health(assess(HEALTHY, few))] == [reason]
     assert warned(HEALTHY, few) == ["window-not-judged"]
@@ -94,11 +105,20 @@ def test_a_window_of_too_few_states_is_not_judged() -> None:
 
 
 def test_a_term_with_a_state_that_is_no_number_is_unknown(tmp_path: Path) -> None:
-    written, nan = np.array(value(3, 0, 12), ">f4").tobytes(), np.array(np.nan, ">f4").tobytes()
-    for name, content in (("whole", bytes(t01(8).data)), ("damaged", bytes(t01(8).data).replace(written, nan))):
+    written, nan = (
+        np.array(value(3, 0, 12), ">f4").tobytes(),
+        np.array(np.nan, ">f4").tobytes(),
+    )
+    for name, content in (
+        ("whole", bytes(t01(8).data)),
+        ("damaged", bytes(t01(8).data).replace(written, nan)),
+    ):
         run_of = open_run([str(put(tmp_path / f"{name}T01", content))])
         balance = sure(balance_of(run_of.databases, run_of.parts))
-        assert (balance.hourglass is None, balance.kinetic is None) == (name == "damaged", False)
+        assert (balance.hourglass is None, balance.kinetic is None) == (
+            name == "damaged",
+            False,
+        )
 
 
 def test_nothing_known_is_nothing_said() -> None:
@@ -106,12 +126,18 @@ def test_nothing_known_is_nothing_said() -> None:
 
 
 @pytest.mark.parametrize("internal", [2e-20 * ONES, 1e-5 * INTERNAL])
-def test_shares_of_a_tiny_internal_energy_are_left_out_with_the_reason(internal: Samples) -> None:
+def test_shares_of_a_tiny_internal_energy_are_left_out_with_the_reason(
+    internal: Samples,
+) -> None:
     health = assess(replace(HEALTHY, internal=internal, hourglass=ONES), WINDOW)
     assert health.hourglass_share is None
     assert health.sliding_share is None
     assert health.reason
-    assert not [code for code in warned(replace(HEALTHY, internal=internal, hourglass=ONES)) if code != "energy-ratio"]
+    assert not [
+        code
+        for code in warned(replace(HEALTHY, internal=internal, hourglass=ONES))
+        if code != "energy-ratio"
+    ]
 
 
 def test_a_part_without_energy_of_its_own_is_not_the_worst_part() -> None:
@@ -125,9 +151,13 @@ def test_a_ratio_is_not_judged_where_the_run_has_hardly_any_energy_yet() -> None
     assert "energy-ratio" not in warned(replace(HEALTHY, total=total, ratio=ratio))
 
 
-def test_the_ratio_counts_what_damping_and_walls_have_taken_and_the_total_that_is_written() -> None:
+def test_the_ratio_counts_what_damping_and_walls_have_taken_and_the_total_that_is_written() -> (
+    None
+):
     taken = 10 * TIME
-    damped = replace(HEALTHY, kinetic=sure(HEALTHY.kinetic) - taken, total=None, ratio=None)
+    damped = replace(
+        HEALTHY, kinetic=sure(HEALTHY.kinetic) - taken, total=None, ratio=None
+    )
     assert "energy-ratio" in warned(damped)
     whole = assess(HEALTHY, WINDOW)
     for term in ("damping", "wall"):
@@ -135,12 +165,19 @@ def test_the_ratio_counts_what_damping_and_walls_have_taken_and_the_total_that_i
         assert health.energy_ratio_min == pytest.approx(whole.energy_ratio_min)
     total = 50 + sure(HEALTHY.external_work)
     written = assess(replace(damped, total=total), WINDOW)
-    assert (written.energy_ratio_min, written.energy_ratio_max) == pytest.approx((1.0, 1.0))
+    assert (written.energy_ratio_min, written.energy_ratio_max) == pytest.approx(
+        (1.0, 1.0)
+    )
 
 
-def test_the_total_energy_of_abaqus_is_without_the_external_work(tmp_path: Path) -> None:
+def test_the_total_energy_of_abaqus_is_without_the_external_work(
+    tmp_path: Path,
+) -> None:
     rows = [f"{time},{5 + time},{3 + 2 * time},{3 * time},8" for time in range(5)]
-    path = put(tmp_path / "abaqus.csv", "\n".join(["time,ALLIE,ALLKE,ALLWK,ETOTAL", *rows]).encode())
+    path = put(
+        tmp_path / "abaqus.csv",
+        "\n".join(["time,ALLIE,ALLKE,ALLWK,ETOTAL", *rows]).encode(),
+    )
     run_of = open_run([str(path)])
     health = assess(sure(balance_of(run_of.databases, None)))
     assert (health.energy_ratio_min, health.energy_ratio_max) == (1.0, 1.0)
@@ -149,11 +186,16 @@ def test_the_total_energy_of_abaqus_is_without_the_external_work(tmp_path: Path)
 def test_damping_that_counts_as_external_work_is_no_load() -> None:
     fall = 4 * np.exp(-3 * TIME) - 2  # of v' = g - 3 v with g = -6
     velocity = np.stack([np.exp(-3 * TIME), 0 * TIME, fall], axis=1)
-    kinetic = 5 / 2 * np.sum(velocity**2, axis=1) + 50 * np.exp(-3 * TIME) * (1.2 + np.cos(60 * TIME))
-    gravity, damping = (
-        np.append(0, np.cumsum((rate[1:] + rate[:-1]) / 2 * np.diff(TIME))) for rate in (-6 * 5 * fall, -6 * kinetic)
+    kinetic = 5 / 2 * np.sum(velocity**2, axis=1) + 50 * np.exp(-3 * TIME) * (
+        1.2 + np.cos(60 * TIME)
     )
-    damped = replace(HEALTHY, kinetic=kinetic, external_work=gravity + damping, velocity=velocity)
+    gravity, damping = (
+        np.append(0, np.cumsum((rate[1:] + rate[:-1]) / 2 * np.diff(TIME)))
+        for rate in (-6 * 5 * fall, -6 * kinetic)
+    )
+    damped = replace(
+        HEALTHY, kinetic=kinetic, external_work=gravity + damping, velocity=velocity
+    )
     assert "work-in-window" not in warned(damped)
     assert "work-in-window" in warned(replace(damped, kinetic=None))
 
@@ -162,18 +204,31 @@ def test_up_to_td_the_rollover_is_healthy_and_beyond_it_touches_the_ground() -> 
     run_of = open_run([BOX])
     box = [part for part in run_of.parts if part.title == "box"]
     flight = (0.0886, 0.37)
-    before = assess(balance_of(run_of.databases, box, until=0.37) or Balance(TIME), flight, locked=1.75)
+    before = assess(
+        balance_of(run_of.databases, box, until=0.37) or Balance(TIME),
+        flight,
+        locked=1.75,
+    )
     assert not list(cautions_of_health(before))
     assert before.energy_ratio_min == pytest.approx(1.0, abs=1e-3)
-    for window, code in (((0.06, 0.37), "work-in-window"), ((0.0886, 0.4), "contact-in-window")):
-        whole = assess(balance_of(run_of.databases, box) or Balance(TIME), window, locked=1.75)
+    for window, code in (
+        ((0.06, 0.37), "work-in-window"),
+        ((0.0886, 0.4), "contact-in-window"),
+    ):
+        whole = assess(
+            balance_of(run_of.databases, box) or Balance(TIME), window, locked=1.75
+        )
         assert code in {caution.code for caution in cautions_of_health(whole)}
 
 
-@pytest.mark.parametrize("name", ["oscillator_referenceT01.gz", "chain_referenceT01.gz"])
+@pytest.mark.parametrize(
+    "name", ["oscillator_referenceT01.gz", "chain_referenceT01.gz"]
+)
 def test_the_damping_of_computed_runs_is_no_load(name: str) -> None:
     run_of = open_run([stored(name)])
-    health = assess(balance_of(run_of.databases, run_of.parts) or Balance(TIME), (0.013, 0.064))
+    health = assess(
+        balance_of(run_of.databases, run_of.parts) or Balance(TIME), (0.013, 0.064)
+    )
     assert sure(health.window_work) < 1e-3
     assert not list(cautions_of_health(health))
 
@@ -189,26 +244,51 @@ def test_suggest_and_info_tell_the_health() -> None:
 
 
 def test_verify_judges_the_window_between_its_times() -> None:
-    flying = ("verify", "--no-verify", "--td", "0.37", "--part", "box", "--after", "0.05", BOX)
+    flying = (
+        "verify",
+        "--no-verify",
+        "--td",
+        "0.37",
+        "--part",
+        "box",
+        "--after",
+        "0.05",
+        BOX,
+    )
     found = answer(*flying, "--tr", "0.1")
     assert found["health"]["window"] == [0.1, 0.37]
     assert not codes(found) & {"contact-in-window", "work-in-window"}
-    assert {"contact-in-window", "work-in-window"} <= codes(answer(*flying, "--tr", "0.06"))
+    assert {"contact-in-window", "work-in-window"} <= codes(
+        answer(*flying, "--tr", "0.06")
+    )
 
 
 def test_a_window_that_reaches_into_the_next_contact_is_warned_of() -> None:
-    found = answer("suggest", "--no-verify", "--td", "0.39", "--part", "box", "--after", "0.1", BOX)
+    found = answer(
+        "suggest", "--no-verify", "--td", "0.39", "--part", "box", "--after", "0.1", BOX
+    )
     assert "contact-in-window" in codes(found)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("swing", [0.0, 3.0])
-def test_hourglass_is_an_alarm_only_where_a_level_is_matched(swing: float, tmp_path: Path) -> None:
+def test_hourglass_is_an_alarm_only_where_a_level_is_matched(
+    swing: float, tmp_path: Path
+) -> None:
     time = np.linspace(0, 1, 401)
-    internal = np.where(time < 0.2, 250 * time, 50 + swing * np.sin(90 * time) * np.sin(61 * time))
+    internal = np.where(
+        time < 0.2, 250 * time, 50 + swing * np.sin(90 * time) * np.sin(61 * time)
+    )
     columns = np.stack([time, internal, 200 - 0 * time, 0.2 * internal], axis=1)
     file = tmp_path / "glass.csv"
-    np.savetxt(file, columns, "%.9g", ",", header="time,internal_energy,kinetic_energy,hourglass_energy", comments="")
+    np.savetxt(
+        file,
+        columns,
+        "%.9g",
+        ",",
+        header="time,internal_energy,kinetic_energy,hourglass_energy",
+        comments="",
+    )
     for args in (("suggest",), ("verify", "--tr", "0.41")):
         found = answer(*args, "--td", "0.9", "--after", "0.3", str(file))
         assert ("at-rest" in codes(found)) == (swing == 0)
@@ -223,7 +303,11 @@ def test_of_files_with_nothing_to_judge_nothing_is_said() -> None:
 
 def test_terms_that_leave_everything_open_leave_it_unknown() -> None:
     found = answer("suggest", "--td", "0.064", GLSTAT)
-    assert {value for key, value in found["health"].items() if key not in ("window", "until")} == {None}
+    assert {
+        value
+        for key, value in found["health"].items()
+        if key not in ("window", "until")
+    } == {None}
     assert found["health"]["until"] == 0.064
 
 
@@ -237,7 +321,9 @@ LATE = LOADED > 0.05
 
 def record(internal: Samples, kinetic: Samples, **terms: Any) -> History:
     balance = Balance(LOADED, internal=internal, kinetic=kinetic, **terms)
-    return History(LOADED, internal, ("made",), "made", "E", evidence=Given(balance=balance))
+    return History(
+        LOADED, internal, ("made",), "made", "E", evidence=Given(balance=balance)
+    )
 
 
 def said(history: History) -> list[str]:
@@ -245,7 +331,9 @@ def said(history: History) -> list[str]:
 
 
 @pytest.mark.parametrize("terms", [{}, {"external_work": 4 * LOADED}])
-def test_a_run_that_gains_energy_from_nothing_blew_up(terms: dict[str, Samples]) -> None:
+def test_a_run_that_gains_energy_from_nothing_blew_up(
+    terms: dict[str, Samples],
+) -> None:
     (found,) = unsound(record(TORN_INTERNAL, TORN_KINETIC, **terms))
     assert found.code == "blew-up"
     assert "from 0.1" in found.message
@@ -263,28 +351,52 @@ def test_a_run_that_gains_energy_from_nothing_blew_up(terms: dict[str, Samples])
         (0 * LOADED, np.where(LATE, 1e5, 1.9e-9), {}),
         (np.where(LATE, 1e-5, 0.0), np.where(LATE, 1e5, 1.9e-9), {}),
         # what external work explains, and a gain that a load may well have
-        (TORN_INTERNAL, TORN_KINETIC, {"external_work": np.where(TORN, 1.5e13, LOADED)}),
+        (
+            TORN_INTERNAL,
+            TORN_KINETIC,
+            {"external_work": np.where(TORN, 1.5e13, LOADED)},
+        ),
         (np.where(TORN, 8e3, 3 * LOADED), np.where(TORN, 1e7, 0.2 * LOADED), {}),
         # only the first states
-        (np.where(LOADED > 0.004, 8e3, 3 * LOADED), np.where(LOADED > 0.004, 1.5e13, LOADED), {}),
+        (
+            np.where(LOADED > 0.004, 8e3, 3 * LOADED),
+            np.where(LOADED > 0.004, 1.5e13, LOADED),
+            {},
+        ),
     ],
 )
-def test_a_run_with_a_sudden_load_is_sound(internal: Samples, kinetic: Samples, terms: dict[str, Samples]) -> None:
+def test_a_run_with_a_sudden_load_is_sound(
+    internal: Samples, kinetic: Samples, terms: dict[str, Samples]
+) -> None:
     assert "blew-up" not in said(record(internal, kinetic, **terms))
 
 
 def test_energies_of_nothing_are_nothing_to_judge() -> None:
     assert said(record(0 * LOADED, 0 * LOADED + 1.9e-9)) == ["nothing-to-judge"]
     assert said(record(1e-32 * LOADED, 1e-31 * LOADED)) == ["nothing-to-judge"]
-    assert said(record(1e-18 + 0 * LOADED, 225.0 * LOADED)) == []  # a free fall deforms nothing yet
-    assert said(of(0 * LOADED, LOADED)) == []  # of a column alone its energy is objected to
+    assert (
+        said(record(1e-18 + 0 * LOADED, 225.0 * LOADED)) == []
+    )  # a free fall deforms nothing yet
+    assert (
+        said(of(0 * LOADED, LOADED)) == []
+    )  # of a column alone its energy is objected to
 
 
 @pytest.fixture
 def csv(tmp_path: Path) -> Any:
     def write(internal: Samples, kinetic: Samples) -> str:
-        file, table = tmp_path / "run.csv", np.stack([LOADED, internal, kinetic], axis=1)
-        np.savetxt(file, table, "%.7g", ",", header="time,internal_energy,kinetic_energy", comments="")
+        file, table = (
+            tmp_path / "run.csv",
+            np.stack([LOADED, internal, kinetic], axis=1),
+        )
+        np.savetxt(
+            file,
+            table,
+            "%.7g",
+            ",",
+            header="time,internal_energy,kinetic_energy",
+            comments="",
+        )
         return str(file)
 
     return write
@@ -296,7 +408,9 @@ COMMANDS = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("args", [*COMMANDS, ("verify", "--tr", "0.01", "--td", "0.02")])
+@pytest.mark.parametrize(
+    "args", [*COMMANDS, ("verify", "--tr", "0.01", "--td", "0.02")]
+)
 def test_a_run_that_blew_up_is_refused_by_all(csv: Any, args: tuple[str, ...]) -> None:
     result = run(*args, csv(TORN_INTERNAL, TORN_KINETIC))
     assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
@@ -304,16 +418,27 @@ def test_a_run_that_blew_up_is_refused_by_all(csv: Any, args: tuple[str, ...]) -
 
 
 @pytest.mark.parametrize("args", COMMANDS)
-def test_where_nothing_deforms_nothing_is_chosen(csv: Any, args: tuple[str, ...]) -> None:
+def test_where_nothing_deforms_nothing_is_chosen(
+    csv: Any, args: tuple[str, ...]
+) -> None:
     result = run(*args, csv(0 * LOADED, 0 * LOADED + 1.9e-9))
     assert result.exit_code == 2
-    assert "run.csv: nothing to judge: no internal energy exceeds 0, so nothing deforms" in result.stderr
+    assert (
+        "run.csv: nothing to judge: no internal energy exceeds 0, so nothing deforms"
+        in result.stderr
+    )
 
 
 @pytest.mark.parametrize(
-    ("columns", "code"), [((TORN_INTERNAL, TORN_KINETIC), "blew-up"), ((0 * LOADED, LOADED), "nothing-to-judge")]
+    ("columns", "code"),
+    [
+        ((TORN_INTERNAL, TORN_KINETIC), "blew-up"),
+        ((0 * LOADED, LOADED), "nothing-to-judge"),
+    ],
 )
-def test_info_tells_it_and_lists_no_flight(csv: Any, columns: tuple[Samples, Samples], code: str) -> None:
+def test_info_tells_it_and_lists_no_flight(
+    csv: Any, columns: tuple[Samples, Samples], code: str
+) -> None:
     found = answer("info", csv(*columns))
     assert code in codes(found)
     assert found["flights"] == []

@@ -20,9 +20,15 @@ JUDGE = partial(verify, HISTORY, settings=Settings())
 
 @pytest.mark.parametrize(
     ("written", "solver", "expected"),
-    [("csv", None, "ls-dyna"), ("radioss-th", None, "radioss"), ("radioss-th", "ls-dyna", "ls-dyna")],
+    [
+        ("csv", None, "ls-dyna"),
+        ("radioss-th", None, "radioss"),
+        ("radioss-th", "ls-dyna", "ls-dyna"),
+    ],
 )
-def test_the_solver_is_that_of_the_history_unless_asked_for(written: str, solver: str | None, expected: str) -> None:
+def test_the_solver_is_that_of_the_history_unless_asked_for(
+    written: str, solver: str | None, expected: str
+) -> None:
     request = CardRequest(solver, Printing(part=(1,)))
     assert request.of(replace(HISTORY, format=written))[0] == expected
 
@@ -34,14 +40,19 @@ def test_the_run_ends_with_the_history_unless_told() -> None:
 
 def test_without_anybody_to_switch_there_is_no_card() -> None:
     assert judged_card([PAIR], HISTORY, JUDGE, CardRequest()) is None
-    assert judged_card([PAIR], HISTORY, JUDGE, CardRequest("radioss", Printing(part=(1,)))) is None
+    assert (
+        judged_card([PAIR], HISTORY, JUDGE, CardRequest("radioss", Printing(part=(1,))))
+        is None
+    )
 
 
 def test_each_window_has_its_verdict_in_the_comments() -> None:
     windows = [PAIR, (0.0939, 0.119)]
     history = read_history([GLSTAT])
     judge = partial(verify, history, settings=Settings())
-    found = sure(judged_card(windows, history, judge, CardRequest(printing=Printing(part=(1,)))))
+    found = sure(
+        judged_card(windows, history, judge, CardRequest(printing=Printing(part=(1,))))
+    )
     card, verdicts = found
     assert card.windows == tuple(windows)
     assert [verdict.verified for verdict in verdicts] == [True, False]

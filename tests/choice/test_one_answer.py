@@ -34,7 +34,9 @@ planned = cache(plan_of)
 
 @pytest.fixture(scope="module")
 def box(tmp_path_factory: pytest.TempPathFactory) -> Reference:
-    return read(written(drop(), tmp_path_factory.mktemp("run")), Selection(parts=("box",)))
+    return read(
+        written(drop(), tmp_path_factory.mktemp("run")), Selection(parts=("box",))
+    )
 
 
 def resting() -> History:
@@ -57,7 +59,9 @@ def test_the_better_pair_is_what_is_said_of_its_td(td: float) -> None:
 
 
 @pytest.mark.parametrize("asked", [{"max_residual": 0.9}, {"max_kinetic_share": 0.9}])
-def test_where_nothing_vibrates_no_tr_is_acceptable_that_does_not_verify(asked: dict[str, Any]) -> None:
+def test_where_nothing_vibrates_no_tr_is_acceptable_that_does_not_verify(
+    asked: dict[str, Any],
+) -> None:
     history, settings = resting(), Settings(after=0.3, **asked)
     answer = suggest(history, 0.8, settings)
     assert answer.situation.at_rest
@@ -89,7 +93,11 @@ def test_every_tr_of_the_windows_that_are_read_verifies() -> None:
     line = acceptable(answer.windows or (), None)
     windows = re.findall(r"(\S+) to (\S+) \(", line)
     assert len(windows) > 2
-    assert all(verify_at(answer.situation, float(one)).verified for window in windows for one in window)
+    assert all(
+        verify_at(answer.situation, float(one)).verified
+        for window in windows
+        for one in window
+    )
 
 
 @pytest.mark.slow
@@ -100,7 +108,11 @@ def test_a_plan_begins_a_flight_where_the_load_is_said_to_end(box: Reference) ->
     (row,) = (one for one in plan_of(box, asked).flights if one.number == second.number)
     assert row.window
     flight = verify(box.history, *row.window, asked).situation.flight
-    assert (row.flight.start, row.flight.end, row.flight.source) == (after, flight.end, flight.source)
+    assert (row.flight.start, row.flight.end, row.flight.source) == (
+        after,
+        flight.end,
+        flight.source,
+    )
     assert row.margin.time == pytest.approx(0.03 * (second.end - after))
     assert row.window[1] <= row.end - row.margin.time
 
@@ -117,15 +129,26 @@ def test_verify_and_check_name_the_same_ends_of_a_flight(box: Reference) -> None
 
 
 @pytest.mark.parametrize("margin", [None, 0.01])
-def test_the_last_td_that_is_named_lies_in_the_flight(box: Reference, margin: float | None) -> None:
+def test_the_last_td_that_is_named_lies_in_the_flight(
+    box: Reference, margin: float | None
+) -> None:
     asked, flights = replace(LEVEL, margin=margin), planned(box, LEVEL).flights
     answer = suggest(box.history, (flights[1].end + flights[2].start) / 2, asked)
-    (message,) = (one.message for one in answer.cautions if one.code == "no-free-flight")
-    found = sure(re.search(r"its last td is (\S+)$" if margin else r"to (\S+); td must lie in it$", message))
+    (message,) = (
+        one.message for one in answer.cautions if one.code == "no-free-flight"
+    )
+    found = sure(
+        re.search(
+            r"its last td is (\S+)$" if margin else r"to (\S+); td must lie in it$",
+            message,
+        )
+    )
     assert suggest(box.history, float(found[1]), asked).recommended
 
 
-@pytest.mark.parametrize("file", [stored("rollover_r100_T01.gz"), BOX, stored("drop2T01.gz")])
+@pytest.mark.parametrize(
+    "file", [stored("rollover_r100_T01.gz"), BOX, stored("drop2T01.gz")]
+)
 def test_a_flight_that_is_listed_is_the_one_that_is_used(file: str) -> None:
     history = read([file]).history
     listed = all_seen(history)
@@ -140,7 +163,11 @@ def test_an_error_that_is_refused_reads_as_too_large() -> None:
     best = sure(suggest(history, td, PLAIN).chosen)
     assert best.residual
     barely = Settings(max_residual=best.residual * (1 - 1e-6))
-    (reason,) = (one for one in verify(history, best.tr, td, barely).reasons if "above the limit" in one)
+    (reason,) = (
+        one
+        for one in verify(history, best.tr, td, barely).reasons
+        if "above the limit" in one
+    )
     value, limit = map(float, re.findall(r"[\d.]+", reason))
     assert value > limit
 
@@ -149,7 +176,12 @@ def test_an_error_that_is_refused_reads_as_too_large() -> None:
 def test_a_plan_knows_a_flight_as_surely_as_the_td_in_it() -> None:
     """An oscillator is seen around some td of the flight, but not around the one that is chosen."""
     rng, time = np.random.default_rng(0), np.linspace(0, 1, 1500)
-    load, contact, omega, alpha = rng.uniform(0.05, 0.3), rng.uniform(0.6, 0.9), rng.uniform(20, 60), rng.uniform(0, 3)
+    load, contact, omega, alpha = (
+        rng.uniform(0.05, 0.3),
+        rng.uniform(0.6, 0.9),
+        rng.uniform(20, 60),
+        rng.uniform(0, 3),
+    )
     energy = np.exp(-alpha * time) * np.sin(omega * time + omega) ** 2
     energy += np.where(time < load, 6 * np.sin(np.pi * time / load) ** 2, 0)
     energy += np.where(time > contact, 20 * ((time - contact) / (1 - contact)) ** 2, 0)
@@ -158,12 +190,18 @@ def test_a_plan_knows_a_flight_as_surely_as_the_td_in_it() -> None:
     assert rows
     for row in rows:
         flight = verify(record.history, *sure(row.window), PLAIN).situation.flight
-        assert (row.flight.source, row.flight.certain, row.start) == (flight.source, flight.certain, flight.start)
+        assert (row.flight.source, row.flight.certain, row.start) == (
+            flight.source,
+            flight.certain,
+            flight.start,
+        )
 
 
 def test_a_flight_whose_start_is_given_ends_where_the_oscillator_does() -> None:
     time = np.linspace(0, 1, 1500)
-    energy = np.exp(-time) * np.sin(40 * time) ** 2 + np.where(time > 0.8, 30 * (time - 0.8), 0)
+    energy = np.exp(-time) * np.sin(40 * time) ** 2 + np.where(
+        time > 0.8, 30 * (time - 0.8), 0
+    )
     record, asked = reference(of(energy, time)), Settings(after=0.1)
     (row,) = plan_of(record, asked).flights
     flight = verify(record.history, *sure(row.window), asked).situation.flight
@@ -177,7 +215,9 @@ def test_a_flight_whose_start_is_given_ends_where_the_oscillator_does() -> None:
 def test_a_card_says_the_same_of_a_pair_whoever_prints_it(tmp_path: Path) -> None:
     """Also of the health of the run, and of a td that is not printed as it was chosen."""
     time = np.linspace(0, 1, 1500) / 7
-    values = np.stack([time, np.exp(-time) * np.sin(280 * time) ** 2, 0.2 + 0 * time], axis=1)
+    values = np.stack(
+        [time, np.exp(-time) * np.sin(280 * time) ** 2, 0.2 + 0 * time], axis=1
+    )
     file = tmp_path / "energy.csv"
     head = "time,internal_energy,hourglass_energy"
     np.savetxt(file, values, delimiter=",", header=head, comments="", fmt="%.17g")
@@ -191,15 +231,28 @@ def test_a_card_says_the_same_of_a_pair_whoever_prints_it(tmp_path: Path) -> Non
     assert "hourglass: " in judged
     assert of_suggest[of_suggest.index("Judged by") :] == judged
     assert judged.splitlines()[0] in unescape(page.read_text("utf-8"))
-    assert "hourglass: " in unescape(page.read_text("utf-8")).partition("/RUN/")[0].rpartition("Judged by")[2]
+    assert (
+        "hourglass: "
+        in unescape(page.read_text("utf-8"))
+        .partition("/RUN/")[0]
+        .rpartition("Judged by")[2]
+    )
 
 
 def test_a_plan_keeps_the_margin_that_it_lists() -> None:
     """To a td in it the energy alone shows no end of that flight."""
     rng, time = np.random.default_rng(277), np.linspace(0, 1, 200)
     omega, phase = rng.uniform(20, 80, 2), rng.uniform(0, 6, 2)
-    energy = np.sin(omega[0] * time + phase[0]) ** 2 + 0.5 * np.sin(omega[1] * time + phase[1]) ** 2 + 0.6
-    rows = [row for row in plan_of(reference(of(energy, time)), LEVEL).flights if row.window and row.flight.end]
+    energy = (
+        np.sin(omega[0] * time + phase[0]) ** 2
+        + 0.5 * np.sin(omega[1] * time + phase[1]) ** 2
+        + 0.6
+    )
+    rows = [
+        row
+        for row in plan_of(reference(of(energy, time)), LEVEL).flights
+        if row.window and row.flight.end
+    ]
     assert rows
     for row in rows:
         assert sure(row.window)[1] <= row.end - row.margin.time
@@ -215,4 +268,6 @@ def test_a_crossing_at_the_start_of_the_flight_may_be_typed_as_it_is_read() -> N
         verdict = verify(history, tr, float(time[60] + np.pi / 10), asked)
         assert verdict.verified
         assert not list(faults_of(verdict))
-    assert not verify(history, start - 1e-5, float(time[60] + np.pi / 10), asked).verified
+    assert not verify(
+        history, start - 1e-5, float(time[60] + np.pi / 10), asked
+    ).verified

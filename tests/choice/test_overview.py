@@ -10,7 +10,18 @@ import numpy as np
 import pytest
 
 from d2rpick.report.history_files import write_table
-from tests.command import BOX, ENERGY, GLSTAT, ROLLOVER, ROOT, answer, put, replayed, run, unwrapped
+from tests.command import (
+    BOX,
+    ENERGY,
+    GLSTAT,
+    ROLLOVER,
+    ROOT,
+    answer,
+    put,
+    replayed,
+    run,
+    unwrapped,
+)
 from tests.json_schemas import checked
 from tests.made_t01 import t01
 
@@ -40,10 +51,22 @@ def test_info_tells_format_states_span_and_channels(
     source: str, form: str, states: int, end: float, channel: str, unit: str
 ) -> None:
     found = info(source)
-    assert (found["source"], found["format"], found["states"]) == ([source], form, states)
-    assert (found["time_start"], found["time_end"], found["time_unit"]) == (0.0, end, unit)
+    assert (found["source"], found["format"], found["states"]) == (
+        [source],
+        form,
+        states,
+    )
+    assert (found["time_start"], found["time_end"], found["time_unit"]) == (
+        0.0,
+        end,
+        unit,
+    )
     assert channel in found["channels"]
-    assert found["sampling"]["min"] <= found["sampling"]["median"] <= found["sampling"]["max"]
+    assert (
+        found["sampling"]["min"]
+        <= found["sampling"]["median"]
+        <= found["sampling"]["max"]
+    )
     assert found["sampling"]["median"] == pytest.approx(end / (states - 1), rel=0.01)
     assert (found["complete"], found["parts"]) == (True, [])
 
@@ -55,7 +78,11 @@ def test_info_tells_version_parts_and_flight_of_a_matsum(matsum: Path) -> None:
     assert [(part["id"], part["title"]) for part in found["parts"]] == [
         (1, "frame"), (2, "suspended mass"), (3, "spring"),
     ]  # fmt: skip
-    assert [part["energy_max"] for part in found["parts"]] == [0.0, 0.0, pytest.approx(140.36, rel=1e-4)]
+    assert [part["energy_max"] for part in found["parts"]] == [
+        0.0,
+        0.0,
+        pytest.approx(140.36, rel=1e-4),
+    ]
     assert found["flights"] == [{"start": 0.0, "end": None, "source": "momentum", "parts": [
         {"id": part["id"], "title": part["title"]} for part in found["parts"]
     ]}]  # fmt: skip
@@ -81,7 +108,9 @@ def test_info_lists_all_flights_of_the_parts_asked_for() -> None:
         (ENERGY,),
     ],
 )
-def test_info_lists_the_flights_that_plan_and_suggest_choose_from(args: tuple[str, ...]) -> None:
+def test_info_lists_the_flights_that_plan_and_suggest_choose_from(
+    args: tuple[str, ...],
+) -> None:
     listed = info(*args)["flights"]
     planned = answer("plan", *args)["windows"]
     assert listed
@@ -90,8 +119,12 @@ def test_info_lists_the_flights_that_plan_and_suggest_choose_from(args: tuple[st
     chosen = answer("suggest", *args)["flight"]
     assert chosen["source"] in [one["source"] for one in listed]
     if chosen["source"] != "energy":  # that shows another flight to each td
-        assert [one["start"] for one in listed] == [row["flight_start"] for row in planned]
-        assert (chosen["start"], chosen["end"]) in [(one["start"], one["end"]) for one in listed]
+        assert [one["start"] for one in listed] == [
+            row["flight_start"] for row in planned
+        ]
+        assert (chosen["start"], chosen["end"]) in [
+            (one["start"], one["end"]) for one in listed
+        ]
 
 
 @pytest.mark.parametrize(
@@ -100,15 +133,25 @@ def test_info_lists_the_flights_that_plan_and_suggest_choose_from(args: tuple[st
         ("rolloverT01.gz", None),
         ("rollover_box.matsum", None),
         ("rollover_box.binout", None),
-        ("rollover_box.glstat", "*DATABASE_MATSUM, with the DT of *DATABASE_GLSTAT: only momenta of the parts show"),
+        (
+            "rollover_box.glstat",
+            "*DATABASE_MATSUM, with the DT of *DATABASE_GLSTAT: only momenta of the parts show",
+        ),
         ("rollover_box.csv", "LS-DYNA: *DATABASE_MATSUM): only momenta"),
-        ("energy.csv", "LS-DYNA: *DATABASE_MATSUM), at least columns x_momentum, y_momentum, z_momentum of the model:"),
+        (
+            "energy.csv",
+            "LS-DYNA: *DATABASE_MATSUM), at least columns x_momentum, y_momentum, z_momentum of the model:",
+        ),
     ],
 )
-def test_info_says_in_the_solver_s_words_what_the_run_should_write(name: str, told: str | None) -> None:
+def test_info_says_in_the_solver_s_words_what_the_run_should_write(
+    name: str, told: str | None
+) -> None:
     source = str(ROOT / "sample_data" / name)
     found = info(source)["should_write"]
-    _, *shown = unwrapped(run("info", source).stdout.split("\n\n")[0]).split(" should write ")
+    _, *shown = unwrapped(run("info", source).stdout.split("\n\n")[0]).split(
+        " should write "
+    )
     if told is None:
         assert (found, shown) == (None, [])
     else:
@@ -118,7 +161,9 @@ def test_info_says_in_the_solver_s_words_what_the_run_should_write(name: str, to
 
 def test_a_t01_without_parts_should_have_them(tmp_path: Path) -> None:
     (tmp_path / "RUNT01").write_bytes(bytes(t01(40, parts=()).data))
-    assert info(str(tmp_path / "RUNT01"))["should_write"].startswith("/TH/PART with DEF, MASS and HE for all parts:")
+    assert info(str(tmp_path / "RUNT01"))["should_write"].startswith(
+        "/TH/PART with DEF, MASS and HE for all parts:"
+    )
 
 
 def test_companions_are_one_run(matsum: Path, tmp_path: Path) -> None:
@@ -130,18 +175,29 @@ def test_companions_are_one_run(matsum: Path, tmp_path: Path) -> None:
     assert len(found["parts"]) == 3
 
 
-@pytest.mark.parametrize("text", ["time,internal_energy\n0.5,1\n", "time,internal_energy\n0.5,1\n0.6,2\n"])
+@pytest.mark.parametrize(
+    "text", ["time,internal_energy\n0.5,1\n", "time,internal_energy\n0.5,1\n0.6,2\n"]
+)
 def test_a_history_may_have_any_number_of_states(text: str, tmp_path: Path) -> None:
     file = put(tmp_path / "few.csv", text)
     found = info(str(file))
     states = text.count("\n") - 1
-    assert (found["states"], found["time_start"], found["sampling"] is None) == (states, 0.5, states == 1)
+    assert (found["states"], found["time_start"], found["sampling"] is None) == (
+        states,
+        0.5,
+        states == 1,
+    )
     assert {run("info", str(file), "-f", name).exit_code for name in FORMATS} == {0}
 
 
-def test_columns_that_leave_the_choice_of_the_energy_open_are_listed(tmp_path: Path) -> None:
+def test_columns_that_leave_the_choice_of_the_energy_open_are_listed(
+    tmp_path: Path,
+) -> None:
     time = np.linspace(0, 1, 20)
-    file = put(tmp_path / "several.csv", write_table("csv", {"time": time, "left": time, "right": time**2}))
+    file = put(
+        tmp_path / "several.csv",
+        write_table("csv", {"time": time, "left": time, "right": time**2}),
+    )
     assert run("suggest", "--td", "0.5", str(file)).exit_code == 2
     found = info(str(file))
     assert (found["channels"], found["states"]) == (["left", "right"], 20)
@@ -150,20 +206,30 @@ def test_columns_that_leave_the_choice_of_the_energy_open_are_listed(tmp_path: P
 def test_hdf5_columns_are_listed(tmp_path: Path) -> None:
     time = np.linspace(0, 1, 20)
     file = tmp_path / "run.h5"
-    file.write_bytes(write_table("hdf5", {"a/time": time, "a/internal_energy": time, "a/other": time**2}))
+    file.write_bytes(
+        write_table(
+            "hdf5", {"a/time": time, "a/internal_energy": time, "a/other": time**2}
+        )
+    )
     found = info(str(file))
     assert found["states"] == 20
     assert {"a/internal_energy", "a/other"} <= set(found["channels"])
 
 
-def test_hdf5_columns_that_leave_the_choice_open_are_listed_with_the_reason(tmp_path: Path) -> None:
+def test_hdf5_columns_that_leave_the_choice_open_are_listed_with_the_reason(
+    tmp_path: Path,
+) -> None:
     time = np.linspace(0, 1, 20)
     file = tmp_path / "several.h5"
     groups = ("a/time", "a/internal_energy", "b/time", "b/internal_energy")
     file.write_bytes(write_table("hdf5", dict.fromkeys(groups, time)))
     found = info(str(file))
     assert set(groups) <= set(found["channels"])
-    assert (found["states"], found["time_start"], found["sampling"]) == (None, None, None)
+    assert (found["states"], found["time_start"], found["sampling"]) == (
+        None,
+        None,
+        None,
+    )
     assert any("2 columns for the internal energy" in note for note in found["notes"])
     assert {run("info", str(file), "-f", name).exit_code for name in FORMATS} == {0}
     assert info("--energy", "b/internal_energy", str(file))["states"] == 20
@@ -173,7 +239,12 @@ def test_a_run_killed_before_its_first_state_has_none(matsum: Path) -> None:
     head, *_ = matsum.read_text().split("\n time =")
     matsum.write_text(head)
     found = info(str(matsum))
-    assert (found["states"], found["time_start"], found["sampling"], found["flights"]) == (0, None, None, [])
+    assert (
+        found["states"],
+        found["time_start"],
+        found["sampling"],
+        found["flights"],
+    ) == (0, None, None, [])
     assert found["title"] == "floating oscillator"
 
 
@@ -183,7 +254,11 @@ def test_a_part_that_comes_and_goes_has_no_highest_energy(matsum: Path) -> None:
             enumerate(states)]  # fmt: skip
     matsum.write_text("\n time =".join([head, *gone]))
     found = info(str(matsum))
-    assert [part["energy_max"] is None for part in found["parts"]] == [False, True, False]
+    assert [part["energy_max"] is None for part in found["parts"]] == [
+        False,
+        True,
+        False,
+    ]
     assert any("only some states have part 2" in note for note in found["notes"])
 
 
@@ -199,7 +274,10 @@ def test_a_killed_run_is_said_to_be_incomplete(tmp_path: Path) -> None:
 def test_every_format_tells_the_same(matsum: Path) -> None:
     table = run("info", str(matsum)).stdout
     assert "states             1501" in table
-    assert "flight             frame, suspended mass, spring from 0 to the end of the record, 0.15" in table
+    assert (
+        "flight             frame, suspended mass, spring from 0 to the end of the record, 0.15"
+        in table
+    )
     assert re.search(r"^   3  spring +140\.36$", table, flags=re.MULTILINE)
     markdown = run("info", "-f", "markdown", str(matsum)).stdout
     assert "| states | 1501 |" in markdown
@@ -209,15 +287,26 @@ def test_every_format_tells_the_same(matsum: Path) -> None:
 def test_csv_is_one_row_under_the_keys_of_json() -> None:
     source = BOX
     found = info("--part", "box", source)
-    (row,) = csv.DictReader(io.StringIO(run("info", "-f", "csv", "--part", "box", source).stdout))
-    assert set(found) - {"schema", "tool_version", "command", "warnings", "sampling"} == {
-        name for name in row if not name.startswith("sampling_")
-    }
-    assert (int(row["states"]), float(row["time_end"])) == (found["states"], found["time_end"])
+    (row,) = csv.DictReader(
+        io.StringIO(run("info", "-f", "csv", "--part", "box", source).stdout)
+    )
+    assert set(found) - {
+        "schema",
+        "tool_version",
+        "command",
+        "warnings",
+        "sampling",
+    } == {name for name in row if not name.startswith("sampling_")}
+    assert (int(row["states"]), float(row["time_end"])) == (
+        found["states"],
+        found["time_end"],
+    )
     assert float(row["sampling_median"]) == found["sampling"]["median"]
     assert row["channels"].split("; ") == found["channels"]
     assert row["parts"] == "1 box; 2 step; 3 sled"
-    assert [flight.startswith("box, step from ") for flight in row["flights"].split("; ")] == [True, True]
+    assert [
+        flight.startswith("box, step from ") for flight in row["flights"].split("; ")
+    ] == [True, True]
 
 
 @pytest.mark.parametrize(
@@ -226,10 +315,16 @@ def test_csv_is_one_row_under_the_keys_of_json() -> None:
         (("car_all_T02.gz",), "from 0.0496021 to 0.146302", None),
         (("car_heavy_T02.gz",), "from 0.0496021 to 0.146306", None),
         (("drop2_w123_T01.gz",), "from 0 to 0.2836", None),
-        (("car_all_T01.gz", "car_all_T02.gz", "car_all_T03.gz"), "from 0.0496021 to 0.146302", 1.1),
+        (
+            ("car_all_T01.gz", "car_all_T02.gz", "car_all_T03.gz"),
+            "from 0.0496021 to 0.146302",
+            1.1,
+        ),
     ],
 )
-def test_rigid_legs_are_called_so_and_raise_no_alarm(names: tuple[str, ...], when: str, ratio: float | None) -> None:
+def test_rigid_legs_are_called_so_and_raise_no_alarm(
+    names: tuple[str, ...], when: str, ratio: float | None
+) -> None:
     """While its parts are rigid Radioss writes masses and momenta of 0, and any energy of solids."""
     found = info(*(str(ROOT / "tests/data" / name) for name in names))
     (warning,) = found["warnings"]
@@ -243,4 +338,6 @@ def test_rigid_legs_are_called_so_and_raise_no_alarm(names: tuple[str, ...], whe
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["tests/data/carT01.gz", "tests/data/drop2T01.gz"])
 def test_deformable_legs_are_not_called_rigid(name: str) -> None:
-    assert "rigid-legs" not in {one["code"] for one in info(str(ROOT / name))["warnings"]}
+    assert "rigid-legs" not in {
+        one["code"] for one in info(str(ROOT / name))["warnings"]
+    }

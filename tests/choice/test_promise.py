@@ -9,7 +9,14 @@ import pytest
 import d2rpick
 from d2rpick.choice.question import Settings
 from tests.benchmarks.promise import BAD, CLASSES, KEEPS_NOTHING, ask_for_pair
-from tests.benchmarks.promise_parts import CLASSES as CLASSES_OF_PARTS, Motion, Record, history, records, stated
+from tests.benchmarks.promise_parts import (
+    CLASSES as CLASSES_OF_PARTS,
+    Motion,
+    Record,
+    history,
+    records,
+    stated,
+)
 from tests.energies import sure
 from tests.vibration.test_identify import about_a_preload
 
@@ -25,23 +32,40 @@ from tests.vibration.test_identify import about_a_preload
         ("drift and heating", 1, 5),
     ],
 )
-def test_what_was_upside_down_has_the_sign_of_td(name: str, seed: int, number: int, tmp_path: Path) -> None:
+def test_what_was_upside_down_has_the_sign_of_td(
+    name: str, seed: int, number: int, tmp_path: Path
+) -> None:
     """The energy alone, or an oscillator about a preload, gave these pairs the other sign: residuals of 2."""
-    found = sure(ask_for_pair(CLASSES[name](np.random.default_rng([seed, number])), tmp_path))
+    found = sure(
+        ask_for_pair(CLASSES[name](np.random.default_rng([seed, number])), tmp_path)
+    )
     assert found.kept or found.true < sure(found.residual)
     assert found.true < BAD
 
 
-def test_of_a_preload_that_hardly_shows_the_residual_is_in_its_range(tmp_path: Path) -> None:
+def test_of_a_preload_that_hardly_shows_the_residual_is_in_its_range(
+    tmp_path: Path,
+) -> None:
     """Half the rate, and a quarter of the kinetic share: the residual is twice the one of a vibration through zero."""
     time, td = np.arange(0.0, 6.711, 1 / 40), 5.506
     path = tmp_path / "preloaded.csv"
     energy = 100 * about_a_preload(time, 2 * np.pi, 3.4484)[0] ** 2
-    np.savetxt(path, np.stack([time, energy], axis=1), "%.8g", ",", header="time,internal_energy", comments="")
+    np.savetxt(
+        path,
+        np.stack([time, energy], axis=1),
+        "%.8g",
+        ",",
+        header="time,internal_energy",
+        comments="",
+    )
     answer = d2rpick.suggest(d2rpick.read(str(path)), td=td).to_dict()
     best = next(one for one in answer["candidates"] if one["recommended"])
-    before, after = (about_a_preload(np.array(at), 2 * np.pi, 3.4484) for at in (best["tr"], td))
-    true = float(np.hypot(before[0] - after[0], after[1]) / np.hypot(after[0] - 1, after[1]))
+    before, after = (
+        about_a_preload(np.array(at), 2 * np.pi, 3.4484) for at in (best["tr"], td)
+    )
+    true = float(
+        np.hypot(before[0] - after[0], after[1]) / np.hypot(after[0] - 1, after[1])
+    )
     assert best["residual"] - 0.05 < BAD < true < best["residual_high"] + 0.05
     assert answer["quality"] != "good"
 
@@ -49,7 +73,9 @@ def test_of_a_preload_that_hardly_shows_the_residual_is_in_its_range(tmp_path: P
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", CLASSES_OF_PARTS)
 def test_what_is_stated_of_random_records_holds(kind: str) -> None:
-    asked = [record._replace(window=record.window[:1] * 2) for record in records(kind, 1, 2)]  # one td is cheap
+    asked = [
+        record._replace(window=record.window[:1] * 2) for record in records(kind, 1, 2)
+    ]  # one td is cheap
     found = [one for record in asked if (one := stated(record))]
     assert found
     assert all(one.kept is not False for one in found)
@@ -68,9 +94,23 @@ def test_what_the_floor_of_the_swings_hides_is_no_good_pair() -> None:
 def test_two_planes_turn_no_pair_upside_down() -> None:
     """97 and 3 % of the energy of one part: its minima stay at some per cent of its maxima."""
     forms = np.array([np.diag([0.97, 0.03, 0.0]), np.diag([0.0, 0.0, 0.5])])
-    truth = Motion(7.7, 2 * np.pi * np.array([29.2, 70.1, 48.76]), np.array([2.95, 4.64, -0.82]), forms)
+    truth = Motion(
+        7.7,
+        2 * np.pi * np.array([29.2, 70.1, 48.76]),
+        np.array([2.95, 4.64, -0.82]),
+        forms,
+    )
     time = np.arange(0, 0.4, 4e-4)
-    found = sure(stated(Record(history(time, truth.energies(time)), Settings(after=0.0), (0.2, 0.38), truth.residual)))
+    found = sure(
+        stated(
+            Record(
+                history(time, truth.energies(time)),
+                Settings(after=0.0),
+                (0.2, 0.38),
+                truth.residual,
+            )
+        )
+    )
     assert (found.basis, found.kept) == ("modal", True)
     assert found.true < KEEPS_NOTHING
 
@@ -78,14 +118,25 @@ def test_two_planes_turn_no_pair_upside_down() -> None:
 def test_the_truth_of_the_benchmark_is_that_of_its_motion() -> None:
     rate, alpha = np.array([5.0, 8.0]), 0.4
     motion = Motion(
-        alpha, rate, np.array([0.3, -0.9]), np.array([[[1.0, 0.2], [0.2, 0.5]], [[0.3, -0.2], [-0.2, 0.6]]])
+        alpha,
+        rate,
+        np.array([0.3, -0.9]),
+        np.array([[[1.0, 0.2], [0.2, 0.5]], [[0.3, -0.2], [-0.2, 0.6]]]),
     )
     step, td = 1e-5, 2.0
     (before, now, after) = (motion.state(td + shift)[0] for shift in (-step, 0.0, step))
-    assert motion.state(td)[1] * np.hypot(rate, alpha / 2) == pytest.approx((after - before) / (2 * step), abs=1e-6)
+    assert motion.state(td)[1] * np.hypot(rate, alpha / 2) == pytest.approx(
+        (after - before) / (2 * step), abs=1e-6
+    )
     acceleration = (after - 2 * now + before) / step**2
     velocity = (after - before) / (2 * step)
-    assert acceleration == pytest.approx(-alpha * velocity - (rate**2 + alpha**2 / 4) * now, abs=1e-3)
+    assert acceleration == pytest.approx(
+        -alpha * velocity - (rate**2 + alpha**2 / 4) * now, abs=1e-3
+    )
     assert motion.residual(td, td) ** 2 == pytest.approx(
-        float([1.3, 1.1] @ motion.state(td)[1] ** 2 / ([1.3, 1.1] @ (now**2 + motion.state(td)[1] ** 2)))
+        float(
+            [1.3, 1.1]
+            @ motion.state(td)[1] ** 2
+            / ([1.3, 1.1] @ (now**2 + motion.state(td)[1] ** 2))
+        )
     )

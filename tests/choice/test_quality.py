@@ -52,8 +52,14 @@ def test_limits_that_cannot_be_judged_are_not_kept() -> None:
 
 @given(rows)
 def test_the_order_of_candidates(some: list[tuple[float, float, int, bool]]) -> None:
-    rigid, error = np.array([row[0] for row in some]), np.array([row[1] for row in some])
-    group, off = np.array([row[2] for row in some], dtype=np.int32), np.array([row[3] for row in some], dtype=bool)
+    rigid, error = (
+        np.array([row[0] for row in some]),
+        np.array([row[1] for row in some]),
+    )
+    group, off = (
+        np.array([row[2] for row in some], dtype=np.int32),
+        np.array([row[3] for row in some], dtype=bool),
+    )
     places = order(group, error, rigid, off, np.full(3, EQUALLY_GOOD)).tolist()
     assert sorted(places) == list(range(len(some)))
     assert [some[i][2] for i in places] == sorted(group.tolist())
@@ -63,8 +69,12 @@ def test_the_order_of_candidates(some: list[tuple[float, float, int, bool]]) -> 
         good = [row for row in ranked if row[1] <= near]
         longest = max(row[0] for row in good)
         late = [row for row in good if row[0] < 0.9 * longest]
-        early = sorted((row for row in good if row not in late), key=lambda row: (row[3], -row[0]))
-        rest = sorted((row for row in ranked if row[1] > near), key=lambda row: (row[1], -row[0]))
+        early = sorted(
+            (row for row in good if row not in late), key=lambda row: (row[3], -row[0])
+        )
+        rest = sorted(
+            (row for row in ranked if row[1] > near), key=lambda row: (row[1], -row[0])
+        )
         assert ranked == early + sorted(late, key=lambda row: -row[0]) + rest
 
 
@@ -90,7 +100,14 @@ def test_of_times_alike_the_one_that_leaves_the_body_in_place_is_recommended() -
     def first(until: float) -> float:
         """The best where those before a time leave the body out of place."""
         off = np.where(found.judged.moments.tr < until, 1.0, 0.0)
-        return next(ranked(replace(found.judged, columns={**found.judged.columns, "position_error": off})))[0].tr
+        return next(
+            ranked(
+                replace(
+                    found.judged,
+                    columns={**found.judged.columns, "position_error": off},
+                )
+            )
+        )[0].tr
 
     best = found[0].tr
     assert best < 0.0395 < first(0.0395) < best + 0.1 * (0.12 - best)
@@ -103,18 +120,29 @@ def fits(_: float) -> Fits:
     return Fits()
 
 
-@pytest.mark.parametrize("limits", [{}, {"max_kinetic_share": 0.9, "max_residual": 0.95}, {"tolerance": 1e-3}])
-@pytest.mark.parametrize(("history", "td"), [(paper.history(), paper.TD), (rollover(), 0.37)])
-def test_candidates_are_kept_together_as_one_by_one(history: History, td: float, limits: dict[str, float]) -> None:
+@pytest.mark.parametrize(
+    "limits",
+    [{}, {"max_kinetic_share": 0.9, "max_residual": 0.95}, {"tolerance": 1e-3}],
+)
+@pytest.mark.parametrize(
+    ("history", "td"), [(paper.history(), paper.TD), (rollover(), 0.37)]
+)
+def test_candidates_are_kept_together_as_one_by_one(
+    history: History, td: float, limits: dict[str, float]
+) -> None:
     situation = examine(history, td, Settings(**limits), fits(td))  # type: ignore[arg-type]
     ranked = next(candidates_at([situation]))
     assert len(ranked) > 3
     kept = ranked.kept.tolist()
-    assert kept == [one.acceptable and not over_limits(situation, one) for one in ranked]
+    assert kept == [
+        one.acceptable and not over_limits(situation, one) for one in ranked
+    ]
     assert ranked.recommended == (kept.index(True) if any(kept) else None)
     assert [one.rank for one in ranked] == list(range(1, len(ranked) + 1))
     assert [one.error for one in ranked] == ranked.judged.error[ranked.order].tolist()
-    assert [one.acceptable for one in ranked] == ranked.judged.acceptable[ranked.order].tolist()
+    assert [one.acceptable for one in ranked] == ranked.judged.acceptable[
+        ranked.order
+    ].tolist()
     assert ranked[1:3] == (ranked[1], ranked[2])
     assert ranked[-1].tr == ranked.tr[-1]
 
@@ -136,7 +164,9 @@ def test_the_residual_of_a_known_vibration_decides(td: float) -> None:
     if answer.chosen is None or answer.quality is None:
         return
     residual = sure(answer.chosen.residual)
-    assert answer.quality.grade == ("good" if residual <= 0.2 else "fair" if residual <= 0.5 else "poor")
+    assert answer.quality.grade == (
+        "good" if residual <= 0.2 else "fair" if residual <= 0.5 else "poor"
+    )
     assert bool(answer.quality.reasons) == (answer.quality.grade != "good")
 
 
@@ -148,7 +178,9 @@ def test_the_energy_alone_says_nothing_of_the_vibration() -> None:
     assert grade(record, at_a_peak, replay=False, after=0.005) == "poor"
     answer = suggest(record, at_a_peak, Settings(replay=False, after=0.005))
     (reason,) = sure(answer.quality).reasons
-    assert reason.startswith("how the deformations at tr and td lie to each other is unknown")
+    assert reason.startswith(
+        "how the deformations at tr and td lie to each other is unknown"
+    )
     assert sure(answer.quality).motion == Grade("good")
 
 
@@ -164,21 +196,36 @@ def test_a_td_near_the_zero_of_the_energy_is_poor_by_the_energy_alone() -> None:
     ],
     ids=["a velocity", "a coarse output"],
 )
-def test_a_record_that_no_level_can_be_read_from_is_poor(energy: np.ndarray, reason: str) -> None:
+def test_a_record_that_no_level_can_be_read_from_is_poor(
+    energy: np.ndarray, reason: str
+) -> None:
     history = of(energy, np.linspace(0, 1, 400))
-    answers = [suggest(history, td, Settings(after=0.1, replay=False)) for td in np.linspace(0.7, 0.9, 3)]
+    answers = [
+        suggest(history, td, Settings(after=0.1, replay=False))
+        for td in np.linspace(0.7, 0.9, 3)
+    ]
     found = [answer.quality for answer in answers if answer.quality]
     assert found
-    assert all(one.grade == "poor" and any(reason in text for text in one.reasons) for one in found)
+    assert all(
+        one.grade == "poor" and any(reason in text for text in one.reasons)
+        for one in found
+    )
 
 
 def test_a_flight_that_is_not_certain_is_no_better_than_fair() -> None:
     time = np.linspace(0, 1, 500)
-    waves = sum((np.sin(rate * time + rate) ** 2 for rate in (30, 47, 71, 103, 151, 199)), np.zeros(500))
+    waves = sum(
+        (np.sin(rate * time + rate) ** 2 for rate in (30, 47, 71, 103, 151, 199)),
+        np.zeros(500),
+    )
     energy = np.where(time < 0.2, 50 * (0.2 - time), 0) + waves
     answer = suggest(of(energy, time), 0.8, Settings())
-    guessed = replace(answer.situation, flight=answer.situation.flight._replace(source="energy"))
-    assert quality_of(guessed, sure(answer.chosen)).motion == Grade("fair", ("the flight is not certain",))
+    guessed = replace(
+        answer.situation, flight=answer.situation.flight._replace(source="energy")
+    )
+    assert quality_of(guessed, sure(answer.chosen)).motion == Grade(
+        "fair", ("the flight is not certain",)
+    )
 
 
 def test_a_pair_is_graded_the_same_whether_it_is_suggested_or_verified() -> None:
@@ -191,13 +238,17 @@ def test_a_pair_is_graded_the_same_whether_it_is_suggested_or_verified() -> None
 
 
 @given(st.integers(4, 40), st.integers(3, 30))
-def test_states_per_period_are_counted_over_whole_periods(states: int, periods: int) -> None:
+def test_states_per_period_are_counted_over_whole_periods(
+    states: int, periods: int
+) -> None:
     wave = 1 + np.sin(2 * np.pi * np.arange(states * periods) / states + 0.4)
     found = sure(states_per_period(wave))
     assert found == pytest.approx(states, rel=2 / periods)
     noise = 0.02 * np.random.default_rng(1).standard_normal(wave.size)
     noisy = states_per_period(wave + noise)
-    assert noisy == pytest.approx(states, rel=2 / periods)  # noise about the mean is not taken for periods
+    assert noisy == pytest.approx(
+        states, rel=2 / periods
+    )  # noise about the mean is not taken for periods
 
 
 def test_without_a_period_there_are_no_states_of_one() -> None:
@@ -208,11 +259,15 @@ def test_without_a_period_there_are_no_states_of_one() -> None:
 
 def test_rest_is_good_only_in_a_flight_that_is_certain() -> None:
     time = np.linspace(0, 1, 201)
-    energy = np.where(time < 0.2, 50 * time, 10.0) + 1e-5 * np.random.default_rng(1).random(201)
+    energy = np.where(time < 0.2, 50 * time, 10.0) + 1e-5 * np.random.default_rng(
+        1
+    ).random(201)
     found = suggest(of(energy, time), 0.9, Settings(after=0.25))
     assert found.situation.at_rest
     assert found.quality == ALL_GOOD
-    guessed = replace(found.situation, flight=found.situation.flight._replace(source="energy"))
+    guessed = replace(
+        found.situation, flight=found.situation.flight._replace(source="energy")
+    )
     assert guessed.at_rest
     quality = quality_of(guessed, sure(found.chosen))
     assert (quality.grade, quality.reasons) == ("fair", ("the flight is not certain",))
@@ -227,7 +282,10 @@ EARLY = np.where(STATES < 12, 1e-12, 1.0 + np.sin(STATES) ** 2)
 def crushed(vibration: float) -> np.ndarray:
     """Of 100 J of which little vibrates, the level says nothing: a frozen tr may be wrong by all of the vibration."""
     swinging = sum(np.sin(rate * UNIT + rate) ** 2 for rate in (31.0, 47.0, 66.0)) / 3
-    return np.asarray(100 * np.minimum(UNIT / 0.1, 1) ** 2 + vibration * np.where(UNIT > 0.1, swinging, 0))
+    return np.asarray(
+        100 * np.minimum(UNIT / 0.1, 1) ** 2
+        + vibration * np.where(UNIT > 0.1, swinging, 0)
+    )
 
 
 @pytest.mark.parametrize(
@@ -259,7 +317,9 @@ def test_a_tr_that_is_not_known_to_its_tolerance_is_fair() -> None:
         assert best is not None
         assert best.residual == pytest.approx(0, abs=1e-3)
         assert sure(quality).grade == wanted
-        assert (sure(best.tr_high) - best.tr > 4 * sure(best.timing_tolerance)) is (wanted == "fair")
+        assert (sure(best.tr_high) - best.tr > 4 * sure(best.timing_tolerance)) is (
+            wanted == "fair"
+        )
         verdict = verify(history, best.tr, answer.situation.td, Settings()).quality
         assert verdict == sure(quality)
     assert "between" not in as_table(early, Shown())
@@ -269,7 +329,10 @@ def test_a_tr_that_is_not_known_to_its_tolerance_is_fair() -> None:
 def test_a_flight_that_vibrates_later_was_never_at_rest() -> None:
     """A structure that rings in many modes is quiet for moments; free flight excites nothing anew."""
     time = np.linspace(0, 1, 201)
-    energy = np.where(time < 0.2, 50 * time, 10.0) + 1.5 * (time > 0.5) * np.sin(200 * time) ** 2
+    energy = (
+        np.where(time < 0.2, 50 * time, 10.0)
+        + 1.5 * (time > 0.5) * np.sin(200 * time) ** 2
+    )
     quiet = suggest(of(energy, time), 0.4, Settings(after=0.25)).situation
     assert quiet.at_rest  # of what comes after td nothing is known
     assert not replace(quiet, flight=quiet.flight._replace(end=0.9)).at_rest

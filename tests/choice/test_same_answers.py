@@ -33,7 +33,10 @@ COMPUTED = {
 MADE = {
     "one mode": (((4.3, 1.0),), 0.01),
     "two modes": (((3.1, 1.0), (5.7, 0.6)), 0.003),
-    "five modes": (((3.1, 1.0), (5.7, 0.7), (9.3, 0.5), (13.9, 0.4), (21.2, 0.3)), 0.003),
+    "five modes": (
+        ((3.1, 1.0), (5.7, 0.7), (9.3, 0.5), (13.9, 0.4), (21.2, 0.3)),
+        0.003,
+    ),
     "noise": (((2.0, 0.3),), 0.3),
 }
 STATES = 2500
@@ -43,34 +46,59 @@ def made(name: str) -> History:
     """Energy of the modes, damped, with white noise."""
     modes, noise = MADE[name]
     time = np.linspace(0.0, 1.0, STATES)
-    energy = sum((share * np.sin(2 * np.pi * rate * time + rate) ** 2 for rate, share in modes), np.zeros(STATES))
+    energy = sum(
+        (share * np.sin(2 * np.pi * rate * time + rate) ** 2 for rate, share in modes),
+        np.zeros(STATES),
+    )
     energy = np.exp(-0.8 * time) * energy
     energy += noise * energy.max() * np.random.default_rng(14).standard_normal(STATES)
     return History(time, energy, source=(name,), format="made", channel="E")
 
 
-def answer(name: str, td: float | tuple[float, float], **asked: float | bool) -> Suggestion:
+def answer(
+    name: str, td: float | tuple[float, float], **asked: float | bool
+) -> Suggestion:
     """Answer for a sample or a made-up record; a window of td is given by its two ends."""
     settings = Settings(**asked)  # type: ignore[arg-type]
     if name in SAMPLES:
         file, selection = SAMPLES[name]
-        return suggest_of(read([str(ROOT / "sample_data" / file)], selection), td, settings)
+        return suggest_of(
+            read([str(ROOT / "sample_data" / file)], selection), td, settings
+        )
     if name in COMPUTED:
         file, selection = COMPUTED[name]
         return suggest_of(read([stored(file)], selection), td, settings)
-    return suggest_in_window(made(name), td, settings) if isinstance(td, tuple) else suggest(made(name), td, settings)
+    return (
+        suggest_in_window(made(name), td, settings)
+        if isinstance(td, tuple)
+        else suggest(made(name), td, settings)
+    )
 
 
 def digest(found: Suggestion) -> str:
     """What is recommended, how sure it is, and the first of the ranks, to printed digits."""
     pair, better, best = found.recommended, found.better_pair, found.chosen
     parts = [found.situation.basis]
-    parts += [f"{pair.tr:.6g} {pair.td:.6g} {_measure(pair.residual)}" if pair else "none"]
-    parts += [f"+-{(best.tr_high - best.tr_low) / 2:.1e}" if best and best.tr_high and best.tr_low else "-"]
-    parts += [f"{better.tr:.6g} {better.td:.6g} {_measure(better.residual)}" if better else "none"]
-    parts += [f"{len(found.candidates)}/{sum(one.acceptable for one in found.candidates)}"]
+    parts += [
+        f"{pair.tr:.6g} {pair.td:.6g} {_measure(pair.residual)}" if pair else "none"
+    ]
+    parts += [
+        f"+-{(best.tr_high - best.tr_low) / 2:.1e}"
+        if best and best.tr_high and best.tr_low
+        else "-"
+    ]
+    parts += [
+        f"{better.tr:.6g} {better.td:.6g} {_measure(better.residual)}"
+        if better
+        else "none"
+    ]
+    parts += [
+        f"{len(found.candidates)}/{sum(one.acceptable for one in found.candidates)}"
+    ]
     parts += [" ".join(f"{one.tr:.6g}" for one in found.candidates[1:4])]
-    parts += ["; ".join(f"{one.start:.5g}-{one.end:.5g}" for one in (found.windows or ())[:3])]
+    parts += [
+        "; ".join(f"{one.start:.5g}-{one.end:.5g}" for one in (found.windows or ())[:3])
+    ]
     return " | ".join(parts)
 
 

@@ -42,11 +42,19 @@ def test_every_model_answers_alike() -> None:
         compared = measures.compared(measured)
         assert compared.size == len(found) == vibration.reach(found).size > 0
         assert np.all(times < situation.td)
-        assert (vibration.kinetic_share is None) == (vibration.unknown is not None) == (not compared.any())
+        assert (
+            (vibration.kinetic_share is None)
+            == (vibration.unknown is not None)
+            == (not compared.any())
+        )
         # what a tolerance is held against is the lock-in error, where the sign is right
-        wanted = np.where(measured["sign_match"] > 0, measured["lock_in_error"], np.inf)[compared]
+        wanted = np.where(
+            measured["sign_match"] > 0, measured["lock_in_error"], np.inf
+        )[compared]
         np.testing.assert_allclose(vibration.errors(times)[compared], wanted)
-        assert situation.energy_td == pytest.approx(situation.history.energy_at(situation.td), rel=0.05)
+        assert situation.energy_td == pytest.approx(
+            situation.history.energy_at(situation.td), rel=0.05
+        )
 
 
 def test_from_another_td_the_same_evidence_is_seen() -> None:
@@ -58,13 +66,21 @@ def test_from_another_td_the_same_evidence_is_seen() -> None:
 
 
 @pytest.mark.parametrize("order", [(0.42, 0.3), (0.3, 0.42)])
-def test_how_bodies_drift_is_known_in_the_flight_whatever_td_was_seen_before(order: tuple[float, float]) -> None:
+def test_how_bodies_drift_is_known_in_the_flight_whatever_td_was_seen_before(
+    order: tuple[float, float],
+) -> None:
     """Behind the flight, at 0.42, it is the same flight that is nearest, but nothing flies."""
-    history = read(["sample_data/rollover_box.matsum"], Selection(parts=("all",))).history
+    history = read(
+        ["sample_data/rollover_box.matsum"], Selection(parts=("all",))
+    ).history
     fits, settings = Fits(), Settings(bodies=(RigidBody((1,)), RigidBody((2,))))
     seen = {td: examine(history, td, settings, fits) for td in order}
     assert len({situation.flight[:2] for situation in seen.values()}) == 1
-    open_ = {td: situation.bodies.unknown for td, situation in seen.items() if situation.bodies}
+    open_ = {
+        td: situation.bodies.unknown
+        for td, situation in seen.items()
+        if situation.bodies
+    }
     assert open_ == {0.42: settings.bodies, 0.3: ()}
 
 
@@ -72,17 +88,32 @@ def test_a_given_oscillator_that_does_not_fit_is_not_believed() -> None:
     wrong = to_mode(replace(paper.OSCILLATOR, stiffness=500e3), 6.0)
     answer = suggest(paper.history(), paper.TD, Settings(oscillator=wrong))
     assert answer.situation.basis == "energy"
-    assert "the given oscillator does not describe the record" in sure(answer.situation.vibration.unknown)
-    assert "the oscillator that was asked for does not describe the record at td" in answer.why_none
-    assert any("the oscillator that was asked for" in note for c in answer.candidates for note in c.notes)
+    assert "the given oscillator does not describe the record" in sure(
+        answer.situation.vibration.unknown
+    )
+    assert (
+        "the oscillator that was asked for does not describe the record at td"
+        in answer.why_none
+    )
+    assert any(
+        "the oscillator that was asked for" in note
+        for c in answer.candidates
+        for note in c.notes
+    )
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("history", "td"), [(paper.history(), paper.TD), (chain.history(), chain.TD_LATE)])
-def test_what_was_found_with_another_end_of_the_load_changes_nothing(history: History, td: float) -> None:
+@pytest.mark.parametrize(
+    ("history", "td"), [(paper.history(), paper.TD), (chain.history(), chain.TD_LATE)]
+)
+def test_what_was_found_with_another_end_of_the_load_changes_nothing(
+    history: History, td: float
+) -> None:
     """A plan keeps what it finds for all flights, and only one of them has the end of the load that was given."""
     fits, fresh = Fits(), suggest(history, td, PLAIN).candidates[:]
-    other = suggest_at(examine(history, td, Settings(after=0.6 * td), fits)).candidates[:]
+    other = suggest_at(examine(history, td, Settings(after=0.6 * td), fits)).candidates[
+        :
+    ]
     assert other != fresh
     assert suggest_at(examine(history, td, PLAIN, fits)).candidates[:] == fresh
 
@@ -91,12 +122,19 @@ def one_mode() -> History:
     """A load until 0.1, then one mode with white noise."""
     time = np.linspace(0.0, 1.0, 601)
     energy = np.sin(2 * np.pi * 6.3 * time) ** 2
-    energy = np.where(time < 0.1, 3 * np.sin(np.pi * time / 0.1) ** 2, 0.0) + np.exp(-time) * energy
-    return of(energy + 0.003 * np.random.default_rng(3).standard_normal(time.size), time)
+    energy = (
+        np.where(time < 0.1, 3 * np.sin(np.pi * time / 0.1) ** 2, 0.0)
+        + np.exp(-time) * energy
+    )
+    return of(
+        energy + 0.003 * np.random.default_rng(3).standard_normal(time.size), time
+    )
 
 
 @pytest.mark.slow
-def test_an_oscillator_that_describes_most_of_a_record_is_not_sought_again_at_another_td() -> None:
+def test_an_oscillator_that_describes_most_of_a_record_is_not_sought_again_at_another_td() -> (
+    None
+):
     history, fits = one_mode(), CountedFits()
     first = examine(history, 0.6, PLAIN, fits, quick=True)
     before = fits.made
@@ -106,12 +144,17 @@ def test_an_oscillator_that_describes_most_of_a_record_is_not_sought_again_at_an
     anew = examine(history, 0.8, PLAIN)
     assert (quick.basis, quick.flight) == (anew.basis, anew.flight)
     assert quick.kinetic_share == pytest.approx(anew.kinetic_share, rel=1e-9)
-    assert examine(history, 0.05, PLAIN, fits, quick=True).evidence.span != first.evidence.span
+    assert (
+        examine(history, 0.05, PLAIN, fits, quick=True).evidence.span
+        != first.evidence.span
+    )
 
 
 def test_a_quick_look_refuses_what_a_full_one_does_without_its_misfit() -> None:
     noise = of(np.random.default_rng(3).random(200), np.linspace(0.0, 1.0, 200))
-    quick, full = (examine(noise, 0.9, Settings(after=0.5), quick=quick) for quick in (True, False))
+    quick, full = (
+        examine(noise, 0.9, Settings(after=0.5), quick=quick) for quick in (True, False)
+    )
     assert (quick.basis, quick.flight) == (full.basis, full.flight)
     assert sure(full.evidence.fit).misfit
     assert sure(quick.evidence.fit).misfit is None

@@ -34,7 +34,13 @@ from tests.reading import read_history
 ASKED = Question(variants.TD, Settings())
 
 
-def row(source: str, *windows: tuple[float, float], tr: float = 2.0, width: float = 0.1, **other: object) -> StudyRow:
+def row(
+    source: str,
+    *windows: tuple[float, float],
+    tr: float = 2.0,
+    width: float = 0.1,
+    **other: object,
+) -> StudyRow:
     """A run with windows of acceptable tr, all alike, its error a straight line from 0 at 0 to 1 at td = 10."""
     acceptable = np.array(windows, float).reshape(-1, 2)
     made = StudyRow(
@@ -50,11 +56,22 @@ def row(source: str, *windows: tuple[float, float], tr: float = 2.0, width: floa
 def test_a_row_says_what_suggest_says(tmp_path: Path) -> None:
     name = variants.write(tmp_path / "run.csv")
     found = ask(ASKED, name)
-    assert (found.status, found.message, found.basis, found.warnings) == ("ok", None, "oscillator", ())
+    assert (found.status, found.message, found.basis, found.warnings) == (
+        "ok",
+        None,
+        "oscillator",
+        (),
+    )
     assert found.tr == pytest.approx(0.0135866683619825, rel=1e-6)
     assert sure(found.tr_low) < 0.0135866683619825 < (found.tr_high or 0)
     assert found.energy_td == pytest.approx(6.05508394485761, rel=1e-6)
-    assert found.files == ((str(tmp_path / "run.csv"), Path(name).stat().st_size, Path(name).stat().st_mtime_ns),)
+    assert found.files == (
+        (
+            str(tmp_path / "run.csv"),
+            Path(name).stat().st_size,
+            Path(name).stat().st_mtime_ns,
+        ),
+    )
 
 
 @pytest.mark.parametrize(
@@ -65,7 +82,11 @@ def test_a_row_says_what_suggest_says(tmp_path: Path) -> None:
         ("time,energy\n0,1\n1,x\n2,3\n", "unreadable", ":3: "),
         ("time,energy\n0,1\n0.05,2\n0.06,3\n", "out-of-range", "outside the record"),
         ("time,energy\n0,1\n0.1,2\n", "out-of-range", "at least 3"),
-        ("time,energy\n0,1\n0.05,2\n0.1,3\n0.2,4\n", "none", "neither passes its level"),
+        (
+            "time,energy\n0,1\n0.05,2\n0.1,3\n0.2,4\n",
+            "none",
+            "neither passes its level",
+        ),
     ],
 )
 def test_what_is_wrong_with_a_run_is_said_in_its_row(
@@ -82,7 +103,10 @@ def test_what_is_wrong_with_a_run_is_said_in_its_row(
 def test_a_process_that_did_not_answer_is_a_row() -> None:
     found = failed("run", MemoryError())
     assert (found.source, found.status) == ("run", "failed")
-    assert found.message == "run: there is not enough memory; give it more, or name fewer files"
+    assert (
+        found.message
+        == "run: there is not enough memory; give it more, or name fewer files"
+    )
     found = failed("run", KeyError("time"))
     assert (found.source, found.status) == ("run", "internal-error")
     assert found.message == "run: internal error, please report it (KeyError: 'time')"
@@ -96,7 +120,9 @@ def test_another_version_gives_no_answer() -> None:
 # Many runs.
 
 
-def test_one_tr_for_all_verifies_in_each_run_and_so_do_the_ends_of_its_window(tmp_path: Path) -> None:
+def test_one_tr_for_all_verifies_in_each_run_and_so_do_the_ends_of_its_window(
+    tmp_path: Path,
+) -> None:
     names = variants.variants(tmp_path)
     answer = summarise(variants.TD, [ask(ASKED, name) for name in names])
     for name in names:
@@ -109,8 +135,12 @@ def test_one_tr_for_all_verifies_in_each_run_and_so_do_the_ends_of_its_window(tm
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("energies", [("IE_spring1_J", "IE_spring2_J"), ("IE_spring1_J",)])
-def test_real_runs_share_a_tr_that_verifies_whatever_the_basis(energies: tuple[str, ...]) -> None:
+@pytest.mark.parametrize(
+    "energies", [("IE_spring1_J", "IE_spring2_J"), ("IE_spring1_J",)]
+)
+def test_real_runs_share_a_tr_that_verifies_whatever_the_basis(
+    energies: tuple[str, ...],
+) -> None:
     name = stored("chain_ref.csv.gz")
     question = Question(0.238, Settings(), Selection(energy=energies))
     found = ask(question, name)
@@ -119,7 +149,9 @@ def test_real_runs_share_a_tr_that_verifies_whatever_the_basis(energies: tuple[s
     assert verify(history, sure(answer.common.tr), 0.238, Settings()).verified
 
 
-def test_the_same_run_twice_agrees_with_itself_and_a_single_run_too(tmp_path: Path) -> None:
+def test_the_same_run_twice_agrees_with_itself_and_a_single_run_too(
+    tmp_path: Path,
+) -> None:
     found = ask(ASKED, variants.write(tmp_path / "run.csv"))
     one, two = summarise(variants.TD, [found]), summarise(variants.TD, [found, found])
     assert one.agree is two.agree is True
@@ -135,37 +167,78 @@ def test_runs_that_agree_have_their_own_tr_in_common(times: list[float]) -> None
     found = summarise(10.0, rows).common
     assert found.tr == pytest.approx(float(np.median(times)))
     assert found.keeps_tolerance
-    without = replace(row("none", (1, 3)), status=NONE, tr=None, tr_low=None, tr_high=None)
+    without = replace(
+        row("none", (1, 3)), status=NONE, tr=None, tr_low=None, tr_high=None
+    )
     assert summarise(10.0, [*rows, without]).common.tr == 1.0
 
 
 def test_a_run_that_was_cut_is_called_so(tmp_path: Path) -> None:
     whole = [variants.write(tmp_path / f"run{i}.csv") for i in range(3)]
-    short, late = variants.write(tmp_path / "short.csv", end=0.06), variants.write(tmp_path / "late.csv", end=0.1)
+    short, late = (
+        variants.write(tmp_path / "short.csv", end=0.06),
+        variants.write(tmp_path / "late.csv", end=0.1),
+    )
     rows = [ask(ASKED, name) for name in (*whole, short, late)]
     assert [one.record_end for one in rows] == pytest.approx([0.15] * 3 + [0.06, 0.1])
     assert [one.status for one in rows] == [OK] * 3 + ["out-of-range", OK]
-    told = {caution.code: caution.message for caution in summarise(variants.TD, rows).cautions}
-    assert told["cut-runs"] == f"2 of 5 runs were cut: {short} (at 0.06), {late} (at 0.1)"
-    assert cut_runs([*rows[:3], replace(rows[0], warnings=("truncated-input",))])[0].warnings == ("truncated-input",)
-    assert "cut-runs" not in {caution.code for caution in summarise(variants.TD, rows[:3]).cautions}
+    told = {
+        caution.code: caution.message
+        for caution in summarise(variants.TD, rows).cautions
+    }
+    assert (
+        told["cut-runs"] == f"2 of 5 runs were cut: {short} (at 0.06), {late} (at 0.1)"
+    )
+    assert cut_runs([*rows[:3], replace(rows[0], warnings=("truncated-input",))])[
+        0
+    ].warnings == ("truncated-input",)
+    assert "cut-runs" not in {
+        caution.code for caution in summarise(variants.TD, rows[:3]).cautions
+    }
 
 
 @given(st.lists(st.tuples(st.floats(0, 1), st.floats(0, 0.3)), min_size=1, max_size=6))
-def test_runs_agree_when_their_intervals_have_a_time_in_common(intervals: list[tuple[float, float]]) -> None:
-    rows = [row(str(i), (0, 3), tr=tr, width=width) for i, (tr, width) in enumerate(intervals)]
+def test_runs_agree_when_their_intervals_have_a_time_in_common(
+    intervals: list[tuple[float, float]],
+) -> None:
+    rows = [
+        row(str(i), (0, 3), tr=tr, width=width)
+        for i, (tr, width) in enumerate(intervals)
+    ]
     pairwise = all(abs(a - b) <= v + w for a, v in intervals for b, w in intervals)
-    close = any(abs(abs(a - b) - v - w) < 1e-12 for a, v in intervals for b, w in intervals if (a, v) != (b, w))
+    close = any(
+        abs(abs(a - b) - v - w) < 1e-12
+        for a, v in intervals
+        for b, w in intervals
+        if (a, v) != (b, w)
+    )
     assert summarise(4.0, rows).agree == pairwise or close
 
 
-def test_where_there_is_none_it_says_which_tr_suits_most_runs_and_which_it_does_not() -> None:
-    rows = [row("a", (1, 2)), row("b", (1.5, 3)), row("c", (5, 6), (1.6, 1.7)), row("d", (8, 9)), row("e")]
+def test_where_there_is_none_it_says_which_tr_suits_most_runs_and_which_it_does_not() -> (
+    None
+):
+    rows = [
+        row("a", (1, 2)),
+        row("b", (1.5, 3)),
+        row("c", (5, 6), (1.6, 1.7)),
+        row("d", (8, 9)),
+        row("e"),
+    ]
     found = summarise(10.0, rows).common
     assert (found.tr, found.window) == (None, None)
-    assert found.reason == "no tr is acceptable in all of 5 runs; tr = 1.6 is in 3, not in d, e"
-    assert summarise(10.0, [row("e")]).common.reason == "no tr is acceptable in the run that was judged"
-    assert summarise(10.0, [failed("f", OSError())]).common.reason == "no run could be judged"
+    assert (
+        found.reason
+        == "no tr is acceptable in all of 5 runs; tr = 1.6 is in 3, not in d, e"
+    )
+    assert (
+        summarise(10.0, [row("e")]).common.reason
+        == "no tr is acceptable in the run that was judged"
+    )
+    assert (
+        summarise(10.0, [failed("f", OSError())]).common.reason
+        == "no run could be judged"
+    )
 
 
 def test_runs_that_were_not_judged_are_left_out_and_named() -> None:
@@ -177,26 +250,48 @@ def test_runs_that_were_not_judged_are_left_out_and_named() -> None:
     assert (caution.code, "bad" in caution.message) == ("runs-left-out", True)
 
 
-def alike(*windows: tuple[float, float]) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+def alike(
+    *windows: tuple[float, float],
+) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
     return np.array(windows, float).reshape(-1, 2)
 
 
-def test_the_common_tr_is_the_earliest_within_the_timing_tolerance_of_every_run() -> None:
-    rows = [row("a", (1, 4), alike=alike((1.2, 1.4), (1.5, 3))), row("b", (0, 6), tr=3.0, alike=alike((1.45, 5)))]
+def test_the_common_tr_is_the_earliest_within_the_timing_tolerance_of_every_run() -> (
+    None
+):
+    rows = [
+        row("a", (1, 4), alike=alike((1.2, 1.4), (1.5, 3))),
+        row("b", (0, 6), tr=3.0, alike=alike((1.45, 5))),
+    ]
     found = summarise(10.0, rows).common
     assert (found.tr, found.window, found.keeps_tolerance) == (1.5, (1.0, 4.0), True)
     assert found.errors == pytest.approx([0.15] * 2)
 
 
-def test_where_no_time_keeps_the_timing_tolerance_of_all_the_least_loss_counts_and_is_told() -> None:
+def test_where_no_time_keeps_the_timing_tolerance_of_all_the_least_loss_counts_and_is_told() -> (
+    None
+):
     """One error falls from 0.2 to 0, the other grows from 0 to 0.2: both are least in the middle."""
-    falling, growing = np.array([[1.0, 3.0], [0.2, 0.0]]), np.array([[1.0, 3.0], [0.0, 0.2]])
+    falling, growing = (
+        np.array([[1.0, 3.0], [0.2, 0.0]]),
+        np.array([[1.0, 3.0], [0.0, 0.2]]),
+    )
     rows = [
         row("a", (1, 3), tr=3.0, profile=falling, alike=alike((2.5, 3))),
-        row("b", (1, 3), tr=1.0, profile=np.insert(growing, 1, [2.0, 0.1], axis=1), alike=alike((1, 1.5))),
+        row(
+            "b",
+            (1, 3),
+            tr=1.0,
+            profile=np.insert(growing, 1, [2.0, 0.1], axis=1),
+            alike=alike((1, 1.5)),
+        ),
     ]
     answer = summarise(10.0, rows)
-    assert (answer.common.tr, answer.common.window, answer.common.keeps_tolerance) == (2.0, (1.0, 3.0), False)
+    assert (answer.common.tr, answer.common.window, answer.common.keeps_tolerance) == (
+        2.0,
+        (1.0, 3.0),
+        False,
+    )
     assert answer.common.errors == pytest.approx([0.1, 0.1])
     (caution,) = answer.cautions
     assert caution.code == "timing-tolerance"
@@ -218,7 +313,9 @@ def test_where_no_time_keeps_the_timing_tolerance_of_all_the_least_loss_counts_a
 def test_a_common_tr_lies_in_the_windows_of_all_runs(rows: list[StudyRow]) -> None:
     found = summarise(10.0, rows).common
     if found.tr is None:
-        assert max(one.acceptable[0, 0] for one in rows) > min(one.acceptable[0, 1] for one in rows)
+        assert max(one.acceptable[0, 0] for one in rows) > min(
+            one.acceptable[0, 1] for one in rows
+        )
         return
     for one in rows:
         for windows in (one.acceptable, *[one.alike] * bool(found.keeps_tolerance)):
@@ -227,11 +324,16 @@ def test_a_common_tr_lies_in_the_windows_of_all_runs(rows: list[StudyRow]) -> No
 
 def test_the_errors_at_the_common_tr_are_those_of_verify(tmp_path: Path) -> None:
     names = variants.variants(tmp_path)
-    for question in (ASKED, replace(ASKED, settings=Settings(replay=False, after=0.01))):
+    for question in (
+        ASKED,
+        replace(ASKED, settings=Settings(replay=False, after=0.01)),
+    ):
         answer = summarise(variants.TD, [ask(question, name) for name in names])
         tr = sure(answer.common.tr)
         for name, error in zip(names, answer.common.errors, strict=True):
-            own = verify(read_history([name]), tr, variants.TD, question.settings).candidate.error
+            own = verify(
+                read_history([name]), tr, variants.TD, question.settings
+            ).candidate.error
             assert error == pytest.approx(own, abs=1e-3)
 
 
@@ -245,11 +347,17 @@ def test_each_run_chooses_its_own_td_in_a_window(tmp_path: Path) -> None:
     assert len(set(times)) == len(names)
     assert all(window[0] <= td <= window[1] for td in times)
     for name, td in zip(names, times, strict=True):
-        assert verify(read_history([name]), sure(answer.common.tr), td, Settings()).verified
+        assert verify(
+            read_history([name]), sure(answer.common.tr), td, Settings()
+        ).verified
 
 
 def test_different_bases_and_units_are_told() -> None:
-    rows = [row("a", (1, 2)), row("b", (1, 2), basis="energy", warnings=("energy-only",)), row("c", time_unit="ms")]
+    rows = [
+        row("a", (1, 2)),
+        row("b", (1, 2), basis="energy", warnings=("energy-only",)),
+        row("c", time_unit="ms"),
+    ]
     told = {caution.code: caution.message for caution in summarise(10.0, rows).cautions}
     assert told == {
         "mixed-units": "the times of the runs have different units, td has only one: not named in 2 runs, ms in 1 run",
@@ -288,7 +396,10 @@ def test_every_match_of_a_pattern_is_a_run_and_what_matches_nothing_stays() -> N
         Path(name).mkdir()
         (Path(name) / "glstat").write_bytes(b"")
     Path("odd[1].csv").write_bytes(b"")
-    assert find_runs(["*/glstat"]) == (os.path.join("a", "glstat"), os.path.join("b", "glstat"))  # noqa: PTH118
+    assert find_runs(["*/glstat"]) == (
+        os.path.join("a", "glstat"),  # noqa: PTH118
+        os.path.join("b", "glstat"),  # noqa: PTH118
+    )
     assert find_runs(["?"]) == ("a", "b")
     assert find_runs(["odd[1].csv", "no*", "a"]) == ("odd[1].csv", "no*", "a")
 
@@ -297,7 +408,13 @@ def test_every_match_of_a_pattern_is_a_run_and_what_matches_nothing_stays() -> N
 def test_files_of_all_formats_are_rows_of_one_study() -> None:
     """One ends before td."""
     samples = sorted(str(path) for path in Path(BOX).parent.iterdir() if path.is_file())
-    sources = [*samples, *(stored(name) for name in ("chain_ref.csv.gz", "load_L1_ref.csv.gz", "car_all_T01.gz"))]
+    sources = [
+        *samples,
+        *(
+            stored(name)
+            for name in ("chain_ref.csv.gz", "load_L1_ref.csv.gz", "car_all_T01.gz")
+        ),
+    ]
     rows = [ask(Question(0.05, Settings()), source) for source in sources]
     answer = summarise(0.05, rows)
     assert [found.source for found in answer.runs] == sources

@@ -42,7 +42,9 @@ def test_both_times_of_the_published_oscillator() -> None:
     assert found.recommended.tr == pytest.approx(paper.BETTER_TR, abs=1e-8)
     assert sure(found.recommended.residual) < 1e-3
     assert found.td_window == (0.06, 0.07)
-    assert all(candidate.rigid_time > 1e-4 for candidate in found.candidates)  # td itself is none
+    assert all(
+        candidate.rigid_time > 1e-4 for candidate in found.candidates
+    )  # td itself is none
 
 
 def test_of_equally_good_peaks_the_longest_rigid_window_wins() -> None:
@@ -50,14 +52,18 @@ def test_of_equally_good_peaks_the_longest_rigid_window_wins() -> None:
     history = of(np.sin(2 * np.pi * time) ** 2, time)
     found = suggest_in_window(history, (2.1, 3.6), PLAIN)
     # peaks at 2.25, 2.75, 3.25; the first with the sign of each at 0.25, 0.75, 0.25
-    assert (sure(found.recommended).tr, sure(found.recommended).td) == pytest.approx((0.25, 3.25), abs=1e-6)
+    assert (sure(found.recommended).tr, sure(found.recommended).td) == pytest.approx(
+        (0.25, 3.25), abs=1e-6
+    )
 
 
 def test_without_a_peak_in_the_window_one_of_its_ends_is_taken() -> None:
     found = suggest_in_window(paper.history(), (0.0635, 0.066), PLAIN)
     ends = [suggest(paper.history(), td, PLAIN).recommended for td in (0.0635, 0.066)]
     assert sure(found.recommended).td == 0.066
-    assert sure(found.recommended).residual == min(end.residual or 1 for end in ends if end)
+    assert sure(found.recommended).residual == min(
+        end.residual or 1 for end in ends if end
+    )
 
 
 def test_on_energy_alone_of_levels_alike_the_longest_rigid_window_wins() -> None:
@@ -68,16 +74,23 @@ def test_on_energy_alone_of_levels_alike_the_longest_rigid_window_wins() -> None
     assert sure(found.recommended).rigid_time > 0.27
     assert found.longer is None
     situation = found.situation
-    falls = {td: float(shortfall(np.array(history.energy_at(td)), mean)) for td in situation.peaks(0.13, 0.38)}
+    falls = {
+        td: float(shortfall(np.array(history.energy_at(td)), mean))
+        for td in situation.peaks(0.13, 0.38)
+    }
     level = falls[sure(found.recommended).td]
     assert level <= min(falls.values()) + PLAIN.tolerance
-    assert sure(found.expected).kinetic_share == pytest.approx(1 - situation.energy_td / (2 * mean))
+    assert sure(found.expected).kinetic_share == pytest.approx(
+        1 - situation.energy_td / (2 * mean)
+    )
 
 
 @pytest.mark.slow
 def test_td_is_not_taken_early_for_a_level_that_is_hardly_better() -> None:
     """The planar box, whose highest peak in flight is the third: 0.0989 to 0.1478 would be rigid for 0.049 s."""
-    found = suggest_in_window(history_of(simulate(Parameters(), 0.42)), (0.09, 0.379), PLAIN)
+    found = suggest_in_window(
+        history_of(simulate(Parameters(), 0.42)), (0.09, 0.379), PLAIN
+    )
     assert sure(found.recommended).td == pytest.approx(0.37, abs=1e-3)
     assert sure(found.recommended).rigid_time > 0.2
 
@@ -86,7 +99,9 @@ def test_what_is_given_up_for_a_higher_level_is_told() -> None:
     """The energy is high up to 6, then low, as it was before 0.5."""
     time = np.arange(0, 10, 0.01)
     high = (time > 0.5) & (time < 6)
-    energy = np.where(high, 1 + 0.3 * np.sin(5 * np.pi * time), 0.1 + 0.05 * np.sin(5 * np.pi * time))
+    energy = np.where(
+        high, 1 + 0.3 * np.sin(5 * np.pi * time), 0.1 + 0.05 * np.sin(5 * np.pi * time)
+    )
     history = of(energy, time)
     found = suggest_in_window(history, (1.0, 9.5), Settings(after=0.05, replay=False))
     assert sure(found.longer).rigid_time > 1.5 * sure(found.recommended).rigid_time
@@ -107,7 +122,9 @@ def test_without_a_window_the_longest_flight_is_searched_up_to_its_margin() -> N
 
 
 def test_no_oscillator_is_sought_again_for_peaks_without_an_acceptable_tr() -> None:
-    late = Settings(after=0.34)  # no tr lies between the end of the load and these peaks
+    late = Settings(
+        after=0.34
+    )  # no tr lies between the end of the load and these peaks
     history, fits = rollover(), CountedFits()
     for td in (0.30, 0.3175, 0.335):
         suggest_at(examine(history, td, late, fits))
@@ -121,8 +138,12 @@ def test_no_oscillator_is_sought_again_for_peaks_without_an_acceptable_tr() -> N
 def test_peaks_above_all_vibration_energy_are_not_locked_in() -> None:
     time = np.arange(0, 10, 0.02)
     rng = np.random.default_rng(2)
-    energy = sum(np.sin(w * time + rng.uniform(0, 6)) ** 2 for w in rng.uniform(4, 20, 15))
-    energy = np.asarray(energy) + 30 * np.exp(-(((time - 8.5) / 0.1) ** 2))  # a burst that is no vibration
+    energy = sum(
+        np.sin(w * time + rng.uniform(0, 6)) ** 2 for w in rng.uniform(4, 20, 15)
+    )
+    energy = np.asarray(energy) + 30 * np.exp(
+        -(((time - 8.5) / 0.1) ** 2)
+    )  # a burst that is no vibration
     history = of(energy, time)
     found = suggest_in_window(history, (8.0, 9.0), Settings(after=0.5))
     for t in (sure(found.recommended).tr, sure(found.recommended).td):
@@ -159,11 +180,19 @@ def test_the_record_ends_before_the_flight_of_an_oscillator_is_left() -> None:
 def test_the_means_of_the_computed_rollover_lie_between_the_expected_ones() -> None:
     """Above what comes back if all of the energy vibrates, and about what is expected if a part of it is at rest."""
     history = rollover()
-    table = np.genfromtxt(results("rollover_scan.csv"), delimiter=",", names=True, dtype=None, encoding=None)
+    table = np.genfromtxt(
+        results("rollover_scan.csv"),
+        delimiter=",",
+        names=True,
+        dtype=None,
+        encoding=None,
+    )
     situation = suggest(history, 0.37, PLAIN).situation
     flying = table[table["tr_s"] > 0.0885]
     computed = flying["IEmean_td_to_380ms_J"] / flying["IEmean_ref_J"]
-    found = [expectation(situation, history.energy_at(float(tr))) for tr in flying["tr_s"]]
+    found = [
+        expectation(situation, history.energy_at(float(tr))) for tr in flying["tr_s"]
+    ]
     low = np.array([one.ratio_low for one in found if one])
     high = np.array([one.ratio for one in found if one])
     assert np.all(low < computed)
@@ -175,7 +204,11 @@ def test_the_means_of_the_computed_car_are_expected() -> None:
     history = solved("carT01.gz", "1-17").history
     situation = examine(history, 0.1464, PLAIN)
     with results("car_runs.csv").open() as table:
-        rows = [row for row in csv.DictReader(table) if row["run"].startswith(("car_a", "car_b_all", "car_full"))]
+        rows = [
+            row
+            for row in csv.DictReader(table)
+            if row["run"].startswith(("car_a", "car_b_all", "car_full"))
+        ]
     flying = [row for row in rows if float(row["tr_s"]) > 0.0386]
     assert len(flying) == 12
     for row in flying:
@@ -205,13 +238,28 @@ def test_what_many_modes_give_back_is_expected(alpha: float) -> None:
     locked = rest + np.sum(deformations(np.array([tr])) ** 2)
     momentum = np.exp(-alpha * time)[:, None, None] * np.array([700.0, 0.0, 0.0])
     flying = Momenta(time, momentum, (Part(1, "box"),), EXACT, chosen=(0,))
-    history = History(time, energy, source=("made",), format="made", channel="energy", evidence=Given((flying,)))
+    history = History(
+        time,
+        energy,
+        source=("made",),
+        format="made",
+        channel="energy",
+        evidence=Given((flying,)),
+    )
     after = (time > td) & (time < td + 0.2)
-    released = deformations(np.array([tr])) * np.cos(rates[:, None] * (time[after] - td))
-    switched = rest + np.mean(np.sum(released**2, axis=0) * np.exp(-alpha * (time[after] - td)))
+    released = deformations(np.array([tr])) * np.cos(
+        rates[:, None] * (time[after] - td)
+    )
+    switched = rest + np.mean(
+        np.sum(released**2, axis=0) * np.exp(-alpha * (time[after] - td))
+    )
     alone = suggest(history, td, Settings(replay=False)).situation
     expected = sure(expectation(alone, float(locked)))
-    assert sure(expected.ratio_low) < switched / energy[after].mean() < sure(expected.ratio)
+    assert (
+        sure(expected.ratio_low)
+        < switched / energy[after].mean()
+        < sure(expected.ratio)
+    )
     assert expected.resting_energy == pytest.approx(energy[time <= td].min())
     for situation in (alone, suggest(history, td, PLAIN).situation):
         kept = sure(kept_mean_energy(situation, judge(situation, [tr])[0]))
@@ -226,18 +274,32 @@ def test_value_prints_both_times_with_one_blank() -> None:
     tr, td = result.stdout.removesuffix("\n").split(" ")
     found = answer("suggest", "--td-window", "0.06", "0.07", ENERGY)
     assert {"tr": float(tr), "td": float(td)} == found["recommended"]
-    assert (result.exit_code, found["td"], found["td_window"]) == (0, float(td), [0.06, 0.07])
+    assert (result.exit_code, found["td"], found["td_window"]) == (
+        0,
+        float(td),
+        [0.06, 0.07],
+    )
 
 
 def test_the_expected_run_time_is_told_by_suggest_and_verify() -> None:
     saving = ("--cost-share", "0.8", "--step-ratio", "2")
     found = answer("suggest", "--td", "0.064", *saving, ENERGY)
     best = found["candidates"][0]
-    assert best["run_time_share"] == pytest.approx(1 - best["rigid_fraction"] * (1 - 0.2 / 2))
-    judged = answer("verify", "--td", "0.064", "--tr", repr(best["tr"]), *saving, ENERGY)
+    assert best["run_time_share"] == pytest.approx(
+        1 - best["rigid_fraction"] * (1 - 0.2 / 2)
+    )
+    judged = answer(
+        "verify", "--td", "0.064", "--tr", repr(best["tr"]), *saving, ENERGY
+    )
     assert judged["run_time_share"] == pytest.approx(best["run_time_share"])
-    assert "rigid for 34% of the record" in run("suggest", "--td", "0.064", *saving, ENERGY).stdout
-    assert answer("suggest", "--td", "0.064", ENERGY)["candidates"][0]["run_time_share"] is None
+    assert (
+        "rigid for 34% of the record"
+        in run("suggest", "--td", "0.064", *saving, ENERGY).stdout
+    )
+    assert (
+        answer("suggest", "--td", "0.064", ENERGY)["candidates"][0]["run_time_share"]
+        is None
+    )
 
 
 def rigid_time(situation: Situation) -> float:
@@ -259,9 +321,13 @@ def test_no_recommended_tr_lies_further_back_than_the_bound(
     rng = np.random.default_rng(seed)
     time = np.linspace(0.0, 1.0, 120)
     rates, phases = rng.uniform(5, 60, 4), rng.uniform(0, 3, 4)
-    energy = np.exp(-decay * time) * (np.sin(time[:, np.newaxis] * rates + phases) ** 2).sum(axis=1)
+    energy = np.exp(-decay * time) * (
+        np.sin(time[:, np.newaxis] * rates + phases) ** 2
+    ).sum(axis=1)
     energy += noise * rng.standard_normal(time.size)
-    start = examine(of(energy, time), 0.8, Settings(tolerance=tolerance, after=after, replay=False))
+    start = examine(
+        of(energy, time), 0.8, Settings(tolerance=tolerance, after=after, replay=False)
+    )
     tds = rng.choice(time[1:], 12)
     bounds = longest_rigid_times(start, tds)
     for td, bound in zip(tds.tolist(), bounds.tolist(), strict=True):
@@ -283,7 +349,10 @@ def test_the_bound_is_near_where_the_energy_passes_the_level() -> None:
 def test_where_a_model_decides_the_flight_alone_is_the_bound() -> None:
     history = paper.history()
     situation = examine(history, 0.064, Settings(after=0.01))
-    assert longest_rigid_times(situation, np.array([0.05, 0.064])).tolist() == [0.04, 0.054]
+    assert longest_rigid_times(situation, np.array([0.05, 0.064])).tolist() == [
+        0.04,
+        0.054,
+    ]
 
 
 def test_without_a_start_of_the_flight_nothing_is_rigid() -> None:

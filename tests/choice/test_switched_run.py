@@ -28,22 +28,37 @@ def files(tmp_path: Path) -> list[str]:
         column(3 + np.cos(31 * TIME), moves, "car"),
         column(1e-9 * swing, moves, "dust"),
     )
-    lines = {"time": TIME, "kinetic energy": 2 * moves, "internal energy": parts[0][1] + parts[1][1]}
-    for name, content in (("matsum", matsum.write("bodies", TIME, parts)), ("glstat", glstat.write("bodies", lines))):
+    lines = {
+        "time": TIME,
+        "kinetic energy": 2 * moves,
+        "internal energy": parts[0][1] + parts[1][1],
+    }
+    for name, content in (
+        ("matsum", matsum.write("bodies", TIME, parts)),
+        ("glstat", glstat.write("bodies", lines)),
+    ):
         (tmp_path / name).write_bytes(content)
     return [str(tmp_path / name) for name in ("matsum", "glstat")]
 
 
 @pytest.mark.parametrize(
     ("asked", "done"),
-    [((), False), (("engine",), True), (("car",), None), (("engine", "car"), False), (("engine", "dust"), True)],
+    [
+        ((), False),
+        (("engine",), True),
+        (("car",), None),
+        (("engine", "car"), False),
+        (("engine", "dust"), True),
+    ],
 )
 def test_a_window_is_done_only_where_the_parts_of_the_question_were_rigid(
     files: list[str], asked: tuple[str, ...], done: bool | None
 ) -> None:
     reference = read(files, Selection(parts=asked))
     history, windows, cautions = switched_history(reference, ())
-    assert [time for window in windows for time in window] == pytest.approx([0.3, 0.7] * bool(done))
+    assert [time for window in windows for time in window] == pytest.approx(
+        [0.3, 0.7] * bool(done)
+    )
     said = {None: [], True: ["rigid-times"], False: ["partly-rigid"]}[done]
     assert [one.code for one in cautions] == said
     if done is False:

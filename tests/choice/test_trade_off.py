@@ -23,7 +23,9 @@ from tests.reading import read
 SAMPLES = {"energy.csv": Selection(), "rollover_box.matsum": Selection(parts=("box",))}
 
 
-def check(found: TradeOff, history: History, asked: Settings, offers: list[Offer]) -> None:
+def check(
+    found: TradeOff, history: History, asked: Settings, offers: list[Offer]
+) -> None:
     """Hold offers against what ``suggest`` says of their td."""
     fits = Fits()
     for one in offers:
@@ -32,11 +34,18 @@ def check(found: TradeOff, history: History, asked: Settings, offers: list[Offer
         assert (one.basis, one.energy_td, one.kinetic_share) == (
             alone.situation.basis, alone.situation.energy_td, alone.situation.kinetic_share,
         )  # fmt: skip
-        shown, asked_for = ([(it.start, it.end) for it in answer.windows or ()] for answer in (one.answer, alone))
+        shown, asked_for = (
+            [(it.start, it.end) for it in answer.windows or ()]
+            for answer in (one.answer, alone)
+        )
         np.testing.assert_allclose(shown, asked_for, rtol=1e-6)
         assert (one.answer.expected is None) == (alone.expected is None)
-        assert (one.quality and one.quality.grade) == (alone.quality and alone.quality.grade)
-        assert one.answer.why_none == "; ".join(it.message for it in alone.cautions if it.code == "no-candidate")
+        assert (one.quality and one.quality.grade) == (
+            alone.quality and alone.quality.grade
+        )
+        assert one.answer.why_none == "; ".join(
+            it.message for it in alone.cautions if it.code == "no-candidate"
+        )
     assert all(low.td < high.td for low, high in pairwise(found.offers))
     unbeaten(found)
 
@@ -52,10 +61,16 @@ def unbeaten(found: TradeOff) -> None:
         pairs = [
             (one.unbeaten, round(one.error, 3), as_read(one.best.rigid_time))
             for one in found.offers
-            if one.best and one.error is not None and not one.best.same_swing and (one.basis != "energy") == known
+            if one.best
+            and one.error is not None
+            and not one.best.same_swing
+            and (one.basis != "energy") == known
         ]
         for marked, error, rigid in pairs:
-            beaten = any((e < error and r >= rigid) or (e <= error and r > rigid) for _, e, r in pairs)
+            beaten = any(
+                (e < error and r >= rigid) or (e <= error and r > rigid)
+                for _, e, r in pairs
+            )
             assert marked != beaten
 
 
@@ -64,7 +79,9 @@ def test_every_td_of_a_sample_is_answered_as_suggest_answers_it(name: str) -> No
     known = read([str(ROOT / "sample_data" / name)], SAMPLES[name])
     found = explore_of(known, Settings(), steps=4)
     low, high = found.td_window
-    cells = np.searchsorted(np.linspace(low, high, 5)[1:], [one.td - 1e-12 for one in found.offers])
+    cells = np.searchsorted(
+        np.linspace(low, high, 5)[1:], [one.td - 1e-12 for one in found.offers]
+    )
     assert set(cells.tolist()) == set(range(4))
     assert sum(one.recommended for one in found.offers) == 1
     check(found, known.history, Settings(), [*found.offers][:: len(found.offers) // 2])
@@ -86,7 +103,11 @@ def histories(draw: st.DrawFn) -> History:
     time = np.linspace(0.0, 1.0, states)
     energy = np.zeros(states)
     for _ in range(draw(st.integers(1, 4))):
-        rate, share, phase = draw(st.floats(1.5, 12.0)), draw(st.floats(0.2, 1.0)), draw(st.floats(0.0, 3.1))
+        rate, share, phase = (
+            draw(st.floats(1.5, 12.0)),
+            draw(st.floats(0.2, 1.0)),
+            draw(st.floats(0.0, 3.1)),
+        )
         energy += share * np.sin(2 * np.pi * rate * time + phase) ** 2
     energy *= np.exp(-draw(st.floats(0.0, 1.5)) * time)
     energy[time < draw(st.floats(0.0, 0.3))] += draw(st.floats(0.0, 5.0))
@@ -96,7 +117,9 @@ def histories(draw: st.DrawFn) -> History:
     return of(energy + share * noise, time)
 
 
-@pytest.mark.parametrize("seed", [9, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 6, 10))])
+@pytest.mark.parametrize(
+    "seed", [9, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 6, 10))]
+)
 def test_no_td_beats_the_one_that_is_chosen_by_the_level_alone(seed: int) -> None:
     """Of forty modes, for whose td an oscillator is not sought everywhere."""
     rng, time = np.random.default_rng(seed), np.linspace(0, 1, 900)
@@ -106,7 +129,10 @@ def test_no_td_beats_the_one_that_is_chosen_by_the_level_alone(seed: int) -> Non
     )
     energy = energy * np.exp(-0.8 * time) + 60 * np.exp(-(((time - 0.06) / 0.01) ** 2))
     found = explore_of(reference(of(energy, time)), Settings(), None, steps=40)
-    assert (sure(found.recommended).basis, found.suggestion.situation.flight.source) == ("energy", "energy")
+    assert (
+        sure(found.recommended).basis,
+        found.suggestion.situation.flight.source,
+    ) == ("energy", "energy")
     assert sure(found.recommended).unbeaten
 
 
@@ -115,7 +141,11 @@ def test_equal_pairs_do_not_beat_each_other_by_rounding() -> None:
     found = explore_of(read(["sample_data/energy.csv"]), Settings(), None, steps=20)
     unbeaten(found)
     peaks = [one for one in found.offers if one.peak and one.best]
-    alike = [one for one in peaks if as_read(one.best.rigid_time) == as_read(peaks[-1].best.rigid_time)]  # type: ignore[union-attr]
+    alike = [
+        one
+        for one in peaks
+        if as_read(one.best.rigid_time) == as_read(peaks[-1].best.rigid_time)  # type: ignore[union-attr]
+    ]
     assert len(alike) > 1
     assert {one.unbeaten for one in alike} == {True}
 
@@ -127,7 +157,9 @@ def test_every_td_of_any_record_is_answered_as_suggest_answers_it(
     history: History, td: float, after: float | None
 ) -> None:
     asked = Settings(after=after)
-    found = explore_of(reference(history), asked, (td - 0.15, td + 0.15), td=td, steps=6)
+    found = explore_of(
+        reference(history), asked, (td - 0.15, td + 0.15), td=td, steps=6
+    )
     assert sure(found.asked).td == td
     check(found, history, asked, [sure(found.asked), *found.offers[::6]])
 
@@ -139,7 +171,9 @@ def test_candidates_before_the_flight_never_change_what_is_best(
     history: History, td: float, after: float, replay: bool
 ) -> None:
     situation = examine(history, td, Settings(after=after, replay=replay))
-    every, flying = (next(candidates_at([situation], in_flight=one)) for one in (False, True))
+    every, flying = (
+        next(candidates_at([situation], in_flight=one)) for one in (False, True)
+    )
     assert flying.chosen == every.chosen
     if situation.basis == "energy":
         assert sorted(flying.tr) == sorted(every.tr[every.tr >= after])
@@ -148,14 +182,20 @@ def test_candidates_before_the_flight_never_change_what_is_best(
 def test_the_flight_beside_a_td_is_the_one_that_suggest_names() -> None:
     """The energy alone shows another flight to each td; that of the window's start was shown."""
     time = np.linspace(0.0, 1.0, 2001)
-    energy = np.exp(-6 * time) * np.sin(250 * time) ** 2 + 0.4 * np.exp(-3 * time) * np.sin(611 * time) ** 2
+    energy = (
+        np.exp(-6 * time) * np.sin(250 * time) ** 2
+        + 0.4 * np.exp(-3 * time) * np.sin(611 * time) ** 2
+    )
     history = of(energy + 5 * np.exp(-(((time - 0.01) / 0.006) ** 2)), time)
     asked = Settings(replay=False)
     alone = suggest(history, 0.37, asked).situation.flight
     assert alone.source == "energy"
     found = explore_of(reference(history), asked, (0.27, 1.0), td=0.37, steps=4)
     assert found.situation.flight == alone
-    assert explore_of(reference(history), asked, (0.27, 1.0), steps=4).situation.flight != alone
+    assert (
+        explore_of(reference(history), asked, (0.27, 1.0), steps=4).situation.flight
+        != alone
+    )
 
 
 @pytest.mark.slow
@@ -180,12 +220,16 @@ def test_no_offer_beats_the_one_that_is_recommended(
     file: str, selection: Selection, window: tuple[float, float] | None, steps: int
 ) -> None:
     asked = Settings(replay=file == "energy.csv")
-    found = explore_of(read([f"sample_data/{file}"], selection), asked, window, steps=steps)
+    found = explore_of(
+        read([f"sample_data/{file}"], selection), asked, window, steps=steps
+    )
     assert found.recommended is not None
     assert found.recommended.unbeaten
     if file == "rollover.csv":
         alone = suggest_of(read([f"sample_data/{file}"], selection), window, asked)
-        assert (found.recommended.tr, found.recommended.td) == sure(alone.recommended)[:2]
+        assert (found.recommended.tr, found.recommended.td) == sure(alone.recommended)[
+            :2
+        ]
 
 
 @pytest.mark.slow
@@ -194,5 +238,9 @@ def test_a_level_that_stays_the_same_is_graded_alike_at_each_td() -> None:
     time = np.linspace(0, 1, 2001)
     energy = 1000 + 0.05 * np.sin(400 * time) * np.sin(731 * time)
     found = explore_of(reference(of(energy, time)), Settings(after=0.1, replay=False))
-    grades = {one.quality.grade for one in found.offers if one.quality and one.best and not one.best.same_swing}
+    grades = {
+        one.quality.grade
+        for one in found.offers
+        if one.quality and one.best and not one.best.same_swing
+    }
     assert grades == {"poor"}  # nothing tells the deformation

@@ -17,23 +17,33 @@ from tests.energies import of, sure
 
 TIME = np.linspace(0, 1, 2001)
 # Two modes in flight up to 0.8, and a crash of which nothing is told; the mean up to td is far below the energy there.
-ENERGY = (2 + np.sin(90 * TIME) + 0.8 * np.sin(173 * TIME)) * np.where(TIME > 0.8, 50.0, 1.0)
+ENERGY = (2 + np.sin(90 * TIME) + 0.8 * np.sin(173 * TIME)) * np.where(
+    TIME > 0.8, 50.0, 1.0
+)
 
 
 def situation_at(td: float, energy: np.ndarray = ENERGY) -> Situation:
     """See the record from a td in a flight from 0.1 of which no end is known."""
     found = examine(of(energy, TIME), td, Settings(after=0.1, replay=False))
-    return replace(found, flight=found.flight._replace(start=0.1, end=None, refusal=None))
+    return replace(
+        found, flight=found.flight._replace(start=0.1, end=None, refusal=None)
+    )
 
 
-def test_a_pair_that_gives_back_more_than_there_is_is_refused_by_all_that_judge_it() -> None:
+def test_a_pair_that_gives_back_more_than_there_is_is_refused_by_all_that_judge_it() -> (
+    None
+):
     situation = situation_at(0.95)
     assert expectation(situation, situation.energy_td).ratio > 2  # type: ignore[union-attr, operator]
     answer = suggest_at(situation, with_better=False)
     assert answer.recommended is None
     (why,) = (one.message for one in answer.cautions if one.code == "no-candidate")
     assert "times that of the reference, more than 1.2 times" in why
-    crossing = next(one for one in answer.candidates if one.level_error == pytest.approx(0, abs=1e-6))
+    crossing = next(
+        one
+        for one in answer.candidates
+        if one.level_error == pytest.approx(0, abs=1e-6)
+    )
     verdict = verify_at(situation, crossing.tr)
     assert not verdict.verified
     assert "times that of the reference" in verdict.reasons[0]

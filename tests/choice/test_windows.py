@@ -22,7 +22,13 @@ from d2rpick.choice.windows import (
     error_profile,
 )
 from d2rpick.flight.flight import Flight
-from d2rpick.flight.margin import SHARE, grazes, landing_moves, landing_spread, margin_before_contact
+from d2rpick.flight.margin import (
+    SHARE,
+    grazes,
+    landing_moves,
+    landing_spread,
+    margin_before_contact,
+)
 from d2rpick.histories.history import EXACT, Balance, Given, History, Momenta, Samples
 from d2rpick.histories.opening import Selection
 from d2rpick.vibration.modes import Mode
@@ -49,7 +55,9 @@ def flying_oscillator(
     balance = Balance(time, internal=internal, kinetic=kinetic)
     whole = Momenta(time, momentum, None, EXACT, (0,), masses=np.array([mass]))
     evidence = Given((whole,), balance)
-    history = History(time, internal, source=("test",), format="csv", channel="E", evidence=evidence)
+    history = History(
+        time, internal, source=("test",), format="csv", channel="E", evidence=evidence
+    )
     return history, Flight(0.0, float(time[-1]), "momentum")
 
 
@@ -65,7 +73,10 @@ def test_the_landing_moves_by_the_amplitude_over_the_speed(
 
 def test_the_larger_of_share_and_spread_counts() -> None:
     history, flight = flying_oscillator(10.0, 1e-4, 1.0, 2.0)
-    assert margin_before_contact(history, flight)[:2] == (SHARE * sure(flight.end), "flight")
+    assert margin_before_contact(history, flight)[:2] == (
+        SHARE * sure(flight.end),
+        "flight",
+    )
     history, flight = flying_oscillator(10.0, 0.1, 1.0, 2.0, periods=2)
     found = margin_before_contact(history, flight)
     assert (found.source, found.time) == ("landing", found.spread)
@@ -74,9 +85,17 @@ def test_the_larger_of_share_and_spread_counts() -> None:
 
 def test_without_a_contact_or_energies_nothing_is_made_up() -> None:
     history, flight = flying_oscillator(10.0, 1.0, 1.0, 2.0)
-    assert margin_before_contact(history, flight._replace(end=None)) == (0.0, "no-contact", None)
+    assert margin_before_contact(history, flight._replace(end=None)) == (
+        0.0,
+        "no-contact",
+        None,
+    )
     bare = of(history.energy, history.time)
-    assert margin_before_contact(bare, flight) == (SHARE * history.time[-1], "flight", None)
+    assert margin_before_contact(bare, flight) == (
+        SHARE * history.time[-1],
+        "flight",
+        None,
+    )
 
 
 @given(st.floats(0.001, 0.05), positive)
@@ -85,7 +104,9 @@ def test_a_body_out_of_place_reaches_the_contact_earlier_by_that_over_the_closin
 ) -> None:
     history, flight = flying_oscillator(10.0, 1e-4 * speed, speed, 2.0)
     spread = sure(landing_spread(history, flight))
-    assert landing_moves(history, flight, place) == pytest.approx(spread + place / speed, rel=1e-6)
+    assert landing_moves(history, flight, place) == pytest.approx(
+        spread + place / speed, rel=1e-6
+    )
     assert landing_moves(history, flight, None) == spread
     kept = margin_before_contact(history, flight, place=place)
     assert kept.time == max(SHARE * sure(flight.end), sure(kept.spread))
@@ -96,18 +117,26 @@ def touching(force: float) -> tuple[History, Flight]:
     time = np.linspace(0.0, 1.0, 2001)
     push = np.where(time < 0.1, 2000.0, np.where(time > 0.6, force, 0.0))
     momentum = np.zeros((time.size, 1, 3))
-    momentum[:, 0, 0] = np.concatenate([[0.0], np.cumsum((push[1:] + push[:-1]) / 2) * time[1]])
+    momentum[:, 0, 0] = np.concatenate(
+        [[0.0], np.cumsum((push[1:] + push[:-1]) / 2) * time[1]]
+    )
     momentum[:, 0, 2] = -2 * 9.81 * time
     internal = 0.01 * np.sin(60 * time) ** 2
     kinetic = (momentum[:, 0] ** 2).sum(axis=1) / 4 + 0.01 - internal
     whole = Momenta(time, momentum, None, EXACT, (0,), masses=np.array([2.0]))
     history = of(internal, time)
     evidence = Given((whole,), Balance(time, internal=internal, kinetic=kinetic))
-    return replace(history, evidence=evidence), Flight(0.1, 0.6, "momentum", gravity=9.81)
+    return replace(history, evidence=evidence), Flight(
+        0.1, 0.6, "momentum", gravity=9.81
+    )
 
 
-@pytest.mark.parametrize(("force", "grazed"), [(0.5, True), (19.0, True), (30.0, False), (3000.0, False)])
-def test_a_contact_below_a_hundredth_of_the_largest_force_is_a_grazing_one(force: float, grazed: bool) -> None:
+@pytest.mark.parametrize(
+    ("force", "grazed"), [(0.5, True), (19.0, True), (30.0, False), (3000.0, False)]
+)
+def test_a_contact_below_a_hundredth_of_the_largest_force_is_a_grazing_one(
+    force: float, grazed: bool
+) -> None:
     history, flight = touching(force)
     margin = margin_before_contact(history, flight, place=0.02)
     assert grazes(history, flight, 0.02) is grazed
@@ -119,13 +148,18 @@ def test_a_contact_below_a_hundredth_of_the_largest_force_is_a_grazing_one(force
 
 def test_a_grazing_contact_without_gravity_leaves_no_td() -> None:
     history, flight = touching(0.5)
-    assert margin_before_contact(history, flight._replace(gravity=0.0), place=0.02).time == np.inf
+    assert (
+        margin_before_contact(history, flight._replace(gravity=0.0), place=0.02).time
+        == np.inf
+    )
 
 
 def test_where_no_force_is_known_no_contact_grazes() -> None:
     history, flight = touching(0.5)
     assert not grazes(of(history.energy, history.time), flight, 0.02)
-    assert not grazes(history, flight._replace(end=0.99), 0.02)  # the record ends too early
+    assert not grazes(
+        history, flight._replace(end=0.99), 0.02
+    )  # the record ends too early
 
 
 def test_a_grazing_contact_is_said_and_td_keeps_clear_of_it() -> None:
@@ -133,13 +167,17 @@ def test_a_grazing_contact_is_said_and_td_keeps_clear_of_it() -> None:
     answer = suggest(history, 0.59, Settings())
     told = {one.code: one.message for one in answer.cautions}
     assert "stays below 1 % of the largest one" in told["grazing-contact"]
-    assert "grazing-contact" not in {one.code for one in suggest(touching(3000.0)[0], 0.59, Settings()).cautions}
+    assert "grazing-contact" not in {
+        one.code for one in suggest(touching(3000.0)[0], 0.59, Settings()).cautions
+    }
 
 
 def landings(name: str, column: str) -> Iterator[tuple[str, float]]:
     """Name of each computed run, and a number of it."""
     with results(name).open() as file:
-        yield from ((row["run"], float(row[column] or "nan")) for row in csv.DictReader(file))
+        yield from (
+            (row["run"], float(row[column] or "nan")) for row in csv.DictReader(file)
+        )
 
 
 def test_the_landings_of_the_switched_car_lie_within_the_margin() -> None:
@@ -147,9 +185,20 @@ def test_the_landings_of_the_switched_car_lie_within_the_margin() -> None:
     history = solved("carT01.gz").history
     flight = flights_of(history, Settings())[-1]
     margin = margin_before_contact(history, flight)
-    starts, ends = dict(landings("car_runs.csv", "tr_s")), dict(landings("car_runs.csv", "td_s"))
-    kept = [name for name in starts if starts[name] > (flight.start or 0) and ends[name] < 0.15]
-    moved = [abs(landing - 0.15041) for name, landing in landings("car_runs.csv", "landing_s") if name in kept]
+    starts, ends = (
+        dict(landings("car_runs.csv", "tr_s")),
+        dict(landings("car_runs.csv", "td_s")),
+    )
+    kept = [
+        name
+        for name in starts
+        if starts[name] > (flight.start or 0) and ends[name] < 0.15
+    ]
+    moved = [
+        abs(landing - 0.15041)
+        for name, landing in landings("car_runs.csv", "landing_s")
+        if name in kept
+    ]
     assert len(moved) > 15
     assert max(moved) == pytest.approx(1.1e-3, abs=1e-4)
     assert max(moved) < margin.time
@@ -158,11 +207,18 @@ def test_the_landings_of_the_switched_car_lie_within_the_margin() -> None:
 
 
 @pytest.mark.parametrize(
-    ("run", "column", "end"), [("drop2_w2", "dland4_ms", 0.4196), ("drop2_w3", "dland7_ms", 0.5966)]
+    ("run", "column", "end"),
+    [("drop2_w2", "dland4_ms", 0.4196), ("drop2_w3", "dland7_ms", 0.5966)],
 )
-def test_the_landings_of_the_switched_box_lie_within_the_margin(run: str, column: str, end: float) -> None:
+def test_the_landings_of_the_switched_box_lie_within_the_margin(
+    run: str, column: str, end: float
+) -> None:
     history = solved("drop2T01.gz").history
-    (flight,) = (one for one in flights_of(history, Settings()) if one.end == pytest.approx(end, abs=1e-3))
+    (flight,) = (
+        one
+        for one in flights_of(history, Settings())
+        if one.end == pytest.approx(end, abs=1e-3)
+    )
     moved = abs(dict(landings("drop2_runs.csv", column))[run]) / 1e3
     assert 1e-3 < moved < margin_before_contact(history, flight).time
 
@@ -173,7 +229,9 @@ PAPER = of(ENERGY, TIME)
 
 def windows_of(answer: Suggestion) -> Samples:
     own = answer.recommended
-    return acceptable_windows(answer.situation, answer.candidates, own.tr if own else None)
+    return acceptable_windows(
+        answer.situation, answer.candidates, own.tr if own else None
+    )
 
 
 def holds(windows: Samples, times: Samples) -> Samples:
@@ -192,12 +250,21 @@ def check(answer: Suggestion, seed: int) -> None:
     rng = np.random.default_rng(seed)
     ends = windows[rng.permutation(len(windows))[:3]]
     inside = rng.uniform(ends[:, :1], ends[:, 1:], (len(ends), 2))
-    assert all(verify_at(situation, t).verified for t in [*ends.ravel(), *inside.ravel()])
+    assert all(
+        verify_at(situation, t).verified for t in [*ends.ravel(), *inside.ravel()]
+    )
     # what ``verify`` accepts anywhere else lies on the swing of td, where nothing outside of the tolerance follows
     last = max([windows[-1, 1]] if len(windows) else [history.time[0]])
-    anywhere = rng.uniform(history.time[0], last, 8) if last > history.time[0] else np.zeros(0)
-    clear = anywhere[np.min(np.abs(anywhere[:, np.newaxis] - [*windows.ravel(), np.inf]), axis=1) > 1e-5 * history.step]
-    assert [verify_at(situation, t).verified for t in clear] == holds(windows, clear).tolist()
+    anywhere = (
+        rng.uniform(history.time[0], last, 8) if last > history.time[0] else np.zeros(0)
+    )
+    clear = anywhere[
+        np.min(np.abs(anywhere[:, np.newaxis] - [*windows.ravel(), np.inf]), axis=1)
+        > 1e-5 * history.step
+    ]
+    assert [verify_at(situation, t).verified for t in clear] == holds(
+        windows, clear
+    ).tolist()
     # the errors in the windows are those of ``verify``; where nothing vibrates there are none
     profile = error_profile(situation, answer.candidates, windows)
     for t in inside.ravel()[:4]:
@@ -215,13 +282,25 @@ def test_windows_of_an_oscillator_hold_what_verifies(
     omega: float, alpha: float, phase: float, td: float, tolerance: float, plastic: float, preload: float,
     after: float | None, limit: float | None, seed: int,
 ) -> None:  # fmt: skip
-    mode = Mode(omega, alpha, 10 * np.cos(phase), 10 * np.sin(phase), 0.0, plastic, preload)
+    mode = Mode(
+        omega, alpha, 10 * np.cos(phase), 10 * np.sin(phase), 0.0, plastic, preload
+    )
     history = of(mode.energy(TIME[::3]), TIME[::3])
-    answer = suggest(history, td, Settings(tolerance=tolerance, after=after, max_residual=limit))
+    answer = suggest(
+        history, td, Settings(tolerance=tolerance, after=after, max_residual=limit)
+    )
     check(answer, seed)
 
 
-@example(energy=[0, 1, 0, -1, 1], share=1.0, tolerance=1.0, after=0.0, seed=60, uneven=False, margin=0.0)
+@example(
+    energy=[0, 1, 0, -1, 1],
+    share=1.0,
+    tolerance=1.0,
+    after=0.0,
+    seed=60,
+    uneven=False,
+    margin=0.0,
+)
 @settings(max_examples=12)
 @given(
     energy=st.lists(st.floats(-1, 100), min_size=5, max_size=60), share=st.floats(0.3, 1.0),
@@ -229,22 +308,37 @@ def test_windows_of_an_oscillator_hold_what_verifies(
     uneven=st.booleans(), margin=st.sampled_from([0.0, 0.07]),
 )  # fmt: skip
 def test_windows_of_any_energy_hold_what_verifies(
-    energy: list[float], share: float, tolerance: float, after: float | None, seed: int, uneven: bool, margin: float
+    energy: list[float],
+    share: float,
+    tolerance: float,
+    after: float | None,
+    seed: int,
+    uneven: bool,
+    margin: float,
 ) -> None:
     time = np.linspace(0, 1, len(energy)) ** (1.5 if uneven else 1.0)
     history = of(np.array(energy), time)
-    asked = Settings(tolerance=tolerance, after=after and after * time[-2], margin=margin, replay=False)
+    asked = Settings(
+        tolerance=tolerance,
+        after=after and after * time[-2],
+        margin=margin,
+        replay=False,
+    )
     assume(share > float(asked.after or 0))
     check(suggest(history, share, asked), seed)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("tolerance", [0.05, 0.6])
-def test_windows_of_a_record_with_noise_and_of_a_real_one_hold_what_verifies(tolerance: float) -> None:
+def test_windows_of_a_record_with_noise_and_of_a_real_one_hold_what_verifies(
+    tolerance: float,
+) -> None:
     record = of(noisy(ENERGY, 0.002, 5), TIME)
     rollover = read_history([ROLLOVER], Selection(energy=("boxIE_J",)))
     for history, td in ((record, TD), (rollover, 0.37)):
-        answer = suggest(history, td, Settings(tolerance=tolerance, replay=tolerance < 0.5))
+        answer = suggest(
+            history, td, Settings(tolerance=tolerance, replay=tolerance < 0.5)
+        )
         assert len(windows_of(answer))
         check(answer, 1)
 
@@ -263,7 +357,9 @@ def test_windows_of_several_parts_and_modes_hold_what_verifies(td: float) -> Non
     assert len(windows_of(parts))
 
 
-def test_the_windows_of_the_published_record_are_around_the_crossings_of_equal_sign() -> None:
+def test_the_windows_of_the_published_record_are_around_the_crossings_of_equal_sign() -> (
+    None
+):
     answer = suggest(PAPER, TD, Settings())
     windows = windows_of(answer)
     acceptable = np.array(sorted(c.tr for c in answer.candidates if c.acceptable))
@@ -299,18 +395,32 @@ def test_where_nothing_verifies_there_is_no_window(asked: Settings) -> None:
     assert not windows_of(suggest(PAPER, TD, asked)).size
 
 
-def test_what_is_alike_reaches_as_far_as_the_timing_tolerance_and_no_error_in_it_is_larger() -> None:
+def test_what_is_alike_reaches_as_far_as_the_timing_tolerance_and_no_error_in_it_is_larger() -> (
+    None
+):
     """On the level alone the level error grows by 0.05."""
-    for history, asked in ((PAPER, Settings()), (PAPER, Settings(replay=False, after=0.005))):
+    for history, asked in (
+        (PAPER, Settings()),
+        (PAPER, Settings(replay=False, after=0.005)),
+    ):
         answer = suggest(history, TD, asked)
         best = sure(answer.chosen)
-        windows = alike_windows(answer.situation, answer.candidates, best, windows_of(answer))
+        windows = alike_windows(
+            answer.situation, answer.candidates, best, windows_of(answer)
+        )
         (around,) = (one for one in windows.tolist() if one[0] <= best.tr <= one[1])
         if best.timing_tolerance is not None:
-            assert min(abs(end - best.tr) for end in around) == pytest.approx(best.timing_tolerance, rel=1e-3)
+            assert min(abs(end - best.tr) for end in around) == pytest.approx(
+                best.timing_tolerance, rel=1e-3
+            )
         ends = [verify(history, end, TD, asked).candidate for end in windows.ravel()]
-        errors = [one.level_error if one.lock_in_error is None else one.lock_in_error for one in (best, *ends)]
-        assert errors[1:] == pytest.approx([sure(errors[0]) + 0.05] * len(ends), abs=1e-6)
+        errors = [
+            one.level_error if one.lock_in_error is None else one.lock_in_error
+            for one in (best, *ends)
+        ]
+        assert errors[1:] == pytest.approx(
+            [sure(errors[0]) + 0.05] * len(ends), abs=1e-6
+        )
 
 
 def test_a_profile_is_short_where_the_error_is_smooth() -> None:
@@ -320,17 +430,24 @@ def test_a_profile_is_short_where_the_error_is_smooth() -> None:
     profile = error_profile(answer.situation, answer.candidates, windows)
     assert profile.shape[1] < 20 * len(windows)
     assert np.all(np.diff(profile[0]) > 0)
-    assert error_profile(answer.situation, answer.candidates, windows[:0]).shape == (2, 0)
+    assert error_profile(answer.situation, answer.candidates, windows[:0]).shape == (
+        2,
+        0,
+    )
 
 
 @pytest.mark.slow
 def test_two_oscillators_of_different_rate_share_what_both_verify() -> None:
     other = Mode(1.004 * OMEGA_2, MODE.alpha, MODE.cosine, MODE.sine, MODE.origin)
     histories = [PAPER, of(other.energy(TIME), TIME)]
-    both = common_windows([windows_of(suggest(history, 0.0687534, Settings())) for history in histories])
+    both = common_windows(
+        [windows_of(suggest(history, 0.0687534, Settings())) for history in histories]
+    )
     times = np.linspace(0.01, 0.06, 400)
     seen = [examine(history, 0.0687534, Settings()) for history in histories]
-    expected = [all(verify_at(situation, t).verified for situation in seen) for t in times]
+    expected = [
+        all(verify_at(situation, t).verified for situation in seen) for t in times
+    ]
     assert holds(both, times).tolist() == expected
     assert any(expected)
 
@@ -341,12 +458,18 @@ WINDOWS = st.lists(st.integers(0, 12), min_size=0, max_size=8, unique=True).map(
 
 
 @given(st.lists(WINDOWS, min_size=1, max_size=5))
-def test_coverage_counts_at_every_time_the_runs_with_a_window_there(runs: list[Samples]) -> None:
+def test_coverage_counts_at_every_time_the_runs_with_a_window_there(
+    runs: list[Samples],
+) -> None:
     stretches, counts = coverage(runs)
     times = np.arange(0, 12.5, 0.25)
     expected = np.sum([holds(windows, times) for windows in runs], axis=0)
-    held = (stretches[:, 0] <= times[:, np.newaxis]) & (times[:, np.newaxis] <= stretches[:, 1])
-    assert np.max(np.where(held, counts, 0), axis=1, initial=0).tolist() == list(expected)
+    held = (stretches[:, 0] <= times[:, np.newaxis]) & (
+        times[:, np.newaxis] <= stretches[:, 1]
+    )
+    assert np.max(np.where(held, counts, 0), axis=1, initial=0).tolist() == list(
+        expected
+    )
     shared = common_windows(runs)
     assert holds(shared, times).tolist() == [count == len(runs) for count in expected]
     assert np.all(shared[:, 0] <= shared[:, 1])
@@ -356,5 +479,7 @@ def test_a_suggestion_gives_its_windows_on_any_basis() -> None:
     for replay in (True, False):
         answer = suggest(PAPER, 0.0687534, Settings(replay=replay, after=0.005))
         windows = answer.acceptable_windows
-        assert any(start <= sure(answer.recommended).tr <= end for start, end in windows)
+        assert any(
+            start <= sure(answer.recommended).tr <= end for start, end in windows
+        )
         assert all(start < end for start, end in windows)

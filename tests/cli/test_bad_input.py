@@ -18,7 +18,9 @@ HEAD = "time,internal_energy\n"
 
 def table(energy: Callable[[float], float], states: int = 101) -> bytes:
     """Give a CSV file with an energy at every hundredth of a second."""
-    return (HEAD + "".join(f"{i / 100!r},{energy(i / 100)!r}\n" for i in range(states))).encode()
+    return (
+        HEAD + "".join(f"{i / 100!r},{energy(i / 100)!r}\n" for i in range(states))
+    ).encode()
 
 
 def with_line(number: int, line: str) -> bytes:
@@ -66,7 +68,9 @@ FILES = {
 @pytest.mark.parametrize("case", FILES)
 @pytest.mark.parametrize("command", ["suggest", "verify"])
 @pytest.mark.usefixtures("here")
-def test_a_file_that_cannot_be_used_is_named_with_what_is_wrong(command: str, case: str) -> None:
+def test_a_file_that_cannot_be_used_is_named_with_what_is_wrong(
+    command: str, case: str
+) -> None:
     content, args, parts = FILES[case]
     Path("input").write_bytes(content)
     first = ("suggest",) if command == "suggest" else ("verify", "--tr", "0")
@@ -103,9 +107,21 @@ OBJECTIONS = {
     "zero": (table(lambda _: 0.0), (), "no-energy"),
     "negative at td": (table(lambda t: math.cos(6 * t) - 0.5), (), "no-energy"),
     "only rising": (table(lambda t: t), (), "no-candidate"),
-    "td at the start": (table(lambda t: 1 + math.cos(9 * t)), ("--td", "0"), "no-candidate"),
-    "td in the load": (table(lambda t: 1 + math.cos(9 * t)), ("--after", "0.7"), "td-in-load"),
-    "end of the load unknown": (table(lambda t: 1 + t + math.cos(30 * t)), ("--no-verify",), "no-flight"),
+    "td at the start": (
+        table(lambda t: 1 + math.cos(9 * t)),
+        ("--td", "0"),
+        "no-candidate",
+    ),
+    "td in the load": (
+        table(lambda t: 1 + math.cos(9 * t)),
+        ("--after", "0.7"),
+        "td-in-load",
+    ),
+    "end of the load unknown": (
+        table(lambda t: 1 + t + math.cos(30 * t)),
+        ("--no-verify",),
+        "no-flight",
+    ),
 }
 
 
@@ -122,25 +138,42 @@ def test_a_record_without_an_answer_is_an_objection_and_says_why(case: str) -> N
     for form in ("table", "value"):
         result = run("suggest", "--td", "0.5", *args, "-f", form, "input")
         assert result.exit_code == 1
-        told = [line.split(": ")[1] for line in result.stderr.splitlines() if line.startswith("warning")]
-        in_table = {"no-candidate"} if form == "table" else {}  # the reason stands there
-        assert told == [warning["code"] for warning in found["warnings"] if warning["code"] not in in_table]
+        told = [
+            line.split(": ")[1]
+            for line in result.stderr.splitlines()
+            if line.startswith("warning")
+        ]
+        in_table = (
+            {"no-candidate"} if form == "table" else {}
+        )  # the reason stands there
+        assert told == [
+            warning["code"]
+            for warning in found["warnings"]
+            if warning["code"] not in in_table
+        ]
 
 
 @pytest.mark.slow
-def test_where_nothing_flies_a_td_is_asked_for_and_a_plan_is_an_objection(tmp_path: Path) -> None:
+def test_where_nothing_flies_a_td_is_asked_for_and_a_plan_is_an_objection(
+    tmp_path: Path,
+) -> None:
     file = put(tmp_path / "input", table(lambda t: t * t))
     for command in ("suggest", "explore"):
-        assert "shows a flight, in which td could be chosen; give the end of the load as --after" in refused(
-            command, str(file)
+        assert (
+            "shows a flight, in which td could be chosen; give the end of the load as --after"
+            in refused(command, str(file))
         )
     assert run("plan", str(file)).exit_code == 1
 
 
 def test_a_pair_in_the_load_is_an_objection_with_its_reason() -> None:
-    found = answer("verify", "--tr", "0.0128853", "--td", "0.064", "--after", "0.1", ENERGY)
+    found = answer(
+        "verify", "--tr", "0.0128853", "--td", "0.064", "--after", "0.1", ENERGY
+    )
     assert (found["verified"], found["tr_ok"]) == (False, False)
-    assert any("before the end of the load at 0.1" in reason for reason in found["reasons"])
+    assert any(
+        "before the end of the load at 0.1" in reason for reason in found["reasons"]
+    )
 
 
 def test_a_td_behind_the_next_contact_is_an_objection(tmp_path: Path) -> None:
@@ -152,8 +185,18 @@ def test_a_td_behind_the_next_contact_is_an_objection(tmp_path: Path) -> None:
     assert found["flight"]["end"] == pytest.approx(0.1, abs=1e-3)
     assert found["recommended"] is None
     assert "td-after-contact" in codes(found)
-    assert answer("verify", "--tr", "0.0135867", "--td", "0.09", "--margin", "0.02", str(file))["td_ok"] is False
-    assert answer("suggest", "--td", "0.0687534", "--margin", "0.005", str(file))["recommended"] is not None
+    assert (
+        answer(
+            "verify", "--tr", "0.0135867", "--td", "0.09", "--margin", "0.02", str(file)
+        )["td_ok"]
+        is False
+    )
+    assert (
+        answer("suggest", "--td", "0.0687534", "--margin", "0.005", str(file))[
+            "recommended"
+        ]
+        is not None
+    )
 
 
 def test_of_a_time_behind_a_cut_the_cut_is_said_before_a_unit(tmp_path: Path) -> None:
@@ -165,7 +208,9 @@ def test_of_a_time_behind_a_cut_the_cut_is_said_before_a_unit(tmp_path: Path) ->
 
 @pytest.mark.slow
 @pytest.mark.parametrize("source", [ENERGY, GLSTAT])
-def test_a_history_cut_anywhere_is_refused_or_answered_from_what_is_left(source: str, tmp_path: Path) -> None:
+def test_a_history_cut_anywhere_is_refused_or_answered_from_what_is_left(
+    source: str, tmp_path: Path
+) -> None:
     data, file = Path(source).read_bytes(), tmp_path / "cut"
     for size in [0, 1, 50, 200, 700, 5_000, len(data) // 2, len(data) - 1]:
         file.write_bytes(data[:size])
@@ -176,4 +221,6 @@ def test_a_history_cut_anywhere_is_refused_or_answered_from_what_is_left(source:
         if result.stdout:
             found = json.loads(result.stdout)
             assert found["history"]["time_end"] <= 0.15
-            assert found["recommended"]["tr"] == pytest.approx(0.0128852793630525, rel=1e-5)
+            assert found["recommended"]["tr"] == pytest.approx(
+                0.0128852793630525, rel=1e-5
+            )

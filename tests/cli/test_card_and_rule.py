@@ -29,7 +29,9 @@ def pasted(result: Result) -> list[tuple[int, float, float]]:
 
 def comments(text: str) -> str:
     """All comments of a card in one line."""
-    return " ".join(line.lstrip("$# ") for line in text.split("\n") if line.startswith(("$ ", "# ")))
+    return " ".join(
+        line.lstrip("$# ") for line in text.split("\n") if line.startswith(("$ ", "# "))
+    )
 
 
 # card, LS-DYNA.
@@ -38,13 +40,17 @@ def comments(text: str) -> str:
 def test_the_card_is_what_the_check_reads() -> None:
     result = run("card", *GOOD, "--part", "12,14-16", "--part", "11", "--merge", "11")
     assert (result.exit_code, result.stderr) == (0, "")
-    assert pasted(result) == [(part, 0.0135867, 0.0687534) for part in (11, 12, 14, 15, 16)]
+    assert pasted(result) == [
+        (part, 0.0135867, 0.0687534) for part in (11, 12, 14, 15, 16)
+    ]
     assert "        12        11      PART\n" in result.stdout
     assert all(len(line) <= 80 for line in result.stdout.split("\n"))
 
 
 def test_options_of_the_card() -> None:
-    text = run("card", *GOOD, "--part", "1", "--step-cap", "1e-5", "--swset", "7", "8").stdout
+    text = run(
+        "card", *GOOD, "--part", "1", "--step-cap", "1e-5", "--swset", "7", "8"
+    ).stdout
     assert re.findall(r"^ +([78]) ", text, flags=re.MULTILINE) == ["7", "8"]
     assert "    1.0e-5         1         0" in text
     assert "DTMAX is 0" not in text
@@ -54,7 +60,19 @@ def test_the_times_are_judged_as_they_are_printed() -> None:
     good = run("card", *GOOD, "--part", "1", "--history", ENERGY)
     assert good.exit_code == 0
     assert f"Judged by {ENERGY}, internal_energy: verified." in comments(good.stdout)
-    alone = run("card", "--tr", "0.1", "--td", "0.37", "--part", "1", "--solver", "ls-dyna", "--history", BOX)
+    alone = run(
+        "card",
+        "--tr",
+        "0.1",
+        "--td",
+        "0.37",
+        "--part",
+        "1",
+        "--solver",
+        "ls-dyna",
+        "--history",
+        BOX,
+    )
     assert ": verified by the energy level alone" in comments(alone.stdout)
     bad = run("card", *OPPOSITE, "--part", "1", "--history", ENERGY)
     assert bad.exit_code == 1
@@ -62,24 +80,52 @@ def test_the_times_are_judged_as_they_are_printed() -> None:
     assert "poor-td: 92%" in comments(bad.stdout)
     assert "warning: not-verified: the times as printed: opposite sign" in bad.stderr
     assert pasted(bad) == [(1, 0.0122659, 0.064)]
-    assert run("card", *OPPOSITE, "--part", "1", "--history", ENERGY, "--exit-zero").exit_code == 0
-    assert run("card", *GOOD, "--part", "1", "--history", ENERGY, "--after", "0.03").exit_code == 1
+    assert (
+        run(
+            "card", *OPPOSITE, "--part", "1", "--history", ENERGY, "--exit-zero"
+        ).exit_code
+        == 0
+    )
+    assert (
+        run(
+            "card", *GOOD, "--part", "1", "--history", ENERGY, "--after", "0.03"
+        ).exit_code
+        == 1
+    )
 
 
 def test_a_rounded_time_is_told_and_judged() -> None:
     tr = paper.CROSSINGS[2][0] / 1e3
-    result = run("card", "--tr", repr(tr), "--td", "0.064", "--part", "1", "--history", ENERGY)
+    result = run(
+        "card", "--tr", repr(tr), "--td", "0.064", "--part", "1", "--history", ENERGY
+    )
     assert "note: tr is printed as .01288528, " in result.stderr
     assert pasted(result) == [(1, 0.01288528, 0.064)]
     assert result.exit_code == 0
 
 
 def test_parts_are_those_of_the_history() -> None:
-    result = run("card", "--tr", "0.0886", "--td", "0.37", "--part", "box", "--history", BOX, "--solver", "ls-dyna")
-    box = next(part["id"] for part in answer("info", BOX)["parts"] if part["title"] == "box")
+    result = run(
+        "card",
+        "--tr",
+        "0.0886",
+        "--td",
+        "0.37",
+        "--part",
+        "box",
+        "--history",
+        BOX,
+        "--solver",
+        "ls-dyna",
+    )
+    box = next(
+        part["id"] for part in answer("info", BOX)["parts"] if part["title"] == "box"
+    )
     assert pasted(result) == [(box, 0.0886, 0.37)]
     assert "internal energy of box" in comments(result.stdout)
-    assert "no part 77" in refused("card", "--tr", "0.0886", "--td", "0.37", "--part", "77", "--history", BOX)
+    assert "no part 77" in refused(
+        "card", "--tr", "0.0886", "--td", "0.37", "--part", "77", "--history", BOX
+    )
 
 
 def test_a_named_energy_judges_whatever_the_part() -> None:
@@ -100,8 +146,25 @@ def test_the_card_goes_to_a_file() -> None:
 
 
 def test_a_negative_zero_is_printed_as_zero() -> None:
-    assert "-0" not in run("card", "--tr", "-0.0", "--td", "0.02", "--part", "1").stdout.split("*", 1)[1]
-    engine = run("card", "--solver", "radioss", "--tr", "-0.0", "--td", "0.02", "--node", "1", "--end", "1").stdout
+    assert (
+        "-0"
+        not in run("card", "--tr", "-0.0", "--td", "0.02", "--part", "1").stdout.split(
+            "*", 1
+        )[1]
+    )
+    engine = run(
+        "card",
+        "--solver",
+        "radioss",
+        "--tr",
+        "-0.0",
+        "--td",
+        "0.02",
+        "--node",
+        "1",
+        "--end",
+        "1",
+    ).stdout
     assert "-0.0" not in engine
 
 
@@ -109,9 +172,21 @@ def test_a_negative_zero_is_printed_as_zero() -> None:
 
 
 def test_engine_files_of_radioss() -> None:
-    args = ("--solver", "radioss", *GOOD, "--node", "1001,1003-1004", "--name", "box", "--step-cap", "1e-6")
+    args = (
+        "--solver",
+        "radioss",
+        *GOOD,
+        "--node",
+        "1001,1003-1004",
+        "--name",
+        "box",
+        "--step-cap",
+        "1e-6",
+    )
     text = run("card", *args, "--end", "0.2").stdout
-    assert re.findall(r"^/RUN/box/(\d)\n +(\S+)\n/RBODY/(\S+)\n(.*)$", text, flags=re.MULTILINE) == [
+    assert re.findall(
+        r"^/RUN/box/(\d)\n +(\S+)\n/RBODY/(\S+)\n(.*)$", text, flags=re.MULTILINE
+    ) == [
         ("1", "0.0135867", "OFF", "1001 1003 1004"),
         ("2", "0.0687534", "ON", "1001 1003 1004"),
         ("3", "0.2", "OFF", "1001 1003 1004"),
@@ -126,7 +201,12 @@ def test_engine_files_of_radioss() -> None:
 @pytest.mark.parametrize("solver", ["ls-dyna --part 1", "radioss --node 1 --end 0.2"])
 def test_what_a_real_solver_does_at_the_switches_is_told(solver: str) -> None:
     told = comments(run("card", "--solver", *shlex.split(solver), *GOOD).stdout)
-    for what in ("first step at or after", "co-rotating", "vibration is lost", "a switched run"):
+    for what in (
+        "first step at or after",
+        "co-rotating",
+        "vibration is lost",
+        "a switched run",
+    ):
         assert what in told
 
 
@@ -136,7 +216,20 @@ def test_what_a_real_solver_does_at_the_switches_is_told(solver: str) -> None:
 def test_suggest_prints_the_card_of_its_pair() -> None:
     args = ("suggest", "--td", "0.37", "--part", "box", BOX)
     pair = answer(*args)["recommended"]
-    result = run(*args, "-f", "card", "--solver", "ls-dyna", "--step-cap", "1e-5", "--swset", "7", "8", "--merge", "3")
+    result = run(
+        *args,
+        "-f",
+        "card",
+        "--solver",
+        "ls-dyna",
+        "--step-cap",
+        "1e-5",
+        "--swset",
+        "7",
+        "8",
+        "--merge",
+        "3",
+    )
     assert result.exit_code == 0
     ((part, tr, td),) = pasted(result)
     assert tr == pytest.approx(pair["tr"], abs=1e-8)
@@ -152,37 +245,71 @@ def test_the_card_is_that_of_the_solver_that_wrote_the_history() -> None:
     args = ("suggest", "--td", "0.37", "--part", "box", BOX, "-f", "card")
     engine = run(*args, "--node", "1001", "--name", "box")
     assert engine.exit_code == 0
-    assert re.findall(r"^/RUN/box/(\d)", engine.stdout, flags=re.MULTILINE) == ["1", "2", "3"]
+    assert re.findall(r"^/RUN/box/(\d)", engine.stdout, flags=re.MULTILINE) == [
+        "1",
+        "2",
+        "3",
+    ]
     assert "a card for Radioss needs --node" in refused(*args)
     lead = run(*args, "--node", "1001", "--merge", "3")
     assert "--merge is an option of --solver ls-dyna" in lead.stderr
-    card = ("card", "--tr", "0.0886", "--td", "0.37", "--part", "box", "--history", BOX, "--node", "1001")
+    card = (
+        "card",
+        "--tr",
+        "0.0886",
+        "--td",
+        "0.37",
+        "--part",
+        "box",
+        "--history",
+        BOX,
+        "--node",
+        "1001",
+    )
     assert "/RBODY/ON" in run(*card).stdout
 
 
 @pytest.mark.parametrize("form", [*FORMATS["suggestion"], "card"])
-def test_parts_that_the_history_does_not_have_are_refused_in_every_form(form: str) -> None:
+def test_parts_that_the_history_does_not_have_are_refused_in_every_form(
+    form: str,
+) -> None:
     for history in (GLSTAT, ENERGY):
-        refused = [run("suggest", "--td", "0.064", "--part", "11", history, "-f", one) for one in ("table", form)]
-        assert [(result.exit_code, result.stdout) for result in refused] == [(2, "")] * 2
+        refused = [
+            run("suggest", "--td", "0.064", "--part", "11", history, "-f", one)
+            for one in ("table", form)
+        ]
+        assert [(result.exit_code, result.stdout) for result in refused] == [
+            (2, "")
+        ] * 2
         assert refused[0].stderr == refused[1].stderr
-    page = run("suggest", "--td", "0.064", "--part", "11", ENERGY, "--report", "page.html")
+    page = run(
+        "suggest", "--td", "0.064", "--part", "11", ENERGY, "--report", "page.html"
+    )
     assert (page.exit_code, Path("page.html").exists()) == (2, False)
 
 
 def test_a_card_says_whose_level_it_is_and_names_many_parts_by_sets() -> None:
     asked = ("card", *GOOD, "--part", "101-130", "--history", ENERGY, "-o")
-    assert run(*asked, "alone.k").exit_code == run(*asked, "merged.k", "--merge", "101").exit_code == 0
+    assert (
+        run(*asked, "alone.k").exit_code
+        == run(*asked, "merged.k", "--merge", "101").exit_code
+        == 0
+    )
     assert "level is that of the whole model" in comments(Path("alone.k").read_text())
     assert "whole model" not in comments(run("card", *GOOD, "--part", "1").stdout)
     for card in ("alone.k", "merged.k"):
         assert Path(card).read_text().count("PSET") == 2
-        assert sorted(window["part"] for window in answer("check", card)["windows"]) == [*range(101, 131)]
+        assert sorted(
+            window["part"] for window in answer("check", card)["windows"]
+        ) == [*range(101, 131)]
     assert "       902       101      PSET" in Path("merged.k").read_text()
 
 
 def test_options_of_a_card_belong_to_a_card() -> None:
-    assert "is about the card" in run("suggest", "--td", "0.0687534", ENERGY, "--merge", "11").stderr
+    assert (
+        "is about the card"
+        in run("suggest", "--td", "0.0687534", ENERGY, "--merge", "11").stderr
+    )
 
 
 def test_several_windows_are_one_card() -> None:
@@ -191,18 +318,35 @@ def test_several_windows_are_one_card() -> None:
     result = run("card", *pairs, "--part", "11")
     assert [(tr, td) for _, tr, td in pasted(result)] == asked
     Path("switches.txt").write_text("".join(f"{tr} {td}\n" for tr, td in asked))
-    assert run("card", "--windows", "switches.txt", "--part", "11").stdout == result.stdout
     assert (
-        run("card", "--windows", "-", "--part", "11", stdin=Path("switches.txt").read_bytes()).stdout == result.stdout
+        run("card", "--windows", "switches.txt", "--part", "11").stdout == result.stdout
+    )
+    assert (
+        run(
+            "card",
+            "--windows",
+            "-",
+            "--part",
+            "11",
+            stdin=Path("switches.txt").read_bytes(),
+        ).stdout
+        == result.stdout
     )
     judged = run("card", *pairs, "--part", "1", "--history", ENERGY)
     assert judged.exit_code == 2  # 0.3 lies outside the record
     two = ("--tr", "0.0135867", "--td", "0.0687534", "--tr", "0.0939", "--td", "0.119")
-    assert comments(run("card", *two, "--part", "1", "--history", ENERGY).stdout).count("Judged by") == 2
+    assert (
+        comments(run("card", *two, "--part", "1", "--history", ENERGY).stdout).count(
+            "Judged by"
+        )
+        == 2
+    )
 
 
 def test_suggest_without_a_pair_prints_no_card() -> None:
-    result = run("suggest", "--td", "0.37", "--part", "box", BOX, "-f", "card", "--margin", "0.3")
+    result = run(
+        "suggest", "--td", "0.37", "--part", "box", BOX, "-f", "card", "--margin", "0.3"
+    )
     assert (result.exit_code, result.stdout) == (1, "")
     assert "no-candidate" in result.stderr
 
@@ -210,7 +354,10 @@ def test_suggest_without_a_pair_prints_no_card() -> None:
 def test_suggest_needs_the_parts_for_a_card() -> None:
     said = refused("suggest", "--td", "0.064", "-f", "card", ENERGY)
     assert "-f card needs --part" in said
-    assert "where the history has no parts: d2rpick card --tr T --td T --part IDS --history FILE" in said
+    assert (
+        "where the history has no parts: d2rpick card --tr T --td T --part IDS --history FILE"
+        in said
+    )
 
 
 # rule.
@@ -219,14 +366,19 @@ def test_suggest_needs_the_parts_for_a_card() -> None:
 def test_rules_are_listed() -> None:
     lines = run("rule").stdout.splitlines()
     assert [line.split()[0] for line in lines] == list(RULES)
-    assert "D2R105  error    both times of a window are 0 (decimals lost in writing)" in lines
+    assert (
+        "D2R105  error    both times of a window are 0 (decimals lost in writing)"
+        in lines
+    )
 
 
 @pytest.mark.parametrize("name", RULES)
 def test_a_rule_is_explained_with_its_examples(name: str) -> None:
     text = run("rule", name.lower()).stdout
     rule = RULES[name]
-    assert " ".join(text.split()).startswith(f"{name} ({rule.severity}): {rule.summary}")
+    assert " ".join(text.split()).startswith(
+        f"{name} ({rule.severity}): {rule.summary}"
+    )
     assert rule.explanation in " ".join(text.split())
     for example in (*rule.passing, *rule.failing):
         assert f"\n\n{example.deck.rstrip()}\n" in text
@@ -238,13 +390,17 @@ def test_a_rule_is_explained_with_its_examples(name: str) -> None:
 def test_an_example_that_is_judged_by_a_history_says_how_to_run_it() -> None:
     text = run("rule", "D2R204").stdout
     made = text.split("history of\n")[1].split("\nchecked")[0].replace("\\\n", "")
-    assert "checked by d2rpick check main.k --history energy.csv --after 0.03:\n" in text
+    assert (
+        "checked by d2rpick check main.k --history energy.csv --after 0.03:\n" in text
+    )
     assert run(*shlex.split(made)[1:]).exit_code == 0
     assert Path("energy.csv").is_file()
 
 
 def test_the_beginning_of_an_id_gives_all_of_them_and_near_misses_are_named() -> None:
-    assert re.findall(r"^(D2R\d+) \(", run("rule", "D2R3").stdout, flags=re.MULTILINE) == [
-        f"D2R30{number}" for number in range(1, 8)
-    ]
-    assert re.fullmatch(r"no rule 'D2R1O5', .* did you mean D2R1\d5\?", refused("rule", "D2R1O5"))
+    assert re.findall(
+        r"^(D2R\d+) \(", run("rule", "D2R3").stdout, flags=re.MULTILINE
+    ) == [f"D2R30{number}" for number in range(1, 8)]
+    assert re.fullmatch(
+        r"no rule 'D2R1O5', .* did you mean D2R1\d5\?", refused("rule", "D2R1O5")
+    )

@@ -35,9 +35,14 @@ def place(name: str, deck: str) -> str:
 
 def deck_of(tr: float, td: float, part: int = 1) -> str:
     """A deck with one window; the times are printed with all their digits."""
-    there = "*KEYWORD LONG=Y\n*DEFORMABLE_TO_RIGID_AUTOMATIC\n" + f"{2 * part - 1:20d}{0:20d}{tr!r:>20}\n"
+    there = (
+        "*KEYWORD LONG=Y\n*DEFORMABLE_TO_RIGID_AUTOMATIC\n"
+        f"{2 * part - 1:20d}{0:20d}{tr!r:>20}\n"
+    )
     back = "*DEFORMABLE_TO_RIGID_AUTOMATIC\n" + f"{2 * part:20d}{0:20d}{td!r:>20}\n"
-    counts = [f"{'':80}{d2r:20d}{r2d:20d}\n{part:20d}\n" for d2r, r2d in ((1, 0), (0, 1))]
+    counts = [
+        f"{'':80}{d2r:20d}{r2d:20d}\n{part:20d}\n" for d2r, r2d in ((1, 0), (0, 1))
+    ]
     return there + counts[0] + back + counts[1]
 
 
@@ -62,7 +67,9 @@ def test_a_deck_that_looks_right_is_caught_by_the_history() -> None:
     assert run("check", DECK).exit_code == 0
     result = run("check", DECK, "--history", GLSTAT)
     assert result.exit_code == 1
-    (line,) = (line for line in result.stdout.splitlines() if "error" in line and "D2R" in line)
+    (line,) = (
+        line for line in result.stdout.splitlines() if "error" in line and "D2R" in line
+    )
     assert line.strip().startswith(f"{DECK}:43:21: error D2R202 part 12: ")
     assert "tr = 0.0128853 suits this td" in line
     assert "td = 0.0687534 with tr = 0.0135867" in result.stdout
@@ -85,11 +92,21 @@ def test_json_says_where_and_by_what() -> None:
     ("deck", "options", "code"),
     [
         *((GOOD, (), 0), (LATE, (), 1), (LATE, ("--exit-zero",), 0)),
-        *((COARSE, (), 0), (COARSE, ("--fail-on", "warning"), 1), (COARSE, ("--ignore", "D2R111"), 0)),
-        (HEAD + PARTS + THERE + END, ("--fail-on", "warning"), 0),  # an info is never an objection
+        *(
+            (COARSE, (), 0),
+            (COARSE, ("--fail-on", "warning"), 1),
+            (COARSE, ("--ignore", "D2R111"), 0),
+        ),
+        (
+            HEAD + PARTS + THERE + END,
+            ("--fail-on", "warning"),
+            0,
+        ),  # an info is never an objection
     ],
 )
-def test_the_exit_code_is_the_same_in_every_format(deck: str, options: tuple[str, ...], code: int, form: str) -> None:
+def test_the_exit_code_is_the_same_in_every_format(
+    deck: str, options: tuple[str, ...], code: int, form: str
+) -> None:
     result = run("check", place("main.k", deck), "-f", form, *options)
     assert (result.exit_code, result.stderr) == (code, "")
     valid(form, result.stdout)
@@ -101,7 +118,10 @@ def test_paths_are_relative_to_the_working_folder(tmp_path: Path) -> None:
         found = answer("check", name)
         assert found["decks"] == ["runs/a/main.k"]
         assert {finding["file"] for finding in found["findings"]} == {"runs/a/main.k"}
-        assert "::error file=runs/a/main.k,line=" in run("check", "-f", "github", name).stdout
+        assert (
+            "::error file=runs/a/main.k,line="
+            in run("check", "-f", "github", name).stdout
+        )
 
 
 def test_a_deck_without_switching_cards_says_so() -> None:
@@ -127,7 +147,10 @@ def test_a_deck_that_cannot_be_read_does_not_hide_the_others(form: str) -> None:
     place("a.k", COARSE)
     result = run("check", "absent.k", "a.k", "-f", form)
     assert result.exit_code == 1
-    assert result.stderr == "d2rpick: absent.k: no such file; check the name and the folder\n"
+    assert (
+        result.stderr
+        == "d2rpick: absent.k: no such file; check the name and the folder\n"
+    )
     assert "D2R111" in result.stdout
     assert "absent.k" in result.stdout or form == "table"
     valid(form, result.stdout)
@@ -136,11 +159,15 @@ def test_a_deck_that_cannot_be_read_does_not_hide_the_others(form: str) -> None:
 
 def test_an_unreadable_deck_is_an_error_of_its_own_in_reports() -> None:
     place("a.k", GOOD)
-    (error,) = ET.fromstring(run("check", "absent.k", "a.k", "-f", "junit").stdout).iter("error")
+    (error,) = ET.fromstring(
+        run("check", "absent.k", "a.k", "-f", "junit").stdout
+    ).iter("error")
     assert "absent.k" in error.attrib["message"]
     (sarif,) = json.loads(run("check", "absent.k", "a.k", "-f", "sarif").stdout)["runs"]
     assert [one["executionSuccessful"] for one in sarif["invocations"]] == [False]
-    assert run("check", "absent.k", "a.k").stdout.endswith("in 1 deck, 1 not checked; times not judged: no --history\n")
+    assert run("check", "absent.k", "a.k").stdout.endswith(
+        "in 1 deck, 1 not checked; times not judged: no --history\n"
+    )
 
 
 @pytest.mark.parametrize("form", FORMATS)
@@ -150,7 +177,10 @@ def test_no_readable_deck_is_no_answer(form: str) -> None:
     assert result.exit_code == 2
     assert ("absent.k" in result.stdout) == (form != "table")
     valid(form, result.stdout)
-    assert [line.split(": ")[1] for line in result.stderr.splitlines()] == ["absent.k", "run.rad"]
+    assert [line.split(": ")[1] for line in result.stderr.splitlines()] == [
+        "absent.k",
+        "run.rad",
+    ]
 
 
 @pytest.mark.parametrize("form", [*FORMATS, "ndjson"])
@@ -166,7 +196,15 @@ def test_standard_input_is_a_deck(form: str) -> None:
 
 def test_includes_of_standard_input_are_looked_for_here() -> None:
     place("inner.k", THERE)
-    found = json.loads(run("check", "-", "-f", "json", stdin=f"{HEAD}{PARTS}*INCLUDE\ninner.k\n".encode()).stdout)
+    found = json.loads(
+        run(
+            "check",
+            "-",
+            "-f",
+            "json",
+            stdin=f"{HEAD}{PARTS}*INCLUDE\ninner.k\n".encode(),
+        ).stdout
+    )
     assert [window["file"] for window in found["windows"]] == ["inner.k"]
 
 
@@ -208,7 +246,9 @@ def test_the_files_of_a_radioss_run_are_one_deck(chosen: slice) -> None:
     found = answer("check", *files[chosen])
     assert len(found["decks"]) == 1
     assert found["findings"] == []
-    assert [(w["part"], w["tr"], w["td"]) for w in found["windows"]] == [(1, 0.02, 0.09)]
+    assert [(w["part"], w["tr"], w["td"]) for w in found["windows"]] == [
+        (1, 0.02, 0.09)
+    ]
     check_by_schema(found)
 
 
@@ -225,37 +265,55 @@ def test_printed_engine_files_pass() -> None:
     card = run("card", "--solver", "radioss", *pairs, "--node", "1808", "--end", "0.4")
     found = json.loads(run("check", "-", "-f", "json", stdin=card.stdout_bytes).stdout)
     assert found["findings"] == []
-    assert [(w["node"], w["tr"], w["td"]) for w in found["windows"]] == [(1808, 0.02, 0.09), (1808, 0.2, 0.3)]
+    assert [(w["node"], w["tr"], w["td"]) for w in found["windows"]] == [
+        (1808, 0.02, 0.09),
+        (1808, 0.2, 0.3),
+    ]
 
 
 # Which rules count.
 
 
 def test_options_and_configuration_select_rules() -> None:
-    deck = place("runs/main.k", HEAD + PARTS + THERE + automatic(1, "0.5", rigid=["1"]) + END)
+    deck = place(
+        "runs/main.k", HEAD + PARTS + THERE + automatic(1, "0.5", rigid=["1"]) + END
+    )
     every = {"D2R004", "D2R101", "D2R104"}
     assert set(rules(answer("check", deck))) == every
-    assert set(rules(answer("check", deck, "--select", "D2R0,D2R101"))) == {"D2R004", "D2R101"}
-    assert set(rules(answer("check", deck, "--select", "D2R1", "--ignore", "d2r104"))) == {"D2R101"}
+    assert set(rules(answer("check", deck, "--select", "D2R0,D2R101"))) == {
+        "D2R004",
+        "D2R101",
+    }
+    assert set(
+        rules(answer("check", deck, "--select", "D2R1", "--ignore", "d2r104"))
+    ) == {"D2R101"}
     Path("pyproject.toml").write_text('[tool.d2rpick]\nignore = ["D2R004"]\n')
     assert set(rules(answer("check", deck))) == every - {"D2R004"}
     assert set(rules(answer("check", deck, "--ignore", "D2R104"))) == every - {"D2R104"}
-    Path("runs/d2rpick.toml").write_text('severity = {D2R104 = "error"}\nselect = ["D2R104"]\n')
+    Path("runs/d2rpick.toml").write_text(
+        'severity = {D2R104 = "error"}\nselect = ["D2R104"]\n'
+    )
     found = answer("check", deck)
-    assert [(finding["rule"], finding["severity"]) for finding in found["findings"]] == [("D2R104", "error")]
+    assert [
+        (finding["rule"], finding["severity"]) for finding in found["findings"]
+    ] == [("D2R104", "error")]
     assert run("check", deck).exit_code == 1
 
 
 def test_each_deck_goes_by_the_configuration_nearest_to_it() -> None:
     decks = [place("a/main.k", LATE), place("b/main.k", LATE)]
     Path("a/d2rpick.toml").write_text('ignore = ["D2R101"]\n')
-    assert [finding["deck"] for finding in answer("check", *decks)["findings"]] == ["b/main.k"]
+    assert [finding["deck"] for finding in answer("check", *decks)["findings"]] == [
+        "b/main.k"
+    ]
 
 
 def test_a_comment_silences_a_rule_of_the_history_too() -> None:
     text = Path(DECK).read_text()
     for rule, number in (("D2R202", 903), ("D2R203", 904)):
-        head, card, tail = text.partition(f"*DEFORMABLE_TO_RIGID_AUTOMATIC\n{text.split(chr(10))[25]}\n       {number}")
+        head, card, tail = text.partition(
+            f"*DEFORMABLE_TO_RIGID_AUTOMATIC\n{text.split(chr(10))[25]}\n       {number}"
+        )
         assert card
         text = f"{head}$ d2rpick: ignore {rule}\n{card}{tail}"
     assert rules(answer("check", place("main.k", text), "--history", ENERGY)) == []
@@ -264,7 +322,9 @@ def test_a_comment_silences_a_rule_of_the_history_too() -> None:
 def test_a_wrong_configuration_names_its_file() -> None:
     place("main.k", GOOD)
     Path("d2rpick.toml").write_text('select = ["D2R10l"]\n')
-    assert f"{Path('d2rpick.toml').absolute()}: no rule 'D2R10l'" in refused("check", "main.k", "--select", "D2R1")
+    assert f"{Path('d2rpick.toml').absolute()}: no rule 'D2R10l'" in refused(
+        "check", "main.k", "--select", "D2R1"
+    )
 
 
 def test_a_broken_configuration_does_not_hide_other_decks() -> None:
@@ -292,7 +352,10 @@ def failing_on(text: str, error: Exception) -> Callable[[str], dict[str, Any]]:
     ("form", "error"),
     [
         *((form, ZeroDivisionError("odd")) for form in (*FORMATS, "ndjson")),
-        *(("json", error) for error in (AssertionError("odd"), BufferError("odd"), EOFError("odd"))),
+        *(
+            ("json", error)
+            for error in (AssertionError("odd"), BufferError("odd"), EOFError("odd"))
+        ),
     ],
 )
 def test_an_unforeseen_error_is_the_line_of_its_deck(
@@ -309,21 +372,32 @@ def test_an_unforeseen_error_is_the_line_of_its_deck(
     assert told in result.stdout or form == "table"
     valid(form, result.stdout)
     if form == "json":
-        assert [one["code"] for one in json.loads(result.stdout)["warnings"]] == ["internal-error"]
+        assert [one["code"] for one in json.loads(result.stdout)["warnings"]] == [
+            "internal-error"
+        ]
     assert "Traceback" in run("check", *decks, "--debug").stderr
 
 
 def test_two_spellings_of_a_deck_are_one(tmp_path: Path) -> None:
     place("main.k", LATE)
     Path("link.k").symlink_to("main.k")
-    assert answer("check", "main.k", "./main.k", str(tmp_path / "main.k"), "link.k")["decks"] == ["main.k"]
+    assert answer("check", "main.k", "./main.k", str(tmp_path / "main.k"), "link.k")[
+        "decks"
+    ] == ["main.k"]
 
 
 def test_python_takes_decks_as_the_command_line_does() -> None:
-    decks = [place("runs/a.k", LATE), place("runs/b.k", HEAD + PARTS + "$ d2rpick: ignore D2R1O4\n" + THERE + END)]
+    decks = [
+        place("runs/a.k", LATE),
+        place("runs/b.k", HEAD + PARTS + "$ d2rpick: ignore D2R1O4\n" + THERE + END),
+    ]
     found = d2.check(["runs", f"./{decks[0]}"])
     assert found.to_dict() == answer(*found.command) | {"command": list(found.command)}
-    assert (found.decks, found.passed, [one.code for one in found.warnings]) == ((*decks,), False, ["unknown-rule"])
+    assert (found.decks, found.passed, [one.code for one in found.warnings]) == (
+        (*decks,),
+        False,
+        ["unknown-rule"],
+    )
     assert d2.check(place("c.k", GOOD)).passed
     with pytest.raises(d2.DeckError, match=r"absent\.k: no such file"):
         d2.check([decks[0], "absent.k"])
@@ -342,7 +416,9 @@ def test_the_result_never_replaces_what_a_deck_leads_to(name: str) -> None:
     place("inner.k", THERE)
     place("d2rpick.toml", 'ignore = ["D2R104"]\n')
     before = Path(name).read_bytes()
-    assert "is an input" in refused("check", "main.k", "-o", name, "--overwrite", "--select", "D2R1")
+    assert "is an input" in refused(
+        "check", "main.k", "-o", name, "--overwrite", "--select", "D2R1"
+    )
     assert Path(name).read_bytes() == before
 
 
@@ -350,7 +426,9 @@ def test_the_result_never_replaces_an_input() -> None:
     place("main.k", GOOD)
     Path("energy.csv").write_bytes(Path(ENERGY).read_bytes())
     for name in ("main.k", "energy.csv"):
-        assert "is an input" in refused("check", "main.k", "--history", "energy.csv", "-o", name, "--overwrite")
+        assert "is an input" in refused(
+            "check", "main.k", "--history", "energy.csv", "-o", name, "--overwrite"
+        )
     assert run("check", "main.k", "-o", "report.xml", "-f", "junit").stdout == ""
     junit_is_valid(Path("report.xml").read_text())
 
@@ -362,7 +440,12 @@ TIMES = np.linspace(0.001, 0.149, 12).tolist()
 
 
 @pytest.mark.parametrize(
-    ("td", "asked"), [(0.0687534, {}), (0.064, {"after": 0.02}), (0.1, {"margin": 0.005, "tolerance": 0.5})]
+    ("td", "asked"),
+    [
+        (0.0687534, {}),
+        (0.064, {"after": 0.02}),
+        (0.1, {"margin": 0.005, "tolerance": 0.5}),
+    ],
 )
 def test_the_check_objects_where_verify_does(td: float, asked: dict[str, Any]) -> None:
     times = [time for time in [*TIMES, 0.0135867, 0.0128853, 0.0247264] if time < td]
@@ -370,23 +453,47 @@ def test_the_check_objects_where_verify_does(td: float, asked: dict[str, Any]) -
     run, deck = d2.read(ENERGY), place("main.k", "".join(windows))
     findings = d2.check(deck, history=run, **asked).to_dict()["findings"]
     for part, tr in enumerate(times, start=1):
-        told = {one["rule"]: one["severity"] for one in findings if one["message"].startswith(f"part {part}: ")}
+        told = {
+            one["rule"]: one["severity"]
+            for one in findings
+            if one["message"].startswith(f"part {part}: ")
+        }
         judged = d2.verify(run, tr, td, **asked).to_dict()
-        assert ("error" in told.values()) != judged["verified"], (tr, td, judged["reasons"], told)
+        assert ("error" in told.values()) != judged["verified"], (
+            tr,
+            td,
+            judged["reasons"],
+            told,
+        )
         assert ("D2R203" in told) == (judged["kinetic_share"] > 0.5)
-        assert ("D2R202" in told) == any("opposite sign" in reason for reason in judged["reasons"])
-        assert ("D2R204" in told) == any("end of the load" in reason for reason in judged["reasons"])
+        assert ("D2R202" in told) == any(
+            "opposite sign" in reason for reason in judged["reasons"]
+        )
+        assert ("D2R204" in told) == any(
+            "end of the load" in reason for reason in judged["reasons"]
+        )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("tr", [0.05, 0.0886, 0.15])
-def test_parts_that_share_a_window_are_judged_together_as_verify_judges_them(tr: float) -> None:
-    parts = {str(part["id"]): part["energy_max"] for part in answer("info", BOX)["parts"]}
-    both = automatic(1, str(tr), rigid=[*parts]) + automatic(2, "0.37", deformable=[*parts])
+def test_parts_that_share_a_window_are_judged_together_as_verify_judges_them(
+    tr: float,
+) -> None:
+    parts = {
+        str(part["id"]): part["energy_max"] for part in answer("info", BOX)["parts"]
+    }
+    both = automatic(1, str(tr), rigid=[*parts]) + automatic(
+        2, "0.37", deformable=[*parts]
+    )
     found = answer("check", place("main.k", both), "--history", BOX)["findings"]
-    objections = [finding["message"] for finding in found if finding["severity"] == "error"]
+    objections = [
+        finding["message"] for finding in found if finding["severity"] == "error"
+    ]
     chosen = [text for part in parts for text in ("--part", part)]
-    assert bool(objections) != answer("verify", "--tr", str(tr), "--td", "0.37", *chosen, BOX)["verified"]
+    assert (
+        bool(objections)
+        != answer("verify", "--tr", str(tr), "--td", "0.37", *chosen, BOX)["verified"]
+    )
     assert {message.partition(":")[0] for message in objections} <= {"parts 1-3"}
     assert 0.0 in parts.values()
 
@@ -396,27 +503,44 @@ def test_parts_with_windows_of_their_own_are_judged_apart() -> None:
     cards += automatic(3, "0.15", rigid=["2"]) + automatic(4, "0.36", deformable=["2"])
     found = answer("check", place("main.k", cards), "--history", BOX)["findings"]
     for part, tr, td in (("1", "0.05", "0.37"), ("2", "0.15", "0.36")):
-        blamed = [f for f in found if f["severity"] == "error" and f["message"].startswith(f"part {part}:")]
-        assert bool(blamed) != answer("verify", "--tr", tr, "--td", td, "--part", part, BOX)["verified"]
+        blamed = [
+            f
+            for f in found
+            if f["severity"] == "error" and f["message"].startswith(f"part {part}:")
+        ]
+        assert (
+            bool(blamed)
+            != answer("verify", "--tr", tr, "--td", td, "--part", part, BOX)["verified"]
+        )
 
 
 def test_what_verify_warns_of_is_told_for_each_part() -> None:
-    box = next(part["id"] for part in answer("info", BOX)["parts"] if part["title"] == "box")
+    box = next(
+        part["id"] for part in answer("info", BOX)["parts"] if part["title"] == "box"
+    )
     cut = place("cut.matsum", Path(MATSUM).read_text()[:-40])
     found = answer("check", place("main.k", deck_of(0.15, 0.37, box)), "--history", cut)
-    (told,) = (w["message"] for w in found["warnings"] if w["code"] == "truncated-input")
+    (told,) = (
+        w["message"] for w in found["warnings"] if w["code"] == "truncated-input"
+    )
     assert told.startswith(f"part {box}: the input ends within a state")
 
 
 def test_a_part_that_the_history_does_not_have_is_not_passed() -> None:
     found = answer("check", place("main.k", deck_of(0.1, 0.37, 77)), "--history", BOX)
     assert rules(found) == ["D2R205"]
-    assert "part 77: not in the history, which has part" in found["findings"][0]["message"]
+    assert (
+        "part 77: not in the history, which has part" in found["findings"][0]["message"]
+    )
 
 
 def test_parts_of_one_card_with_the_same_fault_are_one_finding() -> None:
-    both = automatic(1, ".0122659", rigid=["1", "2"]) + automatic(2, "0.064", deformable=["1", "2"])
-    found = answer("check", place("main.k", HEAD + PARTS + both + END), "--history", ENERGY)
+    both = automatic(1, ".0122659", rigid=["1", "2"]) + automatic(
+        2, "0.064", deformable=["1", "2"]
+    )
+    found = answer(
+        "check", place("main.k", HEAD + PARTS + both + END), "--history", ENERGY
+    )
     assert [(f["rule"], f["message"].split(":")[0]) for f in found["findings"]] == [
         ("D2R202", "parts 1, 2"),
         ("D2R203", "parts 1, 2"),
@@ -431,23 +555,41 @@ def test_a_history_that_tells_no_flight_is_an_objection() -> None:
     place("main.k", deck_of(0.5, 0.55))
     found = answer("check", "main.k", "--history", "rising.csv")
     (message,) = (f["message"] for f in found["findings"] if f["rule"] == "D2R204")
-    assert "nothing in the history shows when the load is over; give that time as `after`" in message
-    assert "D2R204" not in rules(answer("check", "main.k", "--history", "rising.csv", "--after", "0.2"))
+    assert (
+        "nothing in the history shows when the load is over; give that time as `after`"
+        in message
+    )
+    assert "D2R204" not in rules(
+        answer("check", "main.k", "--history", "rising.csv", "--after", "0.2")
+    )
 
 
 def test_a_history_without_energy_is_an_objection() -> None:
     rows = "\n".join(f"{t:.3f},0" for t in np.linspace(0, 1, 400))
     Path("flat.csv").write_text(f"time,internal_energy\n{rows}\n")
-    found = answer("check", place("main.k", deck_of(0.5, 0.55)), "--history", "flat.csv", "--after", "0.1")
+    found = answer(
+        "check",
+        place("main.k", deck_of(0.5, 0.55)),
+        "--history",
+        "flat.csv",
+        "--after",
+        "0.1",
+    )
     assert [f["message"] for f in found["findings"] if f["rule"] == "D2R201"]
 
 
 def test_td_after_the_next_contact_is_named_at_td() -> None:
-    box = next(part["id"] for part in answer("info", BOX)["parts"] if part["title"] == "box")
+    box = next(
+        part["id"] for part in answer("info", BOX)["parts"] if part["title"] == "box"
+    )
     deck = place("main.k", deck_of(0.2, 0.37, box))
     for margin, expected in (("0.005", []), ("0.03", [("D2R204", 7)])):
         found = answer("check", deck, "--history", BOX, "--margin", margin)["findings"]
-        assert [(f["rule"], f["line"]) for f in found if "after the end of the flight" in f["message"]] == expected
+        assert [
+            (f["rule"], f["line"])
+            for f in found
+            if "after the end of the flight" in f["message"]
+        ] == expected
 
 
 def test_a_part_set_that_cannot_be_resolved_is_judged_by_the_whole_model() -> None:
@@ -459,25 +601,45 @@ def test_a_part_set_that_cannot_be_resolved_is_judged_by_the_whole_model() -> No
 
 def test_windows_that_are_none_are_left_to_other_rules() -> None:
     swapped = automatic(1, "0.09", rigid=["1"]) + automatic(2, "0.02", deformable=["1"])
-    assert rules(answer("check", place("main.k", HEAD + PARTS + swapped), "--history", ENERGY)) == ["D2R102"]
-    assert rules(answer("check", place("main.k", HEAD + PARTS + THERE), "--history", ENERGY)) == ["D2R104"]
+    assert rules(
+        answer("check", place("main.k", HEAD + PARTS + swapped), "--history", ENERGY)
+    ) == ["D2R102"]
+    assert rules(
+        answer("check", place("main.k", HEAD + PARTS + THERE), "--history", ENERGY)
+    ) == ["D2R104"]
 
 
 @pytest.mark.parametrize(
     ("tr", "options", "objections"),
-    [("0.19", (), {"D2R205"}), ("0.02", ("--after", "0.03"), {"D2R204"}), ("0.04", ("--after", "0.03"), set())],
+    [
+        ("0.19", (), {"D2R205"}),
+        ("0.02", ("--after", "0.03"), {"D2R204"}),
+        ("0.04", ("--after", "0.03"), set()),
+    ],
 )
-def test_tr_is_judged_whatever_becomes_of_td(tr: str, options: tuple[str, ...], objections: set[str]) -> None:
+def test_tr_is_judged_whatever_becomes_of_td(
+    tr: str, options: tuple[str, ...], objections: set[str]
+) -> None:
     there, back = automatic(1, tr, rigid=["1"]), automatic(2, "0.01", deformable=["1"])
     for deck, other in ((there, "D2R104"), (there + back, "D2R102")):
-        found = answer("check", place("main.k", PARTS + deck), "--history", ENERGY, "--select", "D2R1,D2R2", *options)
+        found = answer(
+            "check",
+            place("main.k", PARTS + deck),
+            "--history",
+            ENERGY,
+            "--select",
+            "D2R1,D2R2",
+            *options,
+        )
         assert set(rules(found)) - {other} == objections
 
 
 def test_what_the_readers_left_out_is_noted() -> None:
     data = Path(GLSTAT).read_bytes()
     Path("glstat").write_bytes(data[: len(data) - 200])
-    assert "warning: truncated-input: " in run("check", DECK, "--history", "glstat").stderr
+    assert (
+        "warning: truncated-input: " in run("check", DECK, "--history", "glstat").stderr
+    )
     assert run("check", DECK, "--history", "glstat", "--quiet").stderr == ""
 
 
@@ -499,7 +661,9 @@ def test_the_history_is_named_relative_to_the_working_folder(tmp_path: Path) -> 
 def test_an_energy_of_several_parts_is_not_called_that_of_one(tmp_path: Path) -> None:
     deck = tmp_path / "main.k"
     run("card", "--tr", "0.15", "--td", "0.37", "--part", "1,2", "-o", str(deck))
-    lines = run("check", str(deck), "--history", BOX, "--tolerance", "0.001").stdout.splitlines()
+    lines = run(
+        "check", str(deck), "--history", BOX, "--tolerance", "0.001"
+    ).stdout.splitlines()
     (found,) = [line for line in lines if "D2R201" in line]
     assert "the energy of the 2 parts that are switched together is" in found
 
@@ -514,7 +678,12 @@ def test_a_check_without_a_history_says_that_it_has_judged_no_times() -> None:
 
 def test_findings_are_rows_of_csv_and_markdown_too() -> None:
     found = answer("check", DECK, "--history", GLSTAT)["findings"]
-    csv, markdown = (run("check", DECK, "--history", GLSTAT, "-f", form).stdout for form in ("csv", "markdown"))
-    assert [row["rule"] for row in DictReader(csv.splitlines())] == [one["rule"] for one in found]
+    csv, markdown = (
+        run("check", DECK, "--history", GLSTAT, "-f", form).stdout
+        for form in ("csv", "markdown")
+    )
+    assert [row["rule"] for row in DictReader(csv.splitlines())] == [
+        one["rule"] for one in found
+    ]
     rows = [line.split(" | ") for line in markdown.splitlines() if "D2R" in line]
     assert [row[0].strip("| ") for row in rows] == [one["rule"] for one in found]

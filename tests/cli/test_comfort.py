@@ -13,7 +13,18 @@ from d2rpick.base import __version__
 from d2rpick.cli import COMMANDS, d2rpick
 from d2rpick.cli.manual import manual
 from d2rpick.rules import RULES
-from tests.command import DECK, ENERGY, GLSTAT, MATSUM, ROLLOVER, ROOT, TIME_LIMIT, answer, put, run
+from tests.command import (
+    DECK,
+    ENERGY,
+    GLSTAT,
+    MATSUM,
+    ROLLOVER,
+    ROOT,
+    TIME_LIMIT,
+    answer,
+    put,
+    run,
+)
 
 
 def test_settings_are_shown_with_their_sources_and_nothing_is_done(
@@ -21,7 +32,9 @@ def test_settings_are_shown_with_their_sources_and_nothing_is_done(
 ) -> None:
     monkeypatch.setenv("D2RPICK_SUGGEST_MARGIN", "0.001")
     target = tmp_path / "out.json"
-    shown = run("suggest", "--td", "0.064", "-o", str(target), "--show-settings", ENERGY)
+    shown = run(
+        "suggest", "--td", "0.064", "-o", str(target), "--show-settings", ENERGY
+    )
     assert shown.exit_code == 0
     lines = shown.stdout.splitlines()
     assert "td = 0.064  # command line" in lines
@@ -47,26 +60,47 @@ def test_every_command_shows_its_settings(command: str) -> None:
 def test_the_version_names_the_libraries() -> None:
     shown = run("--version").stdout.splitlines()
     assert shown[0] == f"d2rpick, version {__version__}"
-    assert shown[1].startswith(f"Python {sys.version_info.major}.{sys.version_info.minor}")
-    assert [line.split()[0] for line in shown[2:]] == ["click", "numpy", "scipy", "pandas", "h5py", "matplotlib"]
+    assert shown[1].startswith(
+        f"Python {sys.version_info.major}.{sys.version_info.minor}"
+    )
+    assert [line.split()[0] for line in shown[2:]] == [
+        "click",
+        "numpy",
+        "scipy",
+        "pandas",
+        "h5py",
+        "matplotlib",
+    ]
 
 
 def test_verbose_says_what_was_read() -> None:
     told = run("suggest", "--td", "0.0687534", "-v", "-f", "value", ENERGY)
     assert re.fullmatch(r"read \S+energy\.csv in \d+\.\d\d s\n", told.stderr)
-    assert told.stdout == run("suggest", "--td", "0.0687534", "-q", "-f", "value", ENERGY).stdout
+    assert (
+        told.stdout
+        == run("suggest", "--td", "0.0687534", "-q", "-f", "value", ENERGY).stdout
+    )
 
 
 def complete(*args: str) -> list[str]:
     """Values that the shell offers for the last word."""
     from click.shell_completion import ShellComplete
 
-    found = ShellComplete(d2rpick, {}, "d2rpick", "_D2RPICK_COMPLETE").get_completions(list(args[:-1]), args[-1])
+    found = ShellComplete(d2rpick, {}, "d2rpick", "_D2RPICK_COMPLETE").get_completions(
+        list(args[:-1]), args[-1]
+    )
     return [one.value for one in found]
 
 
 def test_parts_are_completed_from_the_history_that_was_typed() -> None:
-    assert complete("suggest", MATSUM, "--part", "") == ["1", "2", "box", "step", "flying", "all"]
+    assert complete("suggest", MATSUM, "--part", "") == [
+        "1",
+        "2",
+        "box",
+        "step",
+        "flying",
+        "all",
+    ]
     assert complete("suggest", MATSUM, "--part", "b") == ["box"]
     assert complete("suggest", "--part", "f") == ["flying"]
     assert complete("suggest", "absent", "--part", "a") == ["all"]
@@ -78,11 +112,18 @@ def test_rules_are_completed() -> None:
 
 
 def test_channels_are_completed_from_the_history_that_was_typed() -> None:
-    assert complete("suggest", ROLLOVER, "--energy", "") == ["boxIE_J", "stepIE_J", "IE_total_J"]
+    assert complete("suggest", ROLLOVER, "--energy", "") == [
+        "boxIE_J",
+        "stepIE_J",
+        "IE_total_J",
+    ]
     assert complete("suggest", "absent", "--energy", "") == []
     (offered,) = complete("suggest", GLSTAT, "--energy", "int")
     assert offered == "internal_energy"  # one word for the shell, and yet the channel
-    one, other = (answer("suggest", "--td", "0.064", "--energy", name, GLSTAT) for name in (offered, "internal energy"))
+    one, other = (
+        answer("suggest", "--td", "0.064", "--energy", name, GLSTAT)
+        for name in (offered, "internal energy")
+    )
     assert one["recommended"] == other["recommended"]
 
 
@@ -95,7 +136,10 @@ def test_a_td_far_outside_is_not_explained_by_a_unit() -> None:
 def in_ms(tmp_path: Path) -> str:
     """The record of the oscillator with its times in ms, which no header names."""
     rows = [line.split(",") for line in Path(ENERGY).read_text().splitlines()[1:]]
-    lines = ["time,internal_energy", *(f"{1000 * float(row[0]):.10g},{row[5]}" for row in rows)]
+    lines = [
+        "time,internal_energy",
+        *(f"{1000 * float(row[0]):.10g},{row[5]}" for row in rows),
+    ]
     return str(put(tmp_path / "ms.csv", "\n".join(lines) + "\n"))
 
 
@@ -109,22 +153,47 @@ def in_ms(tmp_path: Path) -> str:
         (("explore", "--td", "0.064"), "--td 64,"),
         (("study", "--td", "0.064"), "--td 64,"),
         (("plan", "--after", "0.06"), "--after 60,"),
-        (("card", "--tr", "0.0129", "--td", "0.064", "--solver", "ls-dyna", "--part", "1", "--history"), "--td 64,"),
+        (
+            (
+                "card",
+                "--tr",
+                "0.0129",
+                "--td",
+                "0.064",
+                "--solver",
+                "ls-dyna",
+                "--part",
+                "1",
+                "--history",
+            ),
+            "--td 64,",
+        ),
     ],
 )
-def test_a_time_in_s_is_not_taken_for_one_in_ms(in_ms: str, args: tuple[str, ...], told: str) -> None:
+def test_a_time_in_s_is_not_taken_for_one_in_ms(
+    in_ms: str, args: tuple[str, ...], told: str
+) -> None:
     result = run(*args, in_ms)
     assert result.exit_code == 2
-    assert "within the first ten states of the record, 0 to 150; was it meant in s? Then give " + told in result.stderr
+    assert (
+        "within the first ten states of the record, 0 to 150; was it meant in s? Then give "
+        + told
+        in result.stderr
+    )
 
 
 def test_early_times_that_are_meant_are_kept(in_ms: str) -> None:
     # a flight may begin at once, and so may a tr; of 0.4 the thousandfold is no time of the record
-    for args in (("suggest", "--td", "64", "--after", "0"), ("verify", "--tr", "0.0129", "--td", "64")):
+    for args in (
+        ("suggest", "--td", "64", "--after", "0"),
+        ("verify", "--tr", "0.0129", "--td", "64"),
+    ):
         assert run(*args, in_ms).exit_code in (0, 1)
     assert run("suggest", "--td", "0.4", in_ms).exit_code in (0, 1)
     named = Path(in_ms).read_text().replace("time,", "time [s],")
-    Path(in_ms).write_text(named)  # there is no larger unit that a time would be given in
+    Path(in_ms).write_text(
+        named
+    )  # there is no larger unit that a time would be given in
     assert run("suggest", "--td", "0.064", in_ms).exit_code in (0, 1)
 
 
@@ -156,16 +225,24 @@ def test_ndjson_is_the_json_in_one_line() -> None:
         (("explore", "--td-window", "0.06", "0.07", "--steps", "5"), "good", 0),
     ],
 )
-def test_a_pair_may_be_asked_to_be_good(args: tuple[str, ...], wanted: str, code: int) -> None:
+def test_a_pair_may_be_asked_to_be_good(
+    args: tuple[str, ...], wanted: str, code: int
+) -> None:
     plain = run(*args, "-q", "-f", "csv", ENERGY)
     asked = run(*args, "-q", "-f", "csv", "--min-quality", wanted, ENERGY)
     assert (plain.exit_code, asked.exit_code) == (0, code)
     assert asked.stdout == plain.stdout
-    assert args[0] != "verify" or run(*args, "-q", "--exit-zero", "--min-quality", wanted, ENERGY).exit_code == 0
+    assert (
+        args[0] != "verify"
+        or run(*args, "-q", "--exit-zero", "--min-quality", wanted, ENERGY).exit_code
+        == 0
+    )
 
 
 def test_the_number_is_the_first_line_whatever_its_quality() -> None:
-    found = run("suggest", "--td", "0.064", "-q", "-f", "value", "--min-quality", "fair", ENERGY)
+    found = run(
+        "suggest", "--td", "0.064", "-q", "-f", "value", "--min-quality", "fair", ENERGY
+    )
     assert found.exit_code == 1
     assert float(found.stdout.splitlines()[0]) == pytest.approx(0.0128853, abs=1e-7)
 
@@ -173,12 +250,19 @@ def test_the_number_is_the_first_line_whatever_its_quality() -> None:
 @pytest.mark.slow
 def test_the_command_on_a_page_can_be_pasted(tmp_path: Path) -> None:
     page = tmp_path / "page.html"
-    assert run("study", "--td", "0.064", "-q", "--report", str(page), ENERGY).exit_code == 0
+    assert (
+        run("study", "--td", "0.064", "-q", "--report", str(page), ENERGY).exit_code
+        == 0
+    )
     first = page.read_text("utf-8")
     line = re.search(r"d2rpick study --td 0\.064 [^<]+ --overwrite", first)
     assert line is not None
     again = subprocess.run(
-        [sys.executable, "-m", *line[0].split()], capture_output=True, check=False, cwd=ROOT, timeout=TIME_LIMIT
+        [sys.executable, "-m", *line[0].split()],
+        capture_output=True,
+        check=False,
+        cwd=ROOT,
+        timeout=TIME_LIMIT,
     )
     assert again.returncode == 0, again.stderr
     assert page.read_text("utf-8") == first
@@ -202,7 +286,11 @@ def test_the_manual_holds_every_command_and_option() -> None:
 @pytest.mark.skipif(not shutil.which("groff"), reason="groff is not installed")
 def test_the_manual_is_roff_without_warnings() -> None:
     shown = subprocess.run(
-        ["groff", "-man", "-ww", "-Tutf8"], input=manual(), capture_output=True, text=True, check=True
+        ["groff", "-man", "-ww", "-Tutf8"],
+        input=manual(),
+        capture_output=True,
+        text=True,
+        check=True,
     )
     assert not shown.stderr
     assert "d2rpick" in shown.stdout
@@ -223,23 +311,34 @@ def settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def shown(*args: str) -> dict[str, str]:
     """The settings that are not the default, with their values and sources."""
     lines = run(*args, "--show-settings").stdout.splitlines()
-    return dict(line.split(" = ", 1) for line in lines if not line.endswith("# default"))
+    return dict(
+        line.split(" = ", 1) for line in lines if not line.endswith("# default")
+    )
 
 
 def test_the_command_line_counts_before_the_environment_and_that_before_the_settings(
     settings: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    settings.write_text("[tool.d2rpick]\nmargin = 0.001\nmax-residual = 0.3\n[tool.d2rpick.suggest]\nmargin = 0.002\n")
+    settings.write_text(
+        "[tool.d2rpick]\nmargin = 0.001\nmax-residual = 0.3\n[tool.d2rpick.suggest]\nmargin = 0.002\n"
+    )
     assert shown(*ASKED)["margin"] == f"0.002  # settings, {settings}"
-    assert shown("verify", "--tr", "0.01", *ASKED[1:])["margin"] == f"0.001  # settings, {settings}"
+    assert (
+        shown("verify", "--tr", "0.01", *ASKED[1:])["margin"]
+        == f"0.001  # settings, {settings}"
+    )
     monkeypatch.setenv("D2RPICK_SUGGEST_MARGIN", "0.003")
     found = shown(*ASKED, "--max-residual", "0.4")
     assert found["margin"] == "0.003  # environment, D2RPICK_SUGGEST_MARGIN"
     assert found["max-residual"] == "0.4  # command line"
 
 
-def test_an_answer_names_what_came_from_the_settings_and_can_be_asked_again_without_them(settings: Path) -> None:
-    settings.write_text("[tool.d2rpick]\nmargin = 0.001\nenergy = 'internal_energy'\nno-verify = true\n")
+def test_an_answer_names_what_came_from_the_settings_and_can_be_asked_again_without_them(
+    settings: Path,
+) -> None:
+    settings.write_text(
+        "[tool.d2rpick]\nmargin = 0.001\nenergy = 'internal_energy'\nno-verify = true\n"
+    )
     told = run(*ASKED)
     words = "--energy internal_energy --margin 0.001 --no-verify"
     assert told.stderr.startswith(f"note: {words} by {settings}\n")
@@ -251,21 +350,32 @@ def test_an_answer_names_what_came_from_the_settings_and_can_be_asked_again_with
     assert again["candidates"] == found["candidates"]
 
 
-def test_settings_give_way_to_what_excludes_them_and_wait_for_what_they_belong_to(settings: Path) -> None:
+def test_settings_give_way_to_what_excludes_them_and_wait_for_what_they_belong_to(
+    settings: Path,
+) -> None:
     settings.write_text(
         "[tool.d2rpick]\nno-verify = true\nweights = 'site.json'\nstep-ratio = 4\nnode = 7\nafter = 0.01\n"
     )
-    assert {"fit-window", "after"} == {*shown(*ASKED, "--fit-window", "0", "0.1")} - {"td", "history"}
+    assert {"fit-window", "after"} == {*shown(*ASKED, "--fit-window", "0", "0.1")} - {
+        "td",
+        "history",
+    }
     assert {"no-verify", "after", "weights", "step-ratio", "deck"} == {
         *shown(*ASKED, "--deck", DECK),
     } - {"td", "history"}
-    assert "../site.json" in shown(*ASKED, "--deck", DECK)["weights"]  # files lie where the settings do
+    assert (
+        "../site.json" in shown(*ASKED, "--deck", DECK)["weights"]
+    )  # files lie where the settings do
     assert run("check", DECK).exit_code == 0  # without a history nothing is judged
     assert "node" in shown("card", "--solver", "radioss", "--tr", "1", "--td", "2")
 
 
-def test_an_oscillator_in_the_settings_gives_way_to_what_excludes_it(settings: Path) -> None:
-    settings.write_text("[tool.d2rpick]\nstiffness = 1\nmass = 1\nbeta = 2\nalpha = 0\nv0 = 1\n")
+def test_an_oscillator_in_the_settings_gives_way_to_what_excludes_it(
+    settings: Path,
+) -> None:
+    settings.write_text(
+        "[tool.d2rpick]\nstiffness = 1\nmass = 1\nbeta = 2\nalpha = 0\nv0 = 1\n"
+    )
     given = {*shown(*ASKED)} - {"td", "history"}
     assert given == {"stiffness", "mass", "beta", "alpha", "v0"}
     for option in (("--no-verify",), ("--fit-window", "0", "0.1")):
@@ -273,8 +383,12 @@ def test_an_oscillator_in_the_settings_gives_way_to_what_excludes_it(settings: P
     assert given - {*shown(*ASKED, "--frame-mass", "2")} == {"beta"}
 
 
-def test_the_check_takes_its_history_and_what_fails_it_from_the_settings(settings: Path) -> None:
-    settings.write_text(f"[tool.d2rpick]\nhistory = ['{ENERGY}']\nfail-on = 'warning'\nignore = ['D2R202']\n")
+def test_the_check_takes_its_history_and_what_fails_it_from_the_settings(
+    settings: Path,
+) -> None:
+    settings.write_text(
+        f"[tool.d2rpick]\nhistory = ['{ENERGY}']\nfail-on = 'warning'\nignore = ['D2R202']\n"
+    )
     result = run("check", DECK)
     assert result.exit_code == 1
     assert "D2R203" in result.stdout
@@ -295,7 +409,9 @@ def test_the_check_takes_its_history_and_what_fails_it_from_the_settings(setting
         ("fit-window = [1]", "fit-window: "),
     ],
 )
-def test_settings_that_are_none_are_named_with_their_file(settings: Path, text: str, message: str) -> None:
+def test_settings_that_are_none_are_named_with_their_file(
+    settings: Path, text: str, message: str
+) -> None:
     settings.write_text(f"[tool.d2rpick]\n{text}\n")
     result = run(*ASKED)
     assert result.exit_code == 2

@@ -41,7 +41,13 @@ ROLLING = ("suggest", "--td", "0.37", "--energy", "boxIE_J", ROLLOVER)
 def program(*args: str, **options: Any) -> CompletedProcess[str]:
     """Run ``python -m d2rpick`` as a process of its own."""
     command = [sys.executable, "-m", "d2rpick", *args]
-    given = {"capture_output": True, "text": True, "cwd": ROOT, "timeout": TIME_LIMIT, **options}
+    given = {
+        "capture_output": True,
+        "text": True,
+        "cwd": ROOT,
+        "timeout": TIME_LIMIT,
+        **options,
+    }
     return subprocess.run(command, check=False, **given)
 
 
@@ -49,31 +55,49 @@ def program(*args: str, **options: Any) -> CompletedProcess[str]:
 
 
 @pytest.mark.parametrize(("source", "digits"), [(ENERGY, 1e-10), (GLSTAT, 1e-5)])
-def test_the_published_record_gets_the_published_answer(source: str, digits: float) -> None:
+def test_the_published_record_gets_the_published_answer(
+    source: str, digits: float
+) -> None:
     found = answer(*SUGGEST, source)
     assert found["basis"] == "oscillator"
-    assert found["recommended"] == {"tr": pytest.approx(paper.CROSSINGS[2][0] / 1e3, rel=digits), "td": 0.064}
+    assert found["recommended"] == {
+        "tr": pytest.approx(paper.CROSSINGS[2][0] / 1e3, rel=digits),
+        "td": 0.064,
+    }
     assert found["kinetic_share"] == pytest.approx(paper.KINETIC_SHARE, rel=digits)
     assert found["better_td"]["td"] == pytest.approx(paper.BETTER_TD, rel=digits)
     assert found["better_td"]["tr"] == pytest.approx(paper.BETTER_TR, rel=digits)
     assert found["better_td"]["residual"] == pytest.approx(0, abs=10 * digits)
-    assert [(w["code"], "92%" in w["message"]) for w in found["warnings"]] == [("poor-td", True)]
+    assert [(w["code"], "92%" in w["message"]) for w in found["warnings"]] == [
+        ("poor-td", True)
+    ]
 
 
 def test_what_a_pair_keeps_and_how_good_it_is_are_two_things() -> None:
     poor = unwrapped(run("verify", "--tr", "0.0128853", "--td", "0.064", ENERGY).stdout)
     assert poor.startswith("verdict verified: tr lies in the flight")
-    assert "quality poor: the vibration after td is off by 96% motion good vibration poor: the vibration" in poor
-    alone = unwrapped(run("verify", "--tr", "0.0128853", "--td", "0.064", "--no-verify", ENERGY).stdout)
+    assert (
+        "quality poor: the vibration after td is off by 96% motion good vibration poor: the vibration"
+        in poor
+    )
+    alone = unwrapped(
+        run(
+            "verify", "--tr", "0.0128853", "--td", "0.064", "--no-verify", ENERGY
+        ).stdout
+    )
     assert alone.startswith(
         "verdict verified by the energy level alone: tr lies in the flight, its level is within the tolerance quality "
     )
 
 
-def test_the_better_pair_verifies_and_the_crossing_before_it_of_opposite_sign_does_not() -> None:
+def test_the_better_pair_verifies_and_the_crossing_before_it_of_opposite_sign_does_not() -> (
+    None
+):
     good = run("verify", "--tr", "0.0135867", "--td", "0.0687534", ENERGY)
     assert good.exit_code == 0
-    assert good.stdout.startswith("verdict  verified: tr lies in the flight, its sign matches and its error is within")
+    assert good.stdout.startswith(
+        "verdict  verified: tr lies in the flight, its sign matches and its error is within"
+    )
     assert good.stdout.splitlines()[1] == "quality  good"
     bad = answer("verify", "--tr", "0.0122659", "--td", "0.064", ENERGY)
     assert (bad["verified"], bad["tr_ok"], bad["sign_match"]) == (False, False, False)
@@ -85,43 +109,73 @@ def test_the_better_pair_verifies_and_the_crossing_before_it_of_opposite_sign_do
 
 def test_an_oscillator_can_be_given_instead_of_identified() -> None:
     given, identified = answer(*SUGGEST, *OSCILLATOR, ENERGY), answer(*SUGGEST, ENERGY)
-    assert (given["oscillator"]["source"], identified["oscillator"]["source"]) == ("given", "identified")
+    assert (given["oscillator"]["source"], identified["oscillator"]["source"]) == (
+        "given",
+        "identified",
+    )
     assert given["oscillator"]["omega"] == pytest.approx(paper.OMEGA_2, rel=1e-13)
-    assert given["kinetic_share"] == pytest.approx(identified["kinetic_share"], rel=1e-9)
+    assert given["kinetic_share"] == pytest.approx(
+        identified["kinetic_share"], rel=1e-9
+    )
     times = [[c["tr"] for c in found["candidates"]] for found in (given, identified)]
     np.testing.assert_allclose(times[0], times[1], rtol=1e-9)
-    assert [c["acceptable"] for c in given["candidates"]] == [c["acceptable"] for c in identified["candidates"]]
+    assert [c["acceptable"] for c in given["candidates"]] == [
+        c["acceptable"] for c in identified["candidates"]
+    ]
 
 
 def test_beta_is_the_ratio_of_the_masses() -> None:
-    by_mass = shlex.split("--stiffness 660e3 --mass 31.4 --frame-mass 15.7 --alpha 50 --v0 6")
-    assert answer(*SUGGEST, *by_mass, ENERGY)["candidates"] == answer(*SUGGEST, *OSCILLATOR, ENERGY)["candidates"]
+    by_mass = shlex.split(
+        "--stiffness 660e3 --mass 31.4 --frame-mass 15.7 --alpha 50 --v0 6"
+    )
+    assert (
+        answer(*SUGGEST, *by_mass, ENERGY)["candidates"]
+        == answer(*SUGGEST, *OSCILLATOR, ENERGY)["candidates"]
+    )
 
 
 def test_an_oscillator_that_is_not_that_of_the_record_is_not_relied_on() -> None:
     found = answer(*SUGGEST, *OSCILLATOR[:-1], "7", ENERGY)
-    assert (found["basis"], found["oscillator"]["describes_record"]) == ("energy", False)
+    assert (found["basis"], found["oscillator"]["describes_record"]) == (
+        "energy",
+        False,
+    )
     assert found["oscillator"]["reason"]
 
 
 def test_a_fit_window_gives_the_same_oscillator_from_a_part_of_the_record() -> None:
     found = answer(*SUGGEST, "--fit-window", "0.02", "0.1", ENERGY)
     assert found["oscillator"]["omega"] == pytest.approx(paper.OMEGA_2, rel=1e-9)
-    assert found["recommended"]["tr"] == pytest.approx(paper.CROSSINGS[2][0] / 1e3, rel=1e-9)
+    assert found["recommended"]["tr"] == pytest.approx(
+        paper.CROSSINGS[2][0] / 1e3, rel=1e-9
+    )
 
 
 def test_without_verification_only_the_energy_level_counts() -> None:
     found = answer(*SUGGEST, "--no-verify", ENERGY)
-    assert (found["basis"], found["oscillator"], found["kinetic_share"]) == ("energy", None, None)
+    assert (found["basis"], found["oscillator"], found["kinetic_share"]) == (
+        "energy",
+        None,
+        None,
+    )
     assert {c["sign_match"] for c in found["candidates"]} == {None}
 
 
 @pytest.mark.parametrize("options", [("--after", "0.02"), ("--margin", "0.02")])
-def test_nothing_before_the_end_of_the_load_and_the_margin_is_acceptable(options: tuple[str, str]) -> None:
+def test_nothing_before_the_end_of_the_load_and_the_margin_is_acceptable(
+    options: tuple[str, str],
+) -> None:
     found = answer(*SUGGEST, *options, ENERGY)
-    assert found["recommended"]["tr"] == pytest.approx(paper.CROSSINGS[3][0] / 1e3, rel=1e-9)
+    assert found["recommended"]["tr"] == pytest.approx(
+        paper.CROSSINGS[3][0] / 1e3, rel=1e-9
+    )
     assert min(c["tr"] for c in found["candidates"] if c["acceptable"]) > 0.02
-    assert answer("verify", "--tr", "0.0128853", "--td", "0.064", *options, ENERGY)["tr_ok"] is False
+    assert (
+        answer("verify", "--tr", "0.0128853", "--td", "0.064", *options, ENERGY)[
+            "tr_ok"
+        ]
+        is False
+    )
 
 
 def test_after_moves_the_start_of_the_flight_and_says_so() -> None:
@@ -131,19 +185,32 @@ def test_after_moves_the_start_of_the_flight_and_says_so() -> None:
 
 @pytest.mark.parametrize("tolerance", [0.001, 0.05, 0.2])
 def test_the_tolerance_bounds_what_is_acceptable(tolerance: float) -> None:
-    candidates = answer(*ROLLING, "--no-verify", "--tolerance", str(tolerance))["candidates"]
+    candidates = answer(*ROLLING, "--no-verify", "--tolerance", str(tolerance))[
+        "candidates"
+    ]
     assert max(c["level_error"] for c in candidates if c["acceptable"]) <= tolerance
-    assert all(c["level_error"] <= tolerance for c in candidates if c["kind"] == "extremum")
+    assert all(
+        c["level_error"] <= tolerance for c in candidates if c["kind"] == "extremum"
+    )
 
 
 @pytest.mark.parametrize(
-    ("limit", "measure"), [(("--max-kinetic-share", "0.5"), "kinetic share"), (("--max-residual", "0.9"), "residual")]
+    ("limit", "measure"),
+    [
+        (("--max-kinetic-share", "0.5"), "kinetic share"),
+        (("--max-residual", "0.9"), "residual"),
+    ],
 )
-def test_a_limit_turns_a_poor_pair_into_an_objection(limit: tuple[str, str], measure: str) -> None:
+def test_a_limit_turns_a_poor_pair_into_an_objection(
+    limit: tuple[str, str], measure: str
+) -> None:
     found = answer(*SUGGEST, *limit, ENERGY)
     assert found["recommended"] is None
     assert found["better_td"] is not None
-    assert any(measure in w["message"] and w["code"] == "no-candidate" for w in found["warnings"])
+    assert any(
+        measure in w["message"] and w["code"] == "no-candidate"
+        for w in found["warnings"]
+    )
     judged = answer("verify", "--tr", "0.0128853", "--td", "0.064", *limit, ENERGY)
     assert (judged["verified"], judged["tr_ok"]) == (False, True)
     assert any(measure in reason for reason in judged["reasons"])
@@ -151,11 +218,18 @@ def test_a_limit_turns_a_poor_pair_into_an_objection(limit: tuple[str, str], mea
 
 
 def test_limit_shortens_the_table_but_not_json_and_csv() -> None:
-    *rows, more = run(*SUGGEST, "--limit", "2", ENERGY).stdout.partition(" verdict\n")[2].splitlines()
+    *rows, more = (
+        run(*SUGGEST, "--limit", "2", ENERGY)
+        .stdout.partition(" verdict\n")[2]
+        .splitlines()
+    )
     assert [row.lstrip("* ").split()[0] for row in rows] == ["1", "2"]
     assert more == "... and 8 more (--limit)"
     assert len(answer(*SUGGEST, "--limit", "2", ENERGY)["candidates"]) == 10
-    assert len(run(*SUGGEST, "--limit", "2", "-f", "csv", ENERGY).stdout.splitlines()) == 11
+    assert (
+        len(run(*SUGGEST, "--limit", "2", "-f", "csv", ENERGY).stdout.splitlines())
+        == 11
+    )
 
 
 def test_columns_are_chosen_by_name_or_number_and_energies_added() -> None:
@@ -173,20 +247,34 @@ def test_columns_are_chosen_by_name_or_number_and_energies_added() -> None:
 
 
 @pytest.mark.parametrize("suffix", ["csv", "glstat"])
-def test_a_replayed_history_read_back_has_the_same_answer(suffix: str, tmp_path: Path) -> None:
+def test_a_replayed_history_read_back_has_the_same_answer(
+    suffix: str, tmp_path: Path
+) -> None:
     name = str(tmp_path / f"again.{suffix}")
     written = run("replay", *OSCILLATOR, "--t-end", "0.15", "--dt", "1e-4", "-o", name)
     assert (written.exit_code, written.stdout, written.stderr) == (0, "", "")
-    again, sample = answer(*SUGGEST, name), answer(*SUGGEST, GLSTAT if suffix == "glstat" else ENERGY)
+    again, sample = (
+        answer(*SUGGEST, name),
+        answer(*SUGGEST, GLSTAT if suffix == "glstat" else ENERGY),
+    )
     assert again["history"]["format"] == suffix
-    assert again["recommended"]["tr"] == pytest.approx(sample["recommended"]["tr"], rel=1e-10)
+    assert again["recommended"]["tr"] == pytest.approx(
+        sample["recommended"]["tr"], rel=1e-10
+    )
 
 
 def test_replay_writes_the_motion_through_both_switches() -> None:
-    result = run("replay", *OSCILLATOR, *shlex.split("--tr 0.006 --td 0.08 --t-end 0.15 --dt 1e-3"))
+    result = run(
+        "replay",
+        *OSCILLATOR,
+        *shlex.split("--tr 0.006 --td 0.08 --t-end 0.15 --dt 1e-3"),
+    )
     head, *rows = result.stdout.splitlines()
     assert head == "time,z,y,vz,vy,internal_energy,kinetic_energy"
-    table = {float(row.split(",")[0]): [float(cell) for cell in row.split(",")] for row in rows}
+    table = {
+        float(row.split(",")[0]): [float(cell) for cell in row.split(",")]
+        for row in rows
+    }
     assert len(table) == 151
     for expected in paper.SWITCHED_6_80:
         np.testing.assert_allclose(table[expected[0]][:6], expected, rtol=1e-11)
@@ -195,22 +283,41 @@ def test_replay_writes_the_motion_through_both_switches() -> None:
 def test_a_replay_that_starts_in_the_middle_goes_on_as_the_whole_does() -> None:
     def motion(*args: str) -> np.ndarray:
         text = run("replay", *OSCILLATOR[:-2], *args, "--dt", "1e-3").stdout
-        return np.array([[float(cell) for cell in row.split(",")] for row in text.splitlines()[1:]])
+        return np.array(
+            [[float(cell) for cell in row.split(",")] for row in text.splitlines()[1:]]
+        )
 
     whole = motion("--v0", "6", "--tr", "0.03", "--td", "0.05", "--t-end", "0.1")
     _, z, y, vz, vy, *_ = whole[20].tolist()
-    start = [f"--{name}={value!r}" for name, value in (("z0", z), ("y0", y), ("vz0", vz), ("vy0", vy))]
+    start = [
+        f"--{name}={value!r}"
+        for name, value in (("z0", z), ("y0", y), ("vz0", vz), ("vy0", vy))
+    ]
     later = motion(*start, "--tr", "0.01", "--td", "0.03", "--t-end", "0.08")
     np.testing.assert_allclose(later[:, 1:], whole[20:, 1:], rtol=1e-10, atol=1e-12)
 
 
 def test_velocity_of_the_frame_has_two_names() -> None:
     rest = (*OSCILLATOR[:-2], "--t-end", "0.01", "--dt", "1e-3")
-    assert run("replay", *rest, "--v0", "6").stdout == run("replay", *rest, "--vz0", "6", "--y0", "0").stdout
+    assert (
+        run("replay", *rest, "--v0", "6").stdout
+        == run("replay", *rest, "--vz0", "6", "--y0", "0").stdout
+    )
 
 
-def test_what_stdout_is_given_and_what_a_file_is_given_is_the_same(tmp_path: Path) -> None:
-    args = ("replay", *OSCILLATOR, "--t-end", "0.01", "--dt", "1e-3", "--write-as", "glstat")
+def test_what_stdout_is_given_and_what_a_file_is_given_is_the_same(
+    tmp_path: Path,
+) -> None:
+    args = (
+        "replay",
+        *OSCILLATOR,
+        "--t-end",
+        "0.01",
+        "--dt",
+        "1e-3",
+        "--write-as",
+        "glstat",
+    )
     run(*args, "-o", str(tmp_path / "motion.csv"))
     assert (tmp_path / "motion.csv").read_text() == run(*args).stdout
 
@@ -218,13 +325,19 @@ def test_what_stdout_is_given_and_what_a_file_is_given_is_the_same(tmp_path: Pat
 @pytest.mark.parametrize("line", [line for line in (ROOT / "sample_data/README.md").read_text().split("`")
                                   if line.startswith("d2rpick replay")])  # fmt: skip
 @pytest.mark.parametrize("name", ["energy.csv", "energy.glstat"])
-def test_the_sample_data_is_what_the_command_beside_it_writes(line: str, name: str, here: Path) -> None:
+def test_the_sample_data_is_what_the_command_beside_it_writes(
+    line: str, name: str, here: Path
+) -> None:
     (here / "sample_data").mkdir()
     args = shlex.split(line.replace("energy.csv", name))
     assert run(*args[1:]).exit_code == 0
-    fresh, kept = (read_history([str(folder / "sample_data" / name)]) for folder in (Path(), ROOT))
+    fresh, kept = (
+        read_history([str(folder / "sample_data" / name)]) for folder in (Path(), ROOT)
+    )
     np.testing.assert_allclose(fresh.time, kept.time, rtol=1e-14)
-    np.testing.assert_allclose(fresh.energy, kept.energy, rtol=1e-5 if "glstat" in name else 1e-11, atol=1e-13)
+    np.testing.assert_allclose(
+        fresh.energy, kept.energy, rtol=1e-5 if "glstat" in name else 1e-11, atol=1e-13
+    )
 
 
 # The program.
@@ -240,7 +353,14 @@ def test_a_reader_that_has_seen_enough_ends_the_program_silently() -> None:
     read_end, write_end = os.pipe()
     os.close(read_end)
     args = [sys.executable, "-m", "d2rpick", *SUGGEST, "-q", ENERGY]
-    result = subprocess.run(args, stdout=write_end, stderr=subprocess.PIPE, check=False, cwd=ROOT, timeout=TIME_LIMIT)
+    result = subprocess.run(
+        args,
+        stdout=write_end,
+        stderr=subprocess.PIPE,
+        check=False,
+        cwd=ROOT,
+        timeout=TIME_LIMIT,
+    )
     os.close(write_end)
     assert (result.returncode, result.stderr) == (141, b"")
 
@@ -253,7 +373,11 @@ def test_debug_shows_the_traceback_and_the_message() -> None:
 
 
 def test_options_come_from_the_environment_too() -> None:
-    result = run("suggest", ENERGY, env={"D2RPICK_SUGGEST_TD": "0.064", "D2RPICK_SUGGEST_OUTPUT_FORMAT": "value"})
+    result = run(
+        "suggest",
+        ENERGY,
+        env={"D2RPICK_SUGGEST_TD": "0.064", "D2RPICK_SUGGEST_OUTPUT_FORMAT": "value"},
+    )
     assert float(result.stdout) == pytest.approx(paper.CROSSINGS[2][0] / 1e3, rel=1e-10)
     assert run("suggest", ENERGY, env={"D2RPICK_SUGGEST_TD": "soon"}).exit_code == 2
 
@@ -282,12 +406,17 @@ def test_an_option_overrules_those_in_the_environment_that_it_excludes(
     command: str, args: str, env: dict[str, str]
 ) -> None:
     named = {f"D2RPICK_{command}_{name}".upper(): value for name, value in env.items()}
-    plain, overruled = (run(command, *args.split(), "-f", "csv", ENERGY, env=each) for each in ({}, named))
+    plain, overruled = (
+        run(command, *args.split(), "-f", "csv", ENERGY, env=each)
+        for each in ({}, named)
+    )
     assert overruled.exit_code in (0, 1), overruled.stderr
     assert (overruled.exit_code, overruled.stdout) == (plain.exit_code, plain.stdout)
 
 
-def test_options_that_exclude_each_other_are_refused_where_both_come_from_the_environment() -> None:
+def test_options_that_exclude_each_other_are_refused_where_both_come_from_the_environment() -> (
+    None
+):
     both = {"D2RPICK_SUGGEST_TD_WINDOW": "0.06 0.07", "D2RPICK_SUGGEST_TD": "0.064"}
     assert run("suggest", ENERGY, env=both).exit_code == 2
 
@@ -307,7 +436,11 @@ def test_without_a_command_the_help_is_an_error_message() -> None:
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_the_shell_completes_the_names_of_commands(command: str) -> None:
-    env = {"_D2RPICK_COMPLETE": "bash_complete", "COMP_WORDS": f"d2rpick {command[:4]}", "COMP_CWORD": "1"}
+    env = {
+        "_D2RPICK_COMPLETE": "bash_complete",
+        "COMP_WORDS": f"d2rpick {command[:4]}",
+        "COMP_CWORD": "1",
+    }
     assert run(env=env).stdout.strip() == f"plain,{command}"
 
 
@@ -321,7 +454,11 @@ def test_the_shell_completes_the_names_of_commands(command: str) -> None:
 )  # fmt: skip
 def test_the_shell_completes_the_names_of_files(words: str) -> None:
     typed = words.split()
-    env = {"_D2RPICK_COMPLETE": "bash_complete", "COMP_WORDS": f"d2rpick {words}", "COMP_CWORD": f"{len(typed)}"}
+    env = {
+        "_D2RPICK_COMPLETE": "bash_complete",
+        "COMP_WORDS": f"d2rpick {words}",
+        "COMP_CWORD": f"{len(typed)}",
+    }
     assert run(env=env).stdout.strip() == f"file,{typed[-1]}"
 
 
@@ -340,10 +477,16 @@ def examples(command: str) -> list[list[str]]:
 
 @pytest.mark.usefixtures("by_level")
 @pytest.mark.parametrize(
-    "command", [pytest.param(one, marks=pytest.mark.slow) if one in SLOW else one for one in ("", *COMMANDS)]
+    "command",
+    [
+        pytest.param(one, marks=pytest.mark.slow) if one in SLOW else one
+        for one in ("", *COMMANDS)
+    ],
 )
 @pytest.mark.usefixtures("here")
-def test_every_help_ends_with_examples_that_run(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_help_ends_with_examples_that_run(
+    command: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("D2RPICK_EXPLORE_STEPS", "4")
     monkeypatch.setenv("D2RPICK_ROLLOVER_DT", "1e-3")
     monkeypatch.setenv("D2RPICK_ROLLOVER_MESH", "4")
@@ -367,11 +510,15 @@ def test_the_help_names_each_command_in_a_line() -> None:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_help_is_the_same_by_its_short_name_and_explains_every_option(command: str) -> None:
+def test_help_is_the_same_by_its_short_name_and_explains_every_option(
+    command: str,
+) -> None:
     text = run(command, "--help").stdout
     assert run(command, "-h").stdout == text
     entries = [
-        line for line in text.split("Examples:")[0].replace("\n      ", " ").split("\n") if line.startswith("  -")
+        line
+        for line in text.split("Examples:")[0].replace("\n      ", " ").split("\n")
+        if line.startswith("  -")
     ]
     assert entries
     for entry in entries:

@@ -24,7 +24,11 @@ SCHEMA = json.loads((ROOT / "d2rpick/schemas/explore-1.json").read_text("utf-8")
     [
         (WINDOW, (), ENERGY),
         ((*WINDOW, "--td", "0.064"), ("--cost-share", "0.8"), ENERGY),
-        (("--steps", "2"), ("--part", "box", "--strict", "--max-residual", "0.1"), MATSUM),
+        (
+            ("--steps", "2"),
+            ("--part", "box", "--strict", "--max-residual", "0.1"),
+            MATSUM,
+        ),
     ],
 )
 def test_the_json_keeps_its_schema_and_every_offer_is_what_suggest_says(
@@ -32,7 +36,9 @@ def test_the_json_keeps_its_schema_and_every_offer_is_what_suggest_says(
 ) -> None:
     found = checked("explore", *explored, *options, source)
     offers = found["offers"]
-    assert offers[0].keys() == SCHEMA["properties"]["offers"]["items"]["properties"].keys()
+    assert (
+        offers[0].keys() == SCHEMA["properties"]["offers"]["items"]["properties"].keys()
+    )
     assert all(low["td"] < high["td"] for low, high in pairwise(offers))
     for one in offers[:: max(1, len(offers) // 3)]:
         alone = answer("suggest", "--td", repr(one["td"]), *options, source)
@@ -41,13 +47,26 @@ def test_the_json_keeps_its_schema_and_every_offer_is_what_suggest_says(
         assert (one["kinetic_share"], one["energy_td"], one["basis"]) == (
             alone["kinetic_share"], alone["energy_td"], alone["basis"],
         )  # fmt: skip
-        assert (one["quality"], one["expected"]) == (alone["quality"], alone["expected"])
-        for name in ("residual", "level_error", "lock_in_error", "timing_tolerance", "rigid_time", "run_time_share"):
+        assert (one["quality"], one["expected"]) == (
+            alone["quality"],
+            alone["expected"],
+        )
+        for name in (
+            "residual",
+            "level_error",
+            "lock_in_error",
+            "timing_tolerance",
+            "rigid_time",
+            "run_time_share",
+        ):
             assert one[name] == (best and best[name])
 
 
 def test_the_recommended_pair_is_that_of_suggest() -> None:
-    found, chosen = answer("explore", *WINDOW, ENERGY), answer("suggest", *WINDOW[:3], ENERGY)
+    found, chosen = (
+        answer("explore", *WINDOW, ENERGY),
+        answer("suggest", *WINDOW[:3], ENERGY),
+    )
     assert found["recommended"] == chosen["recommended"]
     (marked,) = (one for one in found["offers"] if one["recommended"])
     assert {"tr": marked["tr"], "td": marked["td"]} == found["recommended"]
@@ -67,48 +86,87 @@ def test_the_sentence_says_what_a_step_changes() -> None:
     assert good == "td = 0.0687534: residual 0.000; no other td in the window is better"
 
 
-def test_a_td_that_saves_little_is_no_step_and_the_sentence_says_so(tmp_path: Path) -> None:
+def test_a_td_that_saves_little_is_no_step_and_the_sentence_says_so(
+    tmp_path: Path,
+) -> None:
     time = np.linspace(0, 1, 501)
     later = np.maximum(time - 0.2, 0.0)  # at rest, then two modes of their own
     energy = 1 + 0.3 * np.sin(41 * later) ** 2 + 0.2 * np.sin(97 * later) ** 2
     file = tmp_path / "run.csv"
     pd.DataFrame({"time": time, "internal_energy": energy}).to_csv(file, index=False)
-    found = answer("explore", "--td", "0.996", "--after", "0", "--no-verify", "--steps", "20", str(file))
+    found = answer(
+        "explore",
+        "--td",
+        "0.996",
+        "--after",
+        "0",
+        "--no-verify",
+        "--steps",
+        "20",
+        str(file),
+    )
     (start,) = (one for one in found["offers"] if one["td"] == 0.996)
-    halved = [one for one in found["offers"] if one["error"] is not None and one["error"] <= start["error"] / 2]
+    halved = [
+        one
+        for one in found["offers"]
+        if one["error"] is not None and one["error"] <= start["error"] / 2
+    ]
     assert halved
     assert max(one["rigid_time"] for one in halved) < start["rigid_time"] / 2
     assert found["step"] is None
-    assert found["answer"].endswith("; no other td in the window has half of it and keeps half of the rigid time")
+    assert found["answer"].endswith(
+        "; no other td in the window has half of it and keeps half of the rigid time"
+    )
 
 
 @pytest.mark.slow
 def test_every_form_has_the_same_offers(tmp_path: Path) -> None:
     found = answer("explore", *WINDOW, ENERGY)["offers"]
-    rows = list(csv.DictReader(io.StringIO(run("explore", *WINDOW, "-f", "csv", ENERGY).stdout)))
+    rows = list(
+        csv.DictReader(io.StringIO(run("explore", *WINDOW, "-f", "csv", ENERGY).stdout))
+    )
     assert [float(row["td"]) for row in rows] == [one["td"] for one in found]
-    assert [float(row["residual"]) for row in rows] == [one["residual"] for one in found]
+    assert [float(row["residual"]) for row in rows] == [
+        one["residual"] for one in found
+    ]
     frame = d2.explore(d2.read(ENERGY), td_window=(0.06, 0.07), steps=10).to_frame()
     assert frame["td"].tolist() == [one["td"] for one in found]
     assert frame["unbeaten"].tolist() == [one["unbeaten"] for one in found]
     table = run("explore", *WINDOW, "--limit", "3", ENERGY).stdout
     assert f"... and {len(found) - 3} more td" in table
-    assert run("explore", *WINDOW, "-f", "markdown", ENERGY).stdout.startswith("|  | td |")
+    assert run("explore", *WINDOW, "-f", "markdown", ENERGY).stdout.startswith(
+        "|  | td |"
+    )
     picture = tmp_path / "x.svg"
     assert run("explore", *WINDOW, "-q", "--plot", str(picture), ENERGY).exit_code == 0
     assert b"<svg" in picture.read_bytes()
 
 
 def test_nothing_to_recommend_is_an_objection() -> None:
-    result = run("explore", "--steps", "4", "--max-residual", "0.001", "--td-window", "0.06", "0.064", ENERGY)
+    result = run(
+        "explore",
+        "--steps",
+        "4",
+        "--max-residual",
+        "0.001",
+        "--td-window",
+        "0.06",
+        "0.064",
+        ENERGY,
+    )
     assert result.exit_code == 1
     assert "no td in the window has an acceptable tr" in result.stdout
     assert "no-candidate" in result.stderr
 
 
 @pytest.mark.slow
-def test_a_td_where_nothing_flies_is_answered_as_suggest_answers_it(tmp_path: Path) -> None:
-    ramp = put(tmp_path / "ramp.csv", "time,internal_energy\n" + "".join(f"{i / 100},{i * i}\n" for i in range(101)))
+def test_a_td_where_nothing_flies_is_answered_as_suggest_answers_it(
+    tmp_path: Path,
+) -> None:
+    ramp = put(
+        tmp_path / "ramp.csv",
+        "time,internal_energy\n" + "".join(f"{i / 100},{i * i}\n" for i in range(101)),
+    )
     assert "give the end of the load as --after" in run("explore", str(ramp)).stderr
     asked = run("suggest", "--td", "0.5", str(ramp))
     result = run("explore", "--td", "0.5", "--steps", "4", "-f", "json", str(ramp))
@@ -116,7 +174,10 @@ def test_a_td_where_nothing_flies_is_answered_as_suggest_answers_it(tmp_path: Pa
     assert "give --td" not in result.stderr
     assert "no-candidate" in result.stderr
     found = json.loads(result.stdout)
-    assert found["td_window"] == [0.0, 1.0]  # no flight is seen, so that all of the record is explored
+    assert found["td_window"] == [
+        0.0,
+        1.0,
+    ]  # no flight is seen, so that all of the record is explored
     (one,) = (offer for offer in found["offers"] if offer["td"] == 0.5)
     assert one["reason"] in " ".join(asked.stdout.split())
     assert found["recommended"] is None

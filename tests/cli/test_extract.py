@@ -34,14 +34,19 @@ NUMBERS = st.floats(-1e300, 1e300, allow_nan=False)
 
 def same(one: History, other: History) -> bool:
     """Whether two histories hold the same numbers, bit for bit."""
-    return one.time.tobytes() == other.time.tobytes() and one.energy.tobytes() == other.energy.tobytes()
+    return (
+        one.time.tobytes() == other.time.tobytes()
+        and one.energy.tobytes() == other.energy.tobytes()
+    )
 
 
 # extract.
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-@pytest.mark.parametrize(("source", "energy"), [(ENERGY, ()), (GLSTAT, ()), (ROLLOVER, ("stepIE_J",))])
+@pytest.mark.parametrize(
+    ("source", "energy"), [(ENERGY, ()), (GLSTAT, ()), (ROLLOVER, ("stepIE_J",))]
+)
 def test_what_is_extracted_reads_back_bit_for_bit(
     source: str, energy: tuple[str, ...], suffix: str, tmp_path: Path
 ) -> None:
@@ -65,12 +70,16 @@ def test_from_csv_to_hdf5_and_back_the_file_is_the_same(tmp_path: Path) -> None:
 @pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(
-    times=st.lists(NUMBERS, min_size=2, max_size=20, unique=True), energy=st.lists(NUMBERS, min_size=20, max_size=20)
+    times=st.lists(NUMBERS, min_size=2, max_size=20, unique=True),
+    energy=st.lists(NUMBERS, min_size=20, max_size=20),
 )
 def test_any_numbers_read_back_bit_for_bit(
     tmp_path_factory: pytest.TempPathFactory, times: list[float], energy: list[float]
 ) -> None:
-    columns = {"time": np.sort(times) + 0.0, "internal_energy": np.array(energy[: len(times)]) + 0.0}
+    columns = {
+        "time": np.sort(times) + 0.0,
+        "internal_energy": np.array(energy[: len(times)]) + 0.0,
+    }
     for name, form in {"any.csv": "csv", "any.h5": "hdf5"}.items():
         file = put(tmp_path_factory.mktemp("any") / name, write_table(form, columns))
         again = read_history([str(file)])
@@ -86,7 +95,9 @@ def test_several_parts_have_a_column_each_beside_their_sum(tmp_path: Path) -> No
     table = np.array(rows, dtype=float)[:, :4]
     np.testing.assert_array_equal(table[:, 1], table[:, 2] + table[:, 3])
     expected = open_run([source])
-    np.testing.assert_array_equal(table[:, 2:], expected.part_energies(expected.parts[:2]))
+    np.testing.assert_array_equal(
+        table[:, 2:], expected.part_energies(expected.parts[:2])
+    )
     assert run("extract", "--part", "box,step", source, "-o", str(file)).exit_code == 0
     for column in ("part_1", "part_2", "internal_energy"):
         again = read_history([str(file)], Selection(energy=(column,)))
@@ -95,7 +106,9 @@ def test_several_parts_have_a_column_each_beside_their_sum(tmp_path: Path) -> No
 
 def test_one_part_needs_no_column_beside_the_energy() -> None:
     source = ROLLOVER_T01
-    assert run("extract", "--part", "box", source).stdout.startswith("time,internal_energy,kinetic_energy,")
+    assert run("extract", "--part", "box", source).stdout.startswith(
+        "time,internal_energy,kinetic_energy,"
+    )
 
 
 # What a flight is seen by goes with the energy.
@@ -115,7 +128,9 @@ def box(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("source", "suffix"), [*((source, "csv") for source in BOX), ("matsum", "h5")])
+@pytest.mark.parametrize(
+    ("source", "suffix"), [*((source, "csv") for source in BOX), ("matsum", "h5")]
+)
 def test_what_is_extracted_has_the_flight_and_the_choice_of_its_file(
     source: str, suffix: str, box: dict[str, str], tmp_path: Path
 ) -> None:
@@ -124,25 +139,44 @@ def test_what_is_extracted_has_the_flight_and_the_choice_of_its_file(
     asked = ("suggest", "--no-verify", "--td", "0.37")
     found, expected = answer(*asked, file), answer(*asked, *BOX[source], box[source])
     for name in ("start", "end"):
-        assert found["flight"][name] == pytest.approx(expected["flight"][name], abs=5.1e-4)  # one state
+        assert found["flight"][name] == pytest.approx(
+            expected["flight"][name], abs=5.1e-4
+        )  # one state
     assert found["flight"]["source"] == expected["flight"]["source"]
-    assert found["recommended"]["tr"] == pytest.approx(expected["recommended"]["tr"], rel=1e-5)
+    assert found["recommended"]["tr"] == pytest.approx(
+        expected["recommended"]["tr"], rel=1e-5
+    )
 
 
-@pytest.mark.parametrize("name", ["rollover_box.binout", "rollover_box.glstat", "rolloverT01.gz"])
+@pytest.mark.parametrize(
+    "name", ["rollover_box.binout", "rollover_box.glstat", "rolloverT01.gz"]
+)
 def test_what_is_extracted_is_as_healthy_as_its_file(name: str, tmp_path: Path) -> None:
     """Friction that is told apart stays apart, and the energy ratio is the one that the solver wrote."""
     source, file = str(ROOT / "sample_data" / name), str(tmp_path / "extracted.csv")
-    assert run("extract", *(() if name.endswith("glstat") else ("--part", "box")), source, "-o", file).exit_code == 0
+    assert (
+        run(
+            "extract",
+            *(() if name.endswith("glstat") else ("--part", "box")),
+            source,
+            "-o",
+            file,
+        ).exit_code
+        == 0
+    )
     found, expected = answer("info", file)["health"], answer("info", source)["health"]
     for key in ("energy_ratio_min", "energy_ratio_max", "sliding_share"):
         assert found[key] == pytest.approx(expected[key], rel=1e-5, abs=1e-12)
 
 
 @pytest.mark.slow
-def test_the_box_has_one_flight_in_every_format_that_tells_its_momentum(box: dict[str, str]) -> None:
+def test_the_box_has_one_flight_in_every_format_that_tells_its_momentum(
+    box: dict[str, str],
+) -> None:
     asked = ("suggest", "--no-verify", "--td", "0.37")
-    answers = [answer(*asked, *BOX[form], box[form]) for form in ("csv", "h5", "matsum")]
+    answers = [
+        answer(*asked, *BOX[form], box[form]) for form in ("csv", "h5", "matsum")
+    ]
     assert {one["flight"]["source"] for one in answers} == {"momentum"}
     for name in ("start", "end"):
         assert np.ptp([one["flight"][name] for one in answers]) < 5.1e-4
@@ -160,16 +194,23 @@ def test_quantities_of_the_whole_model_are_extracted_under_one_name(
     assert {*QUANTITIES, "x_velocity"} <= {*found.quantities}
     for quantity in QUANTITIES:
         assert found.quantities[quantity] == quantity
-        numbers = found.channel(quantity), expected.channel(expected.quantities[quantity])
+        numbers = (
+            found.channel(quantity),
+            expected.channel(expected.quantities[quantity]),
+        )
         np.testing.assert_array_equal(*numbers)
 
 
-UNUSUAL = "time,IE,E2,M1,M2,M3\n" + "".join(f"{i},{i % 3},{i},1,2,{-i}\n" for i in range(30))
+UNUSUAL = "time,IE,E2,M1,M2,M3\n" + "".join(
+    f"{i},{i % 3},{i},1,2,{-i}\n" for i in range(30)
+)
 
 
 def test_a_channel_of_an_unusual_name_is_named(tmp_path: Path) -> None:
     file = put(tmp_path / "unusual.csv", UNUSUAL)
-    named = [f"--channel={axis}_momentum=M{number}" for number, axis in enumerate("xyz", 1)]
+    named = [
+        f"--channel={axis}_momentum=M{number}" for number, axis in enumerate("xyz", 1)
+    ]
     text = run("extract", *named, "--channel", "kinetic-energy=3", str(file)).stdout
     assert text.startswith(
         "time,internal_energy,kinetic_energy,x_momentum,y_momentum,z_momentum,mass\n0.0,0.0,0.0,1.0,2.0,"
@@ -180,21 +221,30 @@ def test_a_channel_of_an_unusual_name_is_named(tmp_path: Path) -> None:
     ("given", "reason"),
     [
         (("kinetic_energy=E9",), "no column 'E9'; there are: 1 'time', 2 'IE'"),
-        (("E2",), "--channel E2=: QUANTITY=NAME was expected, with one of kinetic_energy,"),
+        (
+            ("E2",),
+            "--channel E2=: QUANTITY=NAME was expected, with one of kinetic_energy,",
+        ),
         (("spin=E2",), "QUANTITY=NAME was expected"),
         (("mass=E2", "mass=M1"), "--channel names a quantity twice"),
     ],
 )
-def test_a_channel_that_is_none_is_refused(given: tuple[str, ...], reason: str, tmp_path: Path) -> None:
+def test_a_channel_that_is_none_is_refused(
+    given: tuple[str, ...], reason: str, tmp_path: Path
+) -> None:
     file = put(tmp_path / "unusual.csv", UNUSUAL)
     assert reason in refused("info", *(f"--channel={one}" for one in given), str(file))
 
 
 @pytest.mark.slow
-def test_without_a_file_csv_goes_to_standard_output_and_notes_do_not(tmp_path: Path) -> None:
+def test_without_a_file_csv_goes_to_standard_output_and_notes_do_not(
+    tmp_path: Path,
+) -> None:
     file = put(tmp_path / "matsum", replayed("matsum"))
     result = run("extract", str(file))
-    assert result.stdout.startswith("time,internal_energy,x_momentum,y_momentum,z_momentum,mass\n0.0,0.0,")
+    assert result.stdout.startswith(
+        "time,internal_energy,x_momentum,y_momentum,z_momentum,mass\n0.0,0.0,"
+    )
     assert "the energies of all parts were added" in result.stderr
     assert run("extract", "-q", str(file)).stderr == ""
     hdf5 = run("extract", "--write-as", "hdf5", "-q", str(file))
@@ -207,8 +257,12 @@ def test_the_format_asked_for_comes_before_that_of_the_name(tmp_path: Path) -> N
     assert read_history([str(file)]).format == "hdf5"
 
 
-@pytest.mark.parametrize("name", ["energy.txt", "energy", "energy.glstat", "matsum", "csv"])
-def test_a_name_that_tells_no_format_is_refused_before_anything_is_read(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "name", ["energy.txt", "energy", "energy.glstat", "matsum", "csv"]
+)
+def test_a_name_that_tells_no_format_is_refused_before_anything_is_read(
+    name: str, tmp_path: Path
+) -> None:
     told = refused("extract", "absent.csv", "-o", str(tmp_path / name))
     assert told.endswith("the suffix names no format; give --write-as: csv, hdf5")
     assert not (tmp_path / name).exists()
@@ -225,7 +279,9 @@ def test_an_existing_file_and_an_input_are_kept(tmp_path: Path) -> None:
 
 def test_format_of_takes_only_what_can_be_written() -> None:
     assert format_of("run.H5", ["csv", "hdf5"]) == "hdf5"
-    with pytest.raises(FormatError, match=r"run\.h5: the suffix names no format; give `write_as`: csv"):
+    with pytest.raises(
+        FormatError, match=r"run\.h5: the suffix names no format; give `write_as`: csv"
+    ):
         format_of("run.h5", ["csv"])
 
 
@@ -237,23 +293,33 @@ def test_a_replayed_hdf5_holds_the_numbers_of_the_csv(tmp_path: Path) -> None:
     for name, form in zip(names, ("csv", "hdf5"), strict=True):
         Path(name).write_bytes(replayed(form))
     for column in ("internal_energy", "kinetic_energy", "z", "vy"):
-        one, other = (read_history([name], Selection(energy=(column,))) for name in names)
+        one, other = (
+            read_history([name], Selection(energy=(column,))) for name in names
+        )
         assert same(one, other)
 
 
 @pytest.mark.parametrize("switches", [(), ("--tr", "0.0135867", "--td", "0.0687534")])
-def test_a_replayed_matsum_holds_the_motion_to_five_digits(switches: tuple[str, ...], tmp_path: Path) -> None:
+def test_a_replayed_matsum_holds_the_motion_to_five_digits(
+    switches: tuple[str, ...], tmp_path: Path
+) -> None:
     file = put(tmp_path / "matsum", replayed("matsum", *switches))
     opened = open_run([str(file)])
-    table = np.genfromtxt(io.BytesIO(replayed("csv", *switches)), delimiter=",", names=True)
+    table = np.genfromtxt(
+        io.BytesIO(replayed("csv", *switches)), delimiter=",", names=True
+    )
     ids = [part.id for part in opened.parts]
     frame, suspended, spring = opened.parts
     matsum = opened.databases[0]
-    np.testing.assert_allclose(opened.part_energies([spring])[:, 0], table["internal_energy"], rtol=5e-5)
+    np.testing.assert_allclose(
+        opened.part_energies([spring])[:, 0], table["internal_energy"], rtol=5e-5
+    )
     kinetic = matsum.part_channel("kinetic_energy", ids).sum(axis=1)
     np.testing.assert_allclose(kinetic, table["kinetic_energy"], rtol=5e-5)
     momentum = matsum.part_channel("z_momentum", [frame.id, suspended.id])
-    np.testing.assert_allclose(momentum, np.stack([15.7 * table["vz"], 31.4 * table["vy"]], axis=1), rtol=5e-5)
+    np.testing.assert_allclose(
+        momentum, np.stack([15.7 * table["vz"], 31.4 * table["vy"]], axis=1), rtol=5e-5
+    )
 
 
 def test_suggest_gives_the_same_pair_on_a_replayed_matsum(tmp_path: Path) -> None:
@@ -261,18 +327,33 @@ def test_suggest_gives_the_same_pair_on_a_replayed_matsum(tmp_path: Path) -> Non
     found, expected = answer("suggest", "--td", "0.064", "--part", "spring", str(file)), answer(
         "suggest", "--td", "0.064", ENERGY
     )  # fmt: skip
-    assert found["recommended"]["tr"] == pytest.approx(expected["recommended"]["tr"], rel=1e-5)
-    assert found["better_td"]["td"] == pytest.approx(expected["better_td"]["td"], rel=1e-5)
-    assert found["better_td"]["tr"] == pytest.approx(expected["better_td"]["tr"], rel=1e-5)
+    assert found["recommended"]["tr"] == pytest.approx(
+        expected["recommended"]["tr"], rel=1e-5
+    )
+    assert found["better_td"]["td"] == pytest.approx(
+        expected["better_td"]["td"], rel=1e-5
+    )
+    assert found["better_td"]["tr"] == pytest.approx(
+        expected["better_td"]["tr"], rel=1e-5
+    )
     flight = found["flight"]
     assert (flight["start"], flight["end"], flight["source"]) == (0.0, None, "momentum")
-    assert [part["title"] for part in flight["parts"]] == ["frame", "suspended mass", "spring"]
+    assert [part["title"] for part in flight["parts"]] == [
+        "frame",
+        "suspended mass",
+        "spring",
+    ]
     assert found["history"]["parts"] == [{"id": 3, "title": "spring"}]
 
 
 def test_an_undamped_replay_flies_by_its_constant_momentum(tmp_path: Path) -> None:
     file = tmp_path / "matsum"
     undamped = ["0" if value == "50" else value for value in OSCILLATOR]
-    assert run("replay", *undamped, "--t-end", "0.15", "--dt", "1e-4", "-o", str(file)).exit_code == 0
+    assert (
+        run(
+            "replay", *undamped, "--t-end", "0.15", "--dt", "1e-4", "-o", str(file)
+        ).exit_code
+        == 0
+    )
     flight = answer("suggest", "--td", "0.064", "--part", "spring", str(file))["flight"]
     assert (flight["start"], flight["end"], flight["source"]) == (0.0, None, "momentum")

@@ -19,7 +19,18 @@ def test_once_says_what_there_is_and_whether_it_flies() -> None:
     result = run("follow", "--once", CAR)
     assert result.exit_code == 1
     lines = [line.split()[1] for line in result.stdout.splitlines()]
-    assert lines == ["begun", "flight", "switch", "contact", "flight", "later", "switch", "contact", "ended", "state"]
+    assert lines == [
+        "begun",
+        "flight",
+        "switch",
+        "contact",
+        "flight",
+        "later",
+        "switch",
+        "contact",
+        "ended",
+        "state",
+    ]
     assert run("follow", "--once", "--exit-zero", CAR).exit_code == 0
     assert run("follow", CAR).exit_code == 0  # it has ended
 
@@ -28,13 +39,17 @@ def test_lines_of_json_are_those_of_python() -> None:
     result = run("follow", "-f", "ndjson", "--part", "box", "--for", "0", BOX)
     found = [json.loads(line) for line in result.stdout.splitlines()]
     assert found == [one._asdict() for one in d2.follow(BOX, parts="box", lasting=0)]
-    assert {tuple(one) for one in found} == {("event", "time", "seen", "message", "wait", "left", "tr")}
+    assert {tuple(one) for one in found} == {
+        ("event", "time", "seen", "message", "wait", "left", "tr")
+    }
 
 
 def test_a_run_that_flies_exits_with_0(tmp_path: Path) -> None:
     data = gzip.decompress((ROOT / "tests/data/car_all_T01.gz").read_bytes())
     (tmp_path / "carT01").write_bytes(data)
-    assert run("follow", "--once", "--wait", "0.005", str(tmp_path)).exit_code == 2  # half a period is longer
+    assert (
+        run("follow", "--once", "--wait", "0.005", str(tmp_path)).exit_code == 2
+    )  # half a period is longer
     rigid = gzip.decompress((ROOT / "tests/data/drop2_w123_T01.gz").read_bytes())
     (tmp_path / "carT01").write_bytes(rigid[: len(rigid) // 2])
     assert run("follow", "--once", str(tmp_path)).exit_code == 0
@@ -48,4 +63,7 @@ def test_an_interrupt_ends_it_with_a_line(tmp_path: Path) -> None:
         json.loads(process.stdout.readline())
         os.kill(process.pid, signal.SIGINT)
         _, errors = process.communicate()
-    assert (process.returncode, errors.strip()) == (-signal.SIGINT, b"d2rpick: interrupted")
+    assert (process.returncode, errors.strip()) == (
+        -signal.SIGINT,
+        b"d2rpick: interrupted",
+    )

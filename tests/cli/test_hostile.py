@@ -16,7 +16,18 @@ import h5py
 import numpy as np
 import pytest
 
-from tests.command import ENERGY, GLSTAT, INTERRUPTIBLE, ROOT, TIME_LIMIT, answer, put, refused, run, started
+from tests.command import (
+    ENERGY,
+    GLSTAT,
+    INTERRUPTIBLE,
+    ROOT,
+    TIME_LIMIT,
+    answer,
+    put,
+    refused,
+    run,
+    started,
+)
 from tests.made_binout import binout as made_binout
 from tests.made_t01 import t01, value
 from tests.text_files import glstat_text, matsum_text
@@ -33,25 +44,38 @@ def child(command: str, *args: str | Path) -> subprocess.CompletedProcess[str]:
 
 def one_line(found: subprocess.CompletedProcess[str]) -> str:
     """Message of a call that could not run."""
-    assert (found.returncode, found.stdout, found.stderr.count("\n")) == (2, "", 1), found
+    assert (found.returncode, found.stdout, found.stderr.count("\n")) == (2, "", 1), (
+        found
+    )
     assert "internal error" not in found.stderr
     return found.stderr
 
 
 def test_standard_input_that_is_closed_is_told() -> None:
     assert "-: standard input is closed" in one_line(child("d2rpick info - <&-"))
-    assert "-: standard input is closed" in one_line(child("d2rpick study --td 1 --from - <&-"))
+    assert "-: standard input is closed" in one_line(
+        child("d2rpick study --td 1 --from - <&-")
+    )
 
 
-@pytest.mark.parametrize("args", ["--help", "suggest --td 0.064 -q", "study --td 0.064 -qf ndjson"])
+@pytest.mark.parametrize(
+    "args", ["--help", "suggest --td 0.064 -q", "study --td 0.064 -qf ndjson"]
+)
 def test_a_result_that_nobody_can_get_is_no_success(args: str) -> None:
-    for closed, said in ((">&-", "standard output is closed; open it"), (">/dev/full", "No space left on device")):
+    for closed, said in (
+        (">&-", "standard output is closed; open it"),
+        (">/dev/full", "No space left on device"),
+    ):
         if Path("/dev/full").exists() or closed == ">&-":
             assert said in one_line(child(f'd2rpick {args} "$@" {closed}', ENERGY))
 
 
-def test_a_closed_stdout_is_not_missed_where_nothing_is_written_to_it(tmp_path: Path) -> None:
-    found = child('d2rpick suggest --td 0.064 -qf value "$1" -o "$2" >&-', ENERGY, tmp_path / "tr")
+def test_a_closed_stdout_is_not_missed_where_nothing_is_written_to_it(
+    tmp_path: Path,
+) -> None:
+    found = child(
+        'd2rpick suggest --td 0.064 -qf value "$1" -o "$2" >&-', ENERGY, tmp_path / "tr"
+    )
     assert (found.returncode, found.stderr) == (0, "")
     assert float((tmp_path / "tr").read_text()) == pytest.approx(0.0128852793630525)
 
@@ -59,7 +83,9 @@ def test_a_closed_stdout_is_not_missed_where_nothing_is_written_to_it(tmp_path: 
 def test_an_interrupt_during_the_imports_ends_the_program_without_a_word(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "click.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nwhile True: pass\n")
+    (tmp_path / "click.py").write_text(
+        "import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nwhile True: pass\n"
+    )
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(ROOT)]))
     with started("info", ENERGY) as process:
         assert process.communicate() == (b"", b"")
@@ -126,7 +152,11 @@ def test_an_interrupt_ends_the_loop_of_a_shell(tmp_path: Path, command: str) -> 
     ):
         os.killpg(shell.pid, signal.SIGINT)
         told, errors = shell.communicate(timeout=TIME_LIMIT)
-    assert (shell.returncode, told, errors.strip()) == (-signal.SIGINT, b"", b"d2rpick: interrupted")
+    assert (shell.returncode, told, errors.strip()) == (
+        -signal.SIGINT,
+        b"",
+        b"d2rpick: interrupted",
+    )
 
 
 def test_a_job_that_ignores_interrupts_goes_on(tmp_path: Path) -> None:
@@ -134,7 +164,12 @@ def test_a_job_that_ignores_interrupts_goes_on(tmp_path: Path) -> None:
     os.mkfifo(pipe)
     job = f'trap "" INT; exec "{sys.executable}" -m d2rpick info -f json "{pipe}"'
     with (
-        subprocess.Popen(["bash", "-c", job], cwd=ROOT, stdout=subprocess.PIPE, start_new_session=True) as process,
+        subprocess.Popen(
+            ["bash", "-c", job],
+            cwd=ROOT,
+            stdout=subprocess.PIPE,
+            start_new_session=True,
+        ) as process,
         pipe.open("wb") as writer,
     ):
         os.killpg(process.pid, signal.SIGINT)
@@ -152,41 +187,66 @@ def test_a_closed_stderr_loses_no_result() -> None:
 
 def test_a_pipe_in_place_of_a_file_is_read_once_and_signed() -> None:
     piped = child('d2rpick suggest --td 0.064 -f json <(cat "$1")', ENERGY).stdout
-    digests = [found["history"]["sha256"] for found in (json.loads(piped), answer("suggest", "--td", "0.064", ENERGY))]
+    digests = [
+        found["history"]["sha256"]
+        for found in (json.loads(piped), answer("suggest", "--td", "0.064", ENERGY))
+    ]
     assert digests[0] == digests[1]
 
 
 @pytest.mark.slow
 def test_a_full_disk_is_told_of_the_file_that_it_holds(tmp_path: Path) -> None:
     ledger = tmp_path / "ledger"
-    message = one_line(child('ulimit -f 0; d2rpick study --td 0.064 --resume "$1" "$2"', ledger, ENERGY))
+    message = one_line(
+        child(
+            'ulimit -f 0; d2rpick study --td 0.064 --resume "$1" "$2"', ledger, ENERGY
+        )
+    )
     assert f"{ledger}: cannot be written (File too large); make room" in message
     assert not ledger.exists()
     ledger.symlink_to(os.devnull)
-    assert "not a regular file" in one_line(child('d2rpick study --td 0.064 --resume "$1" "$2"', ledger, ENERGY))
+    assert "not a regular file" in one_line(
+        child('d2rpick study --td 0.064 --resume "$1" "$2"', ledger, ENERGY)
+    )
 
 
 def test_a_disk_that_fills_up_leaves_the_rows_that_fitted(tmp_path: Path) -> None:
     """The size of a file is limited in blocks of 1 kB, which the second row exceeds."""
     ledger, again = tmp_path / "ledger", tmp_path / "again.csv"
     again.write_bytes(Path(ENERGY).read_bytes())
-    assert run("study", "--td", "0.064", "--jobs", "1", "--resume", str(ledger), ENERGY).exit_code == 0
+    assert (
+        run(
+            "study", "--td", "0.064", "--jobs", "1", "--resume", str(ledger), ENERGY
+        ).exit_code
+        == 0
+    )
     first = ledger.read_bytes()
     blocks = -(-len(first) // 1024)
-    study = 'ulimit -f "$1"; d2rpick study -q --td 0.064 --jobs 1 --resume "$2" "$3" "$4"'
+    study = (
+        'ulimit -f "$1"; d2rpick study -q --td 0.064 --jobs 1 --resume "$2" "$3" "$4"'
+    )
     assert "make room" in one_line(child(study, str(blocks), ledger, ENERGY, again))
     assert ledger.read_bytes() == first
 
 
 @pytest.mark.parametrize("args", [("absent.csv",), ("absent.csv", "--after", "-1")])
-def test_a_study_without_a_finished_run_leaves_no_ledger(tmp_path: Path, args: tuple[str, ...]) -> None:
-    assert run("study", "--td", "0.064", "--resume", str(tmp_path / "ledger"), *args).exit_code == 2
+def test_a_study_without_a_finished_run_leaves_no_ledger(
+    tmp_path: Path, args: tuple[str, ...]
+) -> None:
+    assert (
+        run(
+            "study", "--td", "0.064", "--resume", str(tmp_path / "ledger"), *args
+        ).exit_code
+        == 2
+    )
     assert not (tmp_path / "ledger").exists()
 
 
 def test_what_is_packed_beyond_the_memory_ends_in_one_line(tmp_path: Path) -> None:
     packed = put(tmp_path / "zeros.gz", 17 * gzip.compress(bytes(1 << 24)))
-    message = one_line(child('ulimit -v 260000; D2RPICK_MAX_RATIO=2e3 d2rpick info "$1"', packed))
+    message = one_line(
+        child('ulimit -v 260000; D2RPICK_MAX_RATIO=2e3 d2rpick info "$1"', packed)
+    )
     assert "zeros.gz: its unpacked data do not fit into memory" in message
 
 
@@ -203,31 +263,67 @@ def dense(sizes: Sequence[int], **options: Any) -> bytes:
     content = io.BytesIO()
     with h5py.File(content, "w") as file:
         for number, size in enumerate(sizes):
-            file.create_dataset(f"e{number}", data=np.zeros(size), chunks=(1 << 17,), **options)
+            file.create_dataset(
+                f"e{number}", data=np.zeros(size), chunks=(1 << 17,), **options
+            )
     return content.getvalue()
 
 
 BEYOND: dict[str, tuple[Callable[[], bytes], str, str]] = {
-    "zeros.gz": (lambda: gzip.compress(bytes(1 << 24)) * 2, "RATIO", "its packed data become more than 100 times"),
+    "zeros.gz": (
+        lambda: gzip.compress(bytes(1 << 24)) * 2,
+        "RATIO",
+        "its packed data become more than 100 times",
+    ),
     "deep.h5": (lambda: deep(101), "DEPTH", "its data lie in more than 100 groups"),
-    "one.h5": (lambda: dense([1 << 22], compression="gzip"), "RATIO", "its packed data become more than 100 times"),
-    "all.h5": (lambda: dense([1 << 20] * 3, compression="gzip"), "RATIO", "become more than 100 times as many bytes"),
-    "head.csv": (lambda: b"time,energy" + b" " * 1_000_000 + b"\n0,1\n", "LINE", "head.csv:1: the line has more than"),
-    "row.csv": (lambda: b"time,energy\n0,1\n1," + b" " * 1_000_001 + b"2\n", "LINE", "row.csv:3: the line has more"),
+    "one.h5": (
+        lambda: dense([1 << 22], compression="gzip"),
+        "RATIO",
+        "its packed data become more than 100 times",
+    ),
+    "all.h5": (
+        lambda: dense([1 << 20] * 3, compression="gzip"),
+        "RATIO",
+        "become more than 100 times as many bytes",
+    ),
+    "head.csv": (
+        lambda: b"time,energy" + b" " * 1_000_000 + b"\n0,1\n",
+        "LINE",
+        "head.csv:1: the line has more than",
+    ),
+    "row.csv": (
+        lambda: b"time,energy\n0,1\n1," + b" " * 1_000_001 + b"2\n",
+        "LINE",
+        "row.csv:3: the line has more",
+    ),
     "end.csv": (
         lambda: b"time,energy\n0,1\n" + b"1" * 1_000_001,
         "LINE",
         "end.csv:3: the line has more than 1,000,000",
     ),
-    "utf16.csv": (lambda: ("x" * 1_000_001).encode("utf-16"), "LINE", "utf16.csv:1: the line has more than 1,000,000"),
-    "line.k": (lambda: b"*PART\n" + b"1," * 500_001 + b"\n", "LINE", "line.k:2: the line has more than 1,000,000"),
-    "long.k": (lambda: b"*SET_PART\n1\n" + b" " * 5_000_000, "LINE", "long.k:3: the line has more than 1,000,000"),
+    "utf16.csv": (
+        lambda: ("x" * 1_000_001).encode("utf-16"),
+        "LINE",
+        "utf16.csv:1: the line has more than 1,000,000",
+    ),
+    "line.k": (
+        lambda: b"*PART\n" + b"1," * 500_001 + b"\n",
+        "LINE",
+        "line.k:2: the line has more than 1,000,000",
+    ),
+    "long.k": (
+        lambda: b"*SET_PART\n1\n" + b" " * 5_000_000,
+        "LINE",
+        "long.k:3: the line has more than 1,000,000",
+    ),
 }
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", BEYOND)
-def test_what_is_beyond_a_bound_is_told_unless_the_environment_raises_it(name: str, tmp_path: Path) -> None:
+def test_what_is_beyond_a_bound_is_told_unless_the_environment_raises_it(
+    name: str, tmp_path: Path
+) -> None:
     make, bound, said = BEYOND[name]
     (tmp_path / name).write_bytes(make())
     command = "check" if name.endswith(".k") else "info"
@@ -240,7 +336,9 @@ def test_what_is_beyond_a_bound_is_told_unless_the_environment_raises_it(name: s
 
 @pytest.mark.slow
 def test_the_bounds_themselves_are_kept(tmp_path: Path) -> None:
-    small = b"time,internal_energy\n" + b"".join(b"%d,0\n" % state for state in range(1000))
+    small = b"time,internal_energy\n" + b"".join(
+        b"%d,0\n" % state for state in range(1000)
+    )
     for name, content in {
         "deep.h5": deep(100),
         "still.gz": gzip.compress(
@@ -254,7 +352,10 @@ def test_the_bounds_themselves_are_kept(tmp_path: Path) -> None:
             run(
                 "info",
                 str(tmp_path / name),
-                env={f"D2RPICK_MAX_{which}": "0.5" for which in ("DEPTH", "LINE", "UNPACKED")},
+                env={
+                    f"D2RPICK_MAX_{which}": "0.5"
+                    for which in ("DEPTH", "LINE", "UNPACKED")
+                },
             ).exit_code
             == 2
         )
@@ -266,7 +367,9 @@ def test_the_bounds_themselves_are_kept(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("here")
-def test_an_unforeseen_error_names_the_files_of_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unforeseen_error_names_the_files_of_the_run(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     Path("a.csv").write_bytes(Path(ENERGY).read_bytes())
     Path("b.csv.gz").write_bytes(gzip.compress(Path(ENERGY).read_bytes()))
     monkeypatch.setattr(zlib, "decompressobj", lambda **_: 1 / 0)
@@ -288,17 +391,28 @@ def test_links_in_a_circle_give_each_run_once() -> None:
 
 def test_a_deck_is_called_a_deck() -> None:
     result = run("info", "sample_data/switching.k")
-    assert "sample_data/switching.k: this is a deck, an energy history was expected" in result.stderr
+    assert (
+        "sample_data/switching.k: this is a deck, an energy history was expected"
+        in result.stderr
+    )
 
 
-@pytest.mark.parametrize("damage", ["123", "null", "[]", '{"files": 1}', '{"files": [{"name": "x"}]}', "{", "\ufffd"])
-def test_a_damaged_line_of_a_resume_file_is_passed_over(damage: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "damage",
+    ["123", "null", "[]", '{"files": 1}', '{"files": [{"name": "x"}]}', "{", "\ufffd"],
+)
+def test_a_damaged_line_of_a_resume_file_is_passed_over(
+    damage: str, tmp_path: Path
+) -> None:
     ledger = tmp_path / "ledger.ndjson"
     args = ("study", "--td", "0.064", "-f", "json", "--resume", str(ledger), ENERGY)
     whole = run(*args)
     ledger.write_text(f"{ledger.read_text()}{damage}\n")
     again = run(*args)
-    assert (again.exit_code, json.loads(again.stdout)["runs"]) == (whole.exit_code, json.loads(whole.stdout)["runs"])
+    assert (again.exit_code, json.loads(again.stdout)["runs"]) == (
+        whole.exit_code,
+        json.loads(whole.stdout)["runs"],
+    )
     assert "1 of 1 runs reused" in again.stderr
     assert "damaged or without a checksum: 1" in again.stderr
 
@@ -326,10 +440,14 @@ def test_two_runs_are_not_legs_of_one(tmp_path: Path) -> None:
         "one": glstat_text(times, [0, 10, 20, 30, 40]),
         "copy": glstat_text(times, [0, 10, 20, 30, 40]),
         "other": glstat_text(times, [0, 10, 21, 30, 40]),
-        "restart": glstat_text(times[2:], [20, 35, 45]),  # another way from the state it begins with
+        "restart": glstat_text(
+            times[2:], [20, 35, 45]
+        ),  # another way from the state it begins with
         "restart of another": glstat_text(times[2:], [25, 35, 45]),
         "parts": matsum_text(times, [7, 3], [[0, 0], [1, 1], [2, 2], [3, 3], [4, 4]]),
-        "other parts": matsum_text(times, [7, 3], [[0, 0], [1, 1], [2, 5], [3, 3], [4, 4]]),
+        "other parts": matsum_text(
+            times, [7, 3], [[0, 0], [1, 1], [2, 5], [3, 3], [4, 4]]
+        ),
     }
     names = {name: tmp_path / name for name in contents}
     for name, content in contents.items():
@@ -346,20 +464,32 @@ def test_two_runs_are_not_legs_of_one(tmp_path: Path) -> None:
 
 def test_tables_of_different_quantities_are_not_legs_of_one(tmp_path: Path) -> None:
     """Of no common column no state would be left, as if the run had written none."""
-    for name, head in (("one", "time,internal_energy"), ("other", "time,force"), ("leg", "time,internal_energy")):
+    for name, head in (
+        ("one", "time,internal_energy"),
+        ("other", "time,force"),
+        ("leg", "time,internal_energy"),
+    ):
         start = 4 if name == "leg" else 0
         rows = [f"{start + i},{i + 1}" for i in range(4)]
         (tmp_path / f"{name}.csv").write_text("\n".join([head, *rows, ""]))
-    one, other, leg = (str(tmp_path / f"{name}.csv") for name in ("one", "other", "leg"))
+    one, other, leg = (
+        str(tmp_path / f"{name}.csv") for name in ("one", "other", "leg")
+    )
     assert "neither a column nor a part in common" in refused("info", one, other)
     assert run("info", one, leg).exit_code == 0
 
 
 SIGNALLING = 0x7FA00000.to_bytes(4)  # a NaN on which the machine raises a flag
 ODD = {
-    "binout": bytes(made_binout(range(1, 9)).data).replace(np.float32(3 / 8).tobytes(), SIGNALLING[::-1]),  # a time
-    "T01": bytes(t01(8).data).replace(np.array(value(3, 0, 1), ">f4").tobytes(), SIGNALLING),  # an energy
-    "matsum": matsum_text([0.0, 0.1], [1, 2], np.ones((2, 2))).replace(b"mat.#=    1   ", b"mat.#=" + b"1" * 5000),
+    "binout": bytes(made_binout(range(1, 9)).data).replace(
+        np.float32(3 / 8).tobytes(), SIGNALLING[::-1]
+    ),  # a time
+    "T01": bytes(t01(8).data).replace(
+        np.array(value(3, 0, 1), ">f4").tobytes(), SIGNALLING
+    ),  # an energy
+    "matsum": matsum_text([0.0, 0.1], [1, 2], np.ones((2, 2))).replace(
+        b"mat.#=    1   ", b"mat.#=" + b"1" * 5000
+    ),
 }
 
 
@@ -371,22 +501,30 @@ def test_odd_numbers_reach_no_warning_of_the_machine(name: str, tmp_path: Path) 
     assert result.exit_code in (0, 2)
 
 
-def test_numbers_whose_squares_overflow_reach_no_warning_of_the_machine(tmp_path: Path) -> None:
+def test_numbers_whose_squares_overflow_reach_no_warning_of_the_machine(
+    tmp_path: Path,
+) -> None:
     rows = [f"{i / 2},{i % 7},{1e308 if i == 14 else i % 5}" for i in range(15)]
-    (tmp_path / "large.csv").write_text("\n".join(["time,internal energy,kinetic energy", *rows, ""]))
+    (tmp_path / "large.csv").write_text(
+        "\n".join(["time,internal energy,kinetic energy", *rows, ""])
+    )
     result = run("info", str(tmp_path / "large.csv"))
     assert (result.exit_code, result.stderr) == (0, "")
 
 
 def test_a_number_of_too_many_digits_is_no_part() -> None:
-    assert "no part" in refused("suggest", "--td", "0.1", "--part", "9" * 5000, "sample_data/rolloverT01.gz")
+    assert "no part" in refused(
+        "suggest", "--td", "0.1", "--part", "9" * 5000, "sample_data/rolloverT01.gz"
+    )
 
 
 def test_lines_of_another_state_are_refused() -> None:
     content = Path(GLSTAT).read_bytes()
     begin = content.index(b" internal energy", len(content) // 2)
     other = content.index(b" kinetic energy")
-    broken = content[: begin + 28] + content[other : other + 120] + content[begin + 40 :]
+    broken = (
+        content[: begin + 28] + content[other : other + 120] + content[begin + 40 :]
+    )
     refused = run("suggest", "--td", "0.064", "-", stdin=broken)
     assert refused.exit_code == 2
     assert "'internal energy' is missing, cut or doubled" in refused.stderr
@@ -395,12 +533,18 @@ def test_lines_of_another_state_are_refused() -> None:
 def test_a_loop_of_links_in_place_of_a_file_to_write_is_told(tmp_path: Path) -> None:
     loop = tmp_path / "loop.csv"
     loop.symlink_to(loop)
-    assert f"{loop}: cannot be written" in one_line(child('d2rpick extract "$@"', ENERGY, "-o", loop))
+    assert f"{loop}: cannot be written" in one_line(
+        child('d2rpick extract "$@"', ENERGY, "-o", loop)
+    )
 
 
-@pytest.mark.parametrize("command", [("info",), ("suggest", "--td", "1"), ("check",), ("plan",)])
+@pytest.mark.parametrize(
+    "command", [("info",), ("suggest", "--td", "1"), ("check",), ("plan",)]
+)
 @pytest.mark.parametrize("device", ["/dev/zero", "/dev/full", "/dev/null"])
-def test_a_device_that_never_ends_is_refused(command: tuple[str, ...], device: str) -> None:
+def test_a_device_that_never_ends_is_refused(
+    command: tuple[str, ...], device: str
+) -> None:
     if not Path(device).exists():
         pytest.skip(f"no {device} here")
     assert f"{device}: this is a device" in refused(*command, device)

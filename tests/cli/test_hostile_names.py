@@ -18,7 +18,13 @@ from hypothesis import given, strategies as st
 
 from d2rpick.base.errors import UNSEEN, printable
 from d2rpick.report.figures import with_unit
-from d2rpick.report.tables import as_json, as_markdown, in_markdown, positional, shell_line
+from d2rpick.report.tables import (
+    as_json,
+    as_markdown,
+    in_markdown,
+    positional,
+    shell_line,
+)
 from tests.command import DECK, ENERGY, ROOT, run
 from tests.sample_deck import DECK as SAMPLE_DECK
 
@@ -29,9 +35,27 @@ NAME = (
 MATSUM = ROOT / "sample_data" / "rollover_box.matsum"
 NO_TEXT = "run\udcff\udc80"
 FORMS = {
-    ("suggest", "--td", "0.064"): ("table", "json", "ndjson", "csv", "markdown", "value"),
-    ("verify", "--tr", "0.0135867", "--td", "0.0687534"): ("table", "json", "csv", "markdown"),
-    ("study", "--jobs", "1", "--td", "0.064"): ("table", "json", "ndjson", "csv", "markdown"),
+    ("suggest", "--td", "0.064"): (
+        "table",
+        "json",
+        "ndjson",
+        "csv",
+        "markdown",
+        "value",
+    ),
+    ("verify", "--tr", "0.0135867", "--td", "0.0687534"): (
+        "table",
+        "json",
+        "csv",
+        "markdown",
+    ),
+    ("study", "--jobs", "1", "--td", "0.064"): (
+        "table",
+        "json",
+        "ndjson",
+        "csv",
+        "markdown",
+    ),
     ("info",): ("table", "json", "csv", "markdown"),
     ("plan", "--exit-zero"): ("table", "json", "markdown"),
 }
@@ -40,20 +64,32 @@ CHECKS = ("table", "json", "ndjson", "github", "junit", "sarif")
 
 def unseen(text: str) -> set[str]:
     """What of a text is not seen on a terminal, or commands it."""
-    return {letter for letter in text if unicodedata.category(letter) in UNSEEN} - {"\n"}
+    return {letter for letter in text if unicodedata.category(letter) in UNSEEN} - {
+        "\n"
+    }
 
 
 def given_back(line: str) -> list[bytes]:
     """Words of a command line as a shell takes them."""
-    found = subprocess.run(["bash", "-c", f"printf '%s\\0' {line}"], capture_output=True, check=True).stdout
+    found = subprocess.run(
+        ["bash", "-c", f"printf '%s\\0' {line}"], capture_output=True, check=True
+    ).stdout
     return found.split(b"\0")[:-1]
 
 
 def test_a_shell_gives_back_the_words_of_a_command() -> None:
-    words = [NAME, NO_TEXT, "plain", "", *(os.fsdecode(bytes([byte, 48])) for byte in range(1, 256))]
+    words = [
+        NAME,
+        NO_TEXT,
+        "plain",
+        "",
+        *(os.fsdecode(bytes([byte, 48])) for byte in range(1, 256)),
+    ]
     line = shell_line(words)
     assert line.isprintable()
-    assert not re.search(r"(?<!\\)(\\\\)*\\x", line)  # whose end not all shells see alike where a digit follows
+    assert not re.search(
+        r"(?<!\\)(\\\\)*\\x", line
+    )  # whose end not all shells see alike where a digit follows
     assert given_back(line) == [os.fsencode(word) for word in words]
 
 
@@ -80,7 +116,9 @@ def test_a_name_stays_in_its_cell_of_a_markdown_table(one: str, other: str) -> N
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", FORMS, ids=lambda command: command[0])
-def test_answers_name_a_file_without_control_codes(command: tuple[str, ...], here: Path) -> None:
+def test_answers_name_a_file_without_control_codes(
+    command: tuple[str, ...], here: Path
+) -> None:
     shutil.copy(ENERGY, here / NAME)
     for form in FORMS[command]:
         result = run(*command, "-f", form, "--", NAME)
@@ -89,33 +127,48 @@ def test_answers_name_a_file_without_control_codes(command: tuple[str, ...], her
         if "json" in form:
             documents = [
                 json.loads(line)
-                for line in (result.stdout.split("\n") if form == "ndjson" else [result.stdout])
+                for line in (
+                    result.stdout.split("\n") if form == "ndjson" else [result.stdout]
+                )
                 if line
             ]
             assert documents[-1]["command"][-1] == NAME
             assert command != ("info",) or documents[-1]["source"] == [NAME]
         if form == "table":
-            assert "".join(printable(NAME).split()) in "".join((result.stdout + result.stderr).split())
+            assert "".join(printable(NAME).split()) in "".join(
+                (result.stdout + result.stderr).split()
+            )
         if form == "csv":
             rows = list(csv.reader(io.StringIO(result.stdout), strict=True))
             assert len({len(row) for row in rows}) == 1
-            assert command[0] != "study" or any(printable(NAME) in cell for cell in rows[1])
+            assert command[0] != "study" or any(
+                printable(NAME) in cell for cell in rows[1]
+            )
         if form == "markdown":
             assert not re.search(r"(?<!\\)<script", result.stdout)
-            assert command[0] not in ("info", "study") or in_markdown(NAME) in result.stdout
+            assert (
+                command[0] not in ("info", "study")
+                or in_markdown(NAME) in result.stdout
+            )
 
 
 @pytest.mark.parametrize("name", ["=cmd.csv", "+1+2.csv", "-2+3.csv", "@sum.csv"])
 def test_a_spreadsheet_computes_no_name(name: str, here: Path) -> None:
     shutil.copy(ENERGY, here / name)
     for command in (("info",), ("study", "--jobs", "1", "--td", "0.064")):
-        (row,) = csv.DictReader(io.StringIO(run(*command, "-f", "csv", "--", name).stdout), strict=True)
+        (row,) = csv.DictReader(
+            io.StringIO(run(*command, "-f", "csv", "--", name).stdout), strict=True
+        )
         assert row["source"] == f"'{name}"
     assert json.loads(run("info", "-f", "json", "--", name).stdout)["source"] == [name]
 
 
-@pytest.mark.parametrize("asked", [("--td", "9"), ("--td", "0.064", "--energy", "no\nsuch\x1b")])
-def test_refusals_name_a_file_without_control_codes(asked: tuple[str, ...], here: Path) -> None:
+@pytest.mark.parametrize(
+    "asked", [("--td", "9"), ("--td", "0.064", "--energy", "no\nsuch\x1b")]
+)
+def test_refusals_name_a_file_without_control_codes(
+    asked: tuple[str, ...], here: Path
+) -> None:
     shutil.copy(ENERGY, here / NAME)
     result = run("suggest", *asked, "--", NAME)
     assert printable(NAME) in result.stderr
@@ -123,16 +176,25 @@ def test_refusals_name_a_file_without_control_codes(asked: tuple[str, ...], here
 
 
 @pytest.mark.parametrize("form", ["table", "json", "csv", "markdown"])
-def test_why_a_set_of_parts_has_no_window_is_told_without_control_codes(form: str, here: Path) -> None:
+def test_why_a_set_of_parts_has_no_window_is_told_without_control_codes(
+    form: str, here: Path
+) -> None:
     shutil.copy(MATSUM, here / NAME)
-    result = run("parts", "--td", "9", "--deck", str(SAMPLE_DECK), "-f", form, "--", NAME)
-    assert (result.exit_code, "outside the record" in result.stdout) == (1, form != "csv")
+    result = run(
+        "parts", "--td", "9", "--deck", str(SAMPLE_DECK), "-f", form, "--", NAME
+    )
+    assert (result.exit_code, "outside the record" in result.stdout) == (
+        1,
+        form != "csv",
+    )
     assert not unseen(result.stdout + result.stderr)
     assert form != "markdown" or not re.search(r"(?<!\\)<script", result.stdout)
 
 
 @pytest.mark.parametrize("form", CHECKS)
-def test_findings_name_a_deck_and_a_history_without_control_codes(form: str, here: Path) -> None:
+def test_findings_name_a_deck_and_a_history_without_control_codes(
+    form: str, here: Path
+) -> None:
     deck = f"{NAME}.k"
     shutil.copy(ENERGY, here / NAME)
     shutil.copy(DECK, here / deck)
@@ -147,7 +209,10 @@ def test_findings_name_a_deck_and_a_history_without_control_codes(form: str, her
     if form == "junit":
         assert ET.fromstring(result.stdout).find("testsuite") is not None
     if form == "github":
-        assert all(re.match(r"::(error|warning|notice) file=[^,:]*[,:]", line) for line in result.stdout.splitlines())
+        assert all(
+            re.match(r"::(error|warning|notice) file=[^,:]*[,:]", line)
+            for line in result.stdout.splitlines()
+        )
 
 
 @pytest.mark.parametrize("name", [NAME, NO_TEXT], ids=["hostile", "no text"])
@@ -168,15 +233,31 @@ def test_cards_settings_and_messages_are_text(name: str, here: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", [command for command in FORMS if command[0] != "info"], ids=lambda one: one[0])
-def test_pages_show_a_name_as_text_and_repeat_it_for_a_shell(command: tuple[str, ...], here: Path) -> None:
+@pytest.mark.parametrize(
+    "command",
+    [command for command in FORMS if command[0] != "info"],
+    ids=lambda one: one[0],
+)
+def test_pages_show_a_name_as_text_and_repeat_it_for_a_shell(
+    command: tuple[str, ...], here: Path
+) -> None:
     names = {"hostile": NAME, "plain": "-plain.csv"}
     pages = {}
     for kind, name in names.items():
         shutil.copy(ENERGY, here / name)
-        assert run(*command, "--no-verify", "--report", f"{kind}.html", "--", name).exit_code == 0
+        assert (
+            run(
+                *command, "--no-verify", "--report", f"{kind}.html", "--", name
+            ).exit_code
+            == 0
+        )
         pages[kind] = Path(f"{kind}.html").read_text("utf-8")
-        lines = [html.unescape(line) for line in re.findall(r'<pre class="wrap">(.*?)</pre>', pages[kind], re.DOTALL)]
+        lines = [
+            html.unescape(line)
+            for line in re.findall(
+                r'<pre class="wrap">(.*?)</pre>', pages[kind], re.DOTALL
+            )
+        ]
         repeated = [line for line in lines if line.startswith(f"d2rpick {command[0]}")]
         assert given_back(repeated[-1])[-1] == os.fsencode(name)
     counts = [Tags.of(page) for page in pages.values()]
@@ -192,7 +273,10 @@ class Tags(HTMLParser):
         found = cls()
         found.counts = {}
         found.feed(page)
-        return {name: found.counts.get(name, 0) for name in ("script", "img", "iframe", "style", "onload")}
+        return {
+            name: found.counts.get(name, 0)
+            for name in ("script", "img", "iframe", "style", "onload")
+        }
 
     counts: dict[str, int]
 
@@ -208,16 +292,33 @@ def test_a_study_of_a_name_that_is_no_text_can_be_reported(here: Path) -> None:
     assert "run\ufffd" in (here / "page.html").read_text("utf-8")
 
 
-def test_a_list_of_runs_may_name_files_with_any_sign_but_a_line_feed(here: Path) -> None:
+def test_a_list_of_runs_may_name_files_with_any_sign_but_a_line_feed(
+    here: Path,
+) -> None:
     name = "run\u2028\x85\x0b\x1c.csv"
     shutil.copy(ENERGY, here / name)
-    found = run("study", "--jobs", "1", "--td", "0.064", "-f", "json", "--from", "-", stdin=f"{name}\r\n".encode())
+    found = run(
+        "study",
+        "--jobs",
+        "1",
+        "--td",
+        "0.064",
+        "-f",
+        "json",
+        "--from",
+        "-",
+        stdin=f"{name}\r\n".encode(),
+    )
     assert [one["source"] for one in json.loads(found.stdout)["runs"]] == [name]
 
 
 def test_a_unit_is_no_formula_of_a_figure(here: Path) -> None:
     head, rows = Path(ENERGY).read_text("utf-8").split("\n", 1)
-    Path("run.csv").write_text(head.replace("time", '"Time ($^{_$)"') + "\n" + rows, "utf-8")
-    assert run("suggest", "--td", "0.064", "--plot", "plot.svg", "run.csv").exit_code == 0
+    Path("run.csv").write_text(
+        head.replace("time", '"Time ($^{_$)"') + "\n" + rows, "utf-8"
+    )
+    assert (
+        run("suggest", "--td", "0.064", "--plot", "plot.svg", "run.csv").exit_code == 0
+    )
     assert ET.parse(here / "plot.svg") is not None
     assert with_unit("time", "$x$") == r"time [\$x\$]"

@@ -52,12 +52,18 @@ ANSWERS = [
     (*VERIFY, ENERGY),
     ("verify", "--tr", "0.1", "--td", "0.37", *ALONE),
 ]
-FORMATS = {"suggest": ("table", "json", "csv", "markdown", "value"), "verify": ("table", "json", "csv", "markdown")}
+FORMATS = {
+    "suggest": ("table", "json", "csv", "markdown", "value"),
+    "verify": ("table", "json", "csv", "markdown"),
+}
 
 
 def rows_of(text: str) -> list[dict[str, Any]]:
     """Rows of a CSV result with the types that JSON has."""
-    return [{key: _typed(key, cell) for key, cell in row.items()} for row in csv.DictReader(io.StringIO(text))]
+    return [
+        {key: _typed(key, cell) for key, cell in row.items()}
+        for row in csv.DictReader(io.StringIO(text))
+    ]
 
 
 def _typed(key: str, cell: str) -> Any:
@@ -70,12 +76,16 @@ def _typed(key: str, cell: str) -> Any:
 
 
 @pytest.mark.parametrize("args", ANSWERS)
-def test_json_follows_the_schema_and_says_where_it_comes_from(args: tuple[str, ...]) -> None:
+def test_json_follows_the_schema_and_says_where_it_comes_from(
+    args: tuple[str, ...],
+) -> None:
     found = checked(*args)
     assert found["tool_version"] == __version__
     assert found["command"] == [*args, "-f", "json"]
     assert found["history"]["source"] == [args[-1]]
-    assert found["history"]["sha256"] == [hashlib.sha256(Path(args[-1]).read_bytes()).hexdigest()]
+    assert found["history"]["sha256"] == [
+        hashlib.sha256(Path(args[-1]).read_bytes()).hexdigest()
+    ]
 
 
 @pytest.mark.parametrize("key", ["td", "candidates", "history", "warnings"])
@@ -93,13 +103,18 @@ def test_csv_holds_the_numbers_of_json_to_the_last_digit(args: tuple[str, ...]) 
     assert len(rows) == len(expected)
     for row, one in zip(rows, expected, strict=True):
         assert row.pop("td") == found["td"]
-        assert row == {key: "; ".join(one[key]) if isinstance(one[key], list) else one[key] for key in row}
+        assert row == {
+            key: "; ".join(one[key]) if isinstance(one[key], list) else one[key]
+            for key in row
+        }
     if args[0] == "suggest":
         assert set(rows[0]) | {"parts"} == set(expected[0])
 
 
 @pytest.mark.parametrize("source", [ENERGY, GLSTAT])
-def test_value_is_the_recommended_tr_in_the_shortest_digits_that_read_back(source: str) -> None:
+def test_value_is_the_recommended_tr_in_the_shortest_digits_that_read_back(
+    source: str,
+) -> None:
     text = run(*SUGGEST, "-f", "value", source).stdout
     assert text.endswith("\n")
     assert float(text) == answer(*SUGGEST, source)["recommended"]["tr"]
@@ -109,7 +124,9 @@ def test_value_is_the_recommended_tr_in_the_shortest_digits_that_read_back(sourc
 @pytest.mark.parametrize("args", ANSWERS)
 def test_markdown_begins_with_a_table(args: tuple[str, ...]) -> None:
     table, *_ = run(*args, "-f", "markdown").stdout.split("\n\n")
-    head, rule, *rows = [line.strip("|\n").split("|") for line in table.rstrip("\n").split("\n")]
+    head, rule, *rows = [
+        line.strip("|\n").split("|") for line in table.rstrip("\n").split("\n")
+    ]
     assert {cell.strip() for cell in rule} == {"---"}
     assert rows
     assert {len(row) for row in (rule, *rows)} == {len(head)}
@@ -129,28 +146,44 @@ def test_the_table_names_what_it_rests_on_and_marks_the_recommended_row() -> Non
     ]
     assert lines[9].startswith(f"history  {ENERGY}: csv, internal_energy, 1501 states")
     assert [line.split()[2] for line in lines if line.startswith("*")] == ["0.0128853"]
-    assert next(line for line in lines if line.startswith("*")).endswith("best of a bad td")
+    assert next(line for line in lines if line.startswith("*")).endswith(
+        "best of a bad td"
+    )
 
 
 @pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(
-    energy=st.lists(st.floats(-1e3, 1e6, allow_subnormal=False), min_size=3, max_size=40),
+    energy=st.lists(
+        st.floats(-1e3, 1e6, allow_subnormal=False), min_size=3, max_size=40
+    ),
     step=st.floats(1e-6, 1e3),
     share=st.floats(0.01, 1.0),
 )
 def test_whatever_the_energies_every_format_gives_one_answer(
-    tmp_path_factory: pytest.TempPathFactory, energy: list[float], step: float, share: float
+    tmp_path_factory: pytest.TempPathFactory,
+    energy: list[float],
+    step: float,
+    share: float,
 ) -> None:
     file = tmp_path_factory.mktemp("history") / "random.csv"
     time = step * np.arange(len(energy))
-    file.write_text("time,energy\n" + "".join(f"{t!r},{e!r}\n" for t, e in zip(time.tolist(), energy, strict=True)))
+    file.write_text(
+        "time,energy\n"
+        + "".join(f"{t!r},{e!r}\n" for t, e in zip(time.tolist(), energy, strict=True))
+    )
     args = ("suggest", "--td", repr(float(share * time[-1])), "-q", str(file))
     found = checked(*args)
     results = {name: run(*args, "-f", name) for name in FORMATS["suggest"]}
-    assert {result.exit_code for result in results.values()} == {0 if found["recommended"] else 1}
-    assert [row["tr"] for row in rows_of(results["csv"].stdout)] == [c["tr"] for c in found["candidates"]]
-    assert results["value"].stdout == (f"{found['recommended']['tr']!r}\n" if found["recommended"] else "")
+    assert {result.exit_code for result in results.values()} == {
+        0 if found["recommended"] else 1
+    }
+    assert [row["tr"] for row in rows_of(results["csv"].stdout)] == [
+        c["tr"] for c in found["candidates"]
+    ]
+    assert results["value"].stdout == (
+        f"{found['recommended']['tr']!r}\n" if found["recommended"] else ""
+    )
 
 
 # Exit codes and streams.
@@ -171,7 +204,9 @@ def test_the_exit_code_does_not_depend_on_the_format_and_objections_can_be_let_p
     args: tuple[str, ...], code: int
 ) -> None:
     formats = FORMATS[args[0]]
-    assert [run(*args, "-f", name).exit_code for name in formats] == [code] * len(formats)
+    assert [run(*args, "-f", name).exit_code for name in formats] == [code] * len(
+        formats
+    )
     assert run(*args, "--exit-zero").exit_code == {0: 0, 1: 0, 2: 2}[code]
 
 
@@ -188,10 +223,14 @@ def test_notes_of_a_reader_go_to_stderr_and_into_json(tmp_path: Path) -> None:
     found, result = answer(*SUGGEST, str(cut)), run(*SUGGEST, str(cut))
     assert found["history"]["complete"] is False
     assert "truncated-input" in [warning["code"] for warning in found["warnings"]]
-    assert [f"note: {note}" for note in found["history"]["notes"]] == result.stderr.splitlines()[:1]
+    assert [
+        f"note: {note}" for note in found["history"]["notes"]
+    ] == result.stderr.splitlines()[:1]
 
 
-@pytest.mark.parametrize("terminal", [False, True])  # for which the colour of CliRunner stands
+@pytest.mark.parametrize(
+    "terminal", [False, True]
+)  # for which the colour of CliRunner stands
 @pytest.mark.parametrize(
     ("args", "line"),
     [
@@ -203,10 +242,19 @@ def test_notes_of_a_reader_go_to_stderr_and_into_json(tmp_path: Path) -> None:
 def test_what_stands_out_does_so_on_terminals_and_where_asked_for(
     args: tuple[str, ...], line: str, terminal: bool, tmp_path: Path
 ) -> None:
-    asked = {(): terminal, ("FORCE_COLOR",): True, ("NO_COLOR",): False, ("NO_COLOR", "FORCE_COLOR"): False}
+    asked = {
+        (): terminal,
+        ("FORCE_COLOR",): True,
+        ("NO_COLOR",): False,
+        ("NO_COLOR", "FORCE_COLOR"): False,
+    }
     for names, coloured in asked.items():
         shown = run(*args, color=terminal, env=dict.fromkeys(names, "1")).stdout
-        assert bool(re.search(rf"(?m)^\x1b\[1m{line}", shown)) == coloured == ("\x1b" in shown)
+        assert (
+            bool(re.search(rf"(?m)^\x1b\[1m{line}", shown))
+            == coloured
+            == ("\x1b" in shown)
+        )
     file = tmp_path / "result.txt"
     run(*args, "-o", str(file), color=terminal, env={"FORCE_COLOR": "1"})
     assert "\x1b" not in file.read_text()
@@ -218,21 +266,37 @@ def test_what_stands_out_does_so_on_terminals_and_where_asked_for(
 @pytest.mark.parametrize("form", FORMATS["suggest"])
 def test_a_file_gets_what_stdout_would_have_got(form: str, tmp_path: Path) -> None:
     file = tmp_path / "result"
-    to_file, to_stdout = run(*SUGGEST, ENERGY, "-f", form, "-o", str(file)), run(*SUGGEST, ENERGY, "-f", form)
-    assert (to_file.exit_code, to_file.stdout, to_file.stderr) == (0, "", to_stdout.stderr)
+    to_file, to_stdout = (
+        run(*SUGGEST, ENERGY, "-f", form, "-o", str(file)),
+        run(*SUGGEST, ENERGY, "-f", form),
+    )
+    assert (to_file.exit_code, to_file.stdout, to_file.stderr) == (
+        0,
+        "",
+        to_stdout.stderr,
+    )
     written, printed = file.read_text(), to_stdout.stdout
     if form == "json":
-        assert {**json.loads(written), "command": []} == {**json.loads(printed), "command": []}
+        assert {**json.loads(written), "command": []} == {
+            **json.loads(printed),
+            "command": [],
+        }
     else:
         assert written == printed
     assert [path.name for path in tmp_path.iterdir()] == ["result"]
 
 
 @pytest.mark.parametrize("option", ["-o", "--plot", "--report"])
-def test_a_file_is_replaced_only_when_that_was_asked_for(option: str, tmp_path: Path) -> None:
+def test_a_file_is_replaced_only_when_that_was_asked_for(
+    option: str, tmp_path: Path
+) -> None:
     file = put(tmp_path / "result.svg", "kept")
-    assert "the file exists; give another one or --overwrite" in refused(*SUGGEST, ENERGY, option, str(file))
-    assert "no such folder" in refused(*SUGGEST, ENERGY, option, str(tmp_path / "no" / "a.svg"))
+    assert "the file exists; give another one or --overwrite" in refused(
+        *SUGGEST, ENERGY, option, str(file)
+    )
+    assert "no such folder" in refused(
+        *SUGGEST, ENERGY, option, str(tmp_path / "no" / "a.svg")
+    )
     assert file.read_text() == "kept"
     assert run(*SUGGEST, ENERGY, option, str(file), "--overwrite").exit_code == 0
     assert file.read_text() != "kept"
@@ -244,7 +308,9 @@ def test_a_file_is_replaced_only_when_that_was_asked_for(option: str, tmp_path: 
 def test_an_input_is_never_written_to(option: str, spelling: str) -> None:
     Path("energy.svg").write_bytes(Path(ENERGY).read_bytes())
     Path("link.svg").symlink_to("energy.svg")
-    assert "this is an input" in refused(*SUGGEST, "energy.svg", option, spelling, "--overwrite")
+    assert "this is an input" in refused(
+        *SUGGEST, "energy.svg", option, spelling, "--overwrite"
+    )
     assert Path("energy.svg").read_bytes() == Path(ENERGY).read_bytes()
 
 
@@ -264,7 +330,12 @@ def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(
 def test_a_link_stays_and_the_file_behind_it_is_replaced(tmp_path: Path) -> None:
     (tmp_path / "target").write_text("old")
     (tmp_path / "link").symlink_to("target")
-    assert run(*SUGGEST, ENERGY, "-f", "value", "-o", str(tmp_path / "link"), "--overwrite").exit_code == 0
+    assert (
+        run(
+            *SUGGEST, ENERGY, "-f", "value", "-o", str(tmp_path / "link"), "--overwrite"
+        ).exit_code
+        == 0
+    )
     assert (tmp_path / "link").is_symlink()
     assert float((tmp_path / "target").read_text()) > 0
 
@@ -273,9 +344,14 @@ def test_a_named_pipe_is_written_to_and_stays_one(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     received: list[str] = []
-    reader = threading.Thread(target=lambda: received.append(pipe.read_text()), daemon=True)
+    reader = threading.Thread(
+        target=lambda: received.append(pipe.read_text()), daemon=True
+    )
     reader.start()
-    assert run(*SUGGEST, ENERGY, "-f", "value", "-o", str(pipe), "--overwrite").exit_code == 0
+    assert (
+        run(*SUGGEST, ENERGY, "-f", "value", "-o", str(pipe), "--overwrite").exit_code
+        == 0
+    )
     reader.join(timeout=10)
     assert received == [run(*SUGGEST, ENERGY, "-f", "value").stdout]
     assert pipe.is_fifo()
@@ -294,10 +370,26 @@ FIRST_BYTES = {"png": b"\x89PNG\r\n", "svg": b"<?xml", "pdf": b"%PDF-"}
         ("svg", NOTHING),
         ("svg", ("suggest", "--td", "0.37", *ALONE)),
         ("svg", (*VERIFY, ENERGY)),
-        ("svg", ("replay", *OSCILLATOR, "--t-end", "0.15", "--dt", "1e-4", "--tr", "0.013", "--td", "0.064")),
+        (
+            "svg",
+            (
+                "replay",
+                *OSCILLATOR,
+                "--t-end",
+                "0.15",
+                "--dt",
+                "1e-4",
+                "--tr",
+                "0.013",
+                "--td",
+                "0.064",
+            ),
+        ),
     ],
 )
-def test_a_plot_is_drawn_in_the_format_of_its_suffix(suffix: str, args: tuple[str, ...], tmp_path: Path) -> None:
+def test_a_plot_is_drawn_in_the_format_of_its_suffix(
+    suffix: str, args: tuple[str, ...], tmp_path: Path
+) -> None:
     file = tmp_path / f"figure.{suffix.upper()}"
     result = run(*args, "--plot", str(file))
     assert result.exit_code == (1 if args == NOTHING else 0)
@@ -305,9 +397,14 @@ def test_a_plot_is_drawn_in_the_format_of_its_suffix(suffix: str, args: tuple[st
     assert [path.name for path in tmp_path.iterdir()] == [file.name]
 
 
-def test_the_plot_comes_beside_the_result_and_shows_the_switch_times(tmp_path: Path) -> None:
+def test_the_plot_comes_beside_the_result_and_shows_the_switch_times(
+    tmp_path: Path,
+) -> None:
     file = tmp_path / "figure.svg"
-    assert run(*SUGGEST, ENERGY, "--plot", str(file)).stdout == run(*SUGGEST, ENERGY).stdout
+    assert (
+        run(*SUGGEST, ENERGY, "--plot", str(file)).stdout
+        == run(*SUGGEST, ENERGY).stdout
+    )
     drawn = file.read_text()
     for label in ("tr = 0.0128853", "td = 0.064"):
         assert f"<!--  {label}  -->" in drawn
@@ -325,20 +422,43 @@ def test_a_name_that_promises_another_format_is_told(tmp_path: Path) -> None:
     result = run("suggest", "--td", "0.0687534", "-o", name, ENERGY)
     assert (result.exit_code, result.stderr.count(told)) == (0, 1)
     for asked in (("-f", "json"), ("-f", "table"), ("-q",)):
-        result = run("suggest", "--td", "0.0687534", "--overwrite", *asked, "-o", name, ENERGY)
+        result = run(
+            "suggest", "--td", "0.0687534", "--overwrite", *asked, "-o", name, ENERGY
+        )
         assert (result.exit_code, result.stderr) == (0, "")
-    assert "-f csv writes what its name promises" in run("check", "-o", str(tmp_path / "found.csv"), DECK).stderr
-    assert run("info", "-o", str(tmp_path / "read.ndjson"), ENERGY).stderr == ""  # which has no ndjson
-    assert run("replay", *OSCILLATOR, "--t-end", "0.1", "--dt", "0.01", "-o", str(tmp_path / "run.csv")).stderr == ""
+    assert (
+        "-f csv writes what its name promises"
+        in run("check", "-o", str(tmp_path / "found.csv"), DECK).stderr
+    )
+    assert (
+        run("info", "-o", str(tmp_path / "read.ndjson"), ENERGY).stderr == ""
+    )  # which has no ndjson
+    assert (
+        run(
+            "replay",
+            *OSCILLATOR,
+            "--t-end",
+            "0.1",
+            "--dt",
+            "0.01",
+            "-o",
+            str(tmp_path / "run.csv"),
+        ).stderr
+        == ""
+    )
 
 
-def test_a_report_is_a_file_of_its_own_and_not_named_what_it_is_not(tmp_path: Path) -> None:
+def test_a_report_is_a_file_of_its_own_and_not_named_what_it_is_not(
+    tmp_path: Path,
+) -> None:
     for name, message in (
         (str(tmp_path / "report.PDF"), "the report is an HTML page"),
         ("-", "--report writes a file"),
         (str(tmp_path / "a.svg"), "--report and --plot are the same file"),
     ):
-        assert message in refused(*SUGGEST, "--report", name, "--plot", str(tmp_path / "a.svg"), ENERGY)
+        assert message in refused(
+            *SUGGEST, "--report", name, "--plot", str(tmp_path / "a.svg"), ENERGY
+        )
     assert [*tmp_path.iterdir()] == []
 
 
@@ -363,7 +483,9 @@ def rest_of(terminal: int) -> bytes:
     return rest
 
 
-def shown(stream: io.StringIO, names: Sequence[str], *, periods: float, quiet: bool = False) -> str:
+def shown(
+    stream: io.StringIO, names: Sequence[str], *, periods: float, quiet: bool = False
+) -> str:
     """Give what is on ``stream`` after that many periods of reading."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "stderr", stream)
@@ -382,7 +504,9 @@ def test_a_line_counts_the_time_and_is_erased() -> None:
 
 
 def test_several_files_are_counted_and_a_long_name_does_not_wrap() -> None:
-    long = shown(Terminal(), ["a/very/long/name/" * 5 + "binout0000", "b", "c"], periods=5).split("\r")[1]
+    long = shown(
+        Terminal(), ["a/very/long/name/" * 5 + "binout0000", "b", "c"], periods=5
+    ).split("\r")[1]
     assert long.endswith("/binout0000 and 2 more ... 0 s")
     assert len(long) == 39
 
@@ -390,7 +514,15 @@ def test_several_files_are_counted_and_a_long_name_does_not_wrap() -> None:
 @pytest.mark.parametrize("case", ["no terminal", "quiet", "fast"])
 def test_nothing_is_shown_otherwise(case: str) -> None:
     stream = io.StringIO() if case == "no terminal" else Terminal()
-    assert shown(stream, ["glstat"], periods=0 if case == "fast" else 5, quiet=case == "quiet") == ""
+    assert (
+        shown(
+            stream,
+            ["glstat"],
+            periods=0 if case == "fast" else 5,
+            quiet=case == "quiet",
+        )
+        == ""
+    )
 
 
 def test_an_error_is_shown_on_a_clean_line(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -410,7 +542,9 @@ def test_an_error_is_shown_on_a_clean_line(monkeypatch: pytest.MonkeyPatch) -> N
 @pytest.mark.slow
 def test_a_program_that_waits_for_its_input_says_so_on_the_terminal() -> None:
     master, slave = pty.openpty()
-    with started("info", "-f", "csv", "-", stdin=subprocess.PIPE, stderr=slave) as process:
+    with started(
+        "info", "-f", "csv", "-", stdin=subprocess.PIPE, stderr=slave
+    ) as process:
         os.close(slave)
         first = os.read(master, 1000)  # blocks until there is something
         result, _ = process.communicate(Path(ENERGY).read_bytes(), timeout=30)
@@ -426,7 +560,9 @@ def test_a_program_that_waits_for_its_input_says_so_on_the_terminal() -> None:
 def test_the_runs_of_a_scan_are_counted_until_it_is_interrupted(quiet: bool) -> None:
     master, slave = pty.openpty()
     options = ["--quiet"] if quiet else []
-    with started("rollover", "--scan", "--mesh", "4", "--jobs", "2", *options, stderr=slave) as process:
+    with started(
+        "rollover", "--scan", "--mesh", "4", "--jobs", "2", *options, stderr=slave
+    ) as process:
         os.close(slave)
         told = b""
         if quiet:
@@ -439,10 +575,16 @@ def test_the_runs_of_a_scan_are_counted_until_it_is_interrupted(quiet: bool) -> 
     assert process.returncode == -signal.SIGINT
     assert b"Traceback" not in told
     assert told.endswith(b"d2rpick: interrupted\r\n")
-    assert told == b"\r\nd2rpick: interrupted\r\n" if quiet else re.search(rb"\r\d+ of \d+ runs[,\r]", told)
+    assert (
+        told == b"\r\nd2rpick: interrupted\r\n"
+        if quiet
+        else re.search(rb"\r\d+ of \d+ runs[,\r]", told)
+    )
 
 
-def test_runs_are_counted_with_the_time_that_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_runs_are_counted_with_the_time_that_is_left(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     stream = Terminal()
     monkeypatch.setattr(sys, "stderr", stream)
     with progress.counting(9, quiet=False, period=PERIOD) as count:
@@ -468,8 +610,26 @@ def test_runs_are_counted_with_the_time_that_is_left(monkeypatch: pytest.MonkeyP
     "args",
     [
         (*SUGGEST, ENERGY),
-        ("suggest", "-v", "--td", "0.37", "--energy", "boxIE_J", "--no-verify", ROLLOVER),
-        ("explore", "--td-window", "0.06", "0.07", "--steps", "5", "--no-verify", ENERGY),
+        (
+            "suggest",
+            "-v",
+            "--td",
+            "0.37",
+            "--energy",
+            "boxIE_J",
+            "--no-verify",
+            ROLLOVER,
+        ),
+        (
+            "explore",
+            "--td-window",
+            "0.06",
+            "0.07",
+            "--steps",
+            "5",
+            "--no-verify",
+            ENERGY,
+        ),
         ("plan", "--no-verify", ENERGY),
         (*VERIFY, "--no-verify", ENERGY),
         ("info", ENERGY),
@@ -480,19 +640,28 @@ def test_runs_are_counted_with_the_time_that_is_left(monkeypatch: pytest.MonkeyP
         *((command, "--help") for command in COMMANDS),
     ],
 )
-def test_nothing_on_stdout_is_wider_than_the_terminal(args: tuple[str, ...], columns: int) -> None:
+def test_nothing_on_stdout_is_wider_than_the_terminal(
+    args: tuple[str, ...], columns: int
+) -> None:
     result = run(*args, env={"COLUMNS": str(columns)})
-    assert max(map(len, result.stdout.replace(str(ROOT), "").splitlines())) <= min(columns, 100)
+    assert max(map(len, result.stdout.replace(str(ROOT), "").splitlines())) <= min(
+        columns, 100
+    )
 
 
 def test_an_error_ends_where_the_terminal_does() -> None:
     args = ("suggest", "--td", "0.06", "--part", "1", ENERGY)
-    assert run(*args, env={"COLUMNS": "80"}).stderr.count("\n") == 1  # a log is no terminal
+    assert (
+        run(*args, env={"COLUMNS": "80"}).stderr.count("\n") == 1
+    )  # a log is no terminal
     master, slave = pty.openpty()
     with started(*args, stderr=slave, env={**os.environ, "COLUMNS": "80"}) as process:
         os.close(slave)
         process.wait(timeout=30)
-    assert max(map(len, rest_of(master).decode().replace(str(ROOT), "").splitlines())) <= 80
+    assert (
+        max(map(len, rest_of(master).decode().replace(str(ROOT), "").splitlines()))
+        <= 80
+    )
 
 
 def test_columns_without_a_value_are_left_out_and_three_rows_are_shown() -> None:
@@ -510,11 +679,16 @@ def test_a_td_at_the_landing_is_answered_by_its_reason_and_the_pair_before_it() 
     result = run("suggest", "--td", "0.38", "--part", "box", MATSUM)
     assert result.exit_code == 1
     first, second, *_ = result.stdout.split("\n")
-    assert first == "recommended  none: td = 0.38: td after the end of the flight at 0.379"
+    assert (
+        first == "recommended  none: td = 0.38: td after the end of the flight at 0.379"
+    )
     assert second.startswith("better pair  tr = 0.0970304, td = 0.37")
     assert "verdict" not in result.stdout
     assert "no-candidate" not in result.stderr
-    assert "no-candidate" in run("suggest", "--td", "0.38", "--part", "box", MATSUM, "-f", "value").stderr
+    assert (
+        "no-candidate"
+        in run("suggest", "--td", "0.38", "--part", "box", MATSUM, "-f", "value").stderr
+    )
 
 
 def test_the_best_of_a_bad_td_is_said_of_a_td_that_was_asked_for() -> None:

@@ -20,7 +20,10 @@ pytestmark = pytest.mark.usefixtures("by_level")
 WITH_DECK = ("--deck", str(DECK), MATSUM)
 
 
-@pytest.mark.parametrize("args", [WITH_DECK, (MATSUM,), ("--td", "0.37", *WITH_DECK), ("--deck", str(DECK), ENERGY)])
+@pytest.mark.parametrize(
+    "args",
+    [WITH_DECK, (MATSUM,), ("--td", "0.37", *WITH_DECK), ("--deck", str(DECK), ENERGY)],
+)
 def test_the_answer_keeps_its_schema(args: tuple[str, ...]) -> None:
     found = checked("parts", *args)
     assert (found["deck"] is None) == ("--deck" not in args)
@@ -30,12 +33,24 @@ def test_all_forms_hold_the_same() -> None:
     parts = d2.parts(d2.read(MATSUM), deck=DECK)
     found = parts.to_dict()
     rows = list(csv.DictReader(io.StringIO(parts.text("csv", Shown()))))
-    assert [row["verdict"] for row in rows] == [row["verdict"] for row in found["parts"]] == ["switch", "merge", "keep"]
+    assert (
+        [row["verdict"] for row in rows]
+        == [row["verdict"] for row in found["parts"]]
+        == ["switch", "merge", "keep"]
+    )
     assert rows[0]["elements"] == "94 shell"
     assert run("parts", "-q", "-f", "value", *WITH_DECK).stdout == "1,2\n"
     for form in ("table", "markdown"):
         text = parts.text(form, Shown())
-        assert all(words in text for words in ("merge with 1", "already rigid", "all that may", "one rigid body"))
+        assert all(
+            words in text
+            for words in (
+                "merge with 1",
+                "already rigid",
+                "all that may",
+                "one rigid body",
+            )
+        )
     assert found["recommended"]["parts"] == [1, 2]
 
 
@@ -63,12 +78,17 @@ def test_without_a_set_to_take_every_form_is_an_objection() -> None:
 
 
 def test_a_set_of_ones_own_is_compared() -> None:
-    sets = {tuple(one["parts"]): one for one in answer("parts", "--part", "step", *WITH_DECK)["sets"]}
+    sets = {
+        tuple(one["parts"]): one
+        for one in answer("parts", "--part", "step", *WITH_DECK)["sets"]
+    }
     assert sets[(2,)]["saving"] < sets[(1,)]["saving"] < sets[(1, 2)]["saving"]
 
 
 def test_a_given_window_and_step_ratio_count() -> None:
-    found = answer("parts", "--tr", "0.1", "--td", "0.3", "--step-ratio", "2", *WITH_DECK)
+    found = answer(
+        "parts", "--tr", "0.1", "--td", "0.3", "--step-ratio", "2", *WITH_DECK
+    )
     best = found["sets"][0]
     assert (best["tr"], best["td"], found["step_ratio"]) == (0.1, 0.3, 2.0)
     share = best["rigid_fraction"] * (1 - (1 - best["cost_share"]) / 2)
@@ -79,33 +99,53 @@ def test_the_page_holds_parts_and_sets(tmp_path: Path) -> None:
     page = tmp_path / "parts.html"
     assert run("parts", "-q", "--report", str(page), *WITH_DECK).exit_code == 0
     text = page.read_text("utf-8")
-    assert all(words in text for words in ("all that may", "merge with 1", "already rigid", "SHA-256"))
+    assert all(
+        words in text
+        for words in ("all that may", "merge with 1", "already rigid", "SHA-256")
+    )
     assert "http" not in text.replace("http-equiv", "")
 
 
-def test_where_nothing_can_be_recommended_the_answer_is_an_objection(tmp_path: Path) -> None:
+def test_where_nothing_can_be_recommended_the_answer_is_an_objection(
+    tmp_path: Path,
+) -> None:
     other = put(
         tmp_path / "main.k",
-        DECK.read_text("utf-8").replace("         1         2       1.0", "         1        99       1.0"),
+        DECK.read_text("utf-8").replace(
+            "         1         2       1.0", "         1        99       1.0"
+        ),
     )
     result = run("parts", "--deck", str(other), MATSUM)
     assert result.exit_code == 1
     assert "no weight is known for shell (ELFORM 99)" in result.stdout
     assert run("parts", "--exit-zero", "--deck", str(other), MATSUM).exit_code == 0
-    weights = put(tmp_path / "site.toml", '[per_element]\n"shell (ELFORM 99)" = 1.0\nQBAT = 1.0\nBT = 1.0\n')
-    assert run("parts", "--deck", str(other), "--weights", str(weights), MATSUM).exit_code == 0
+    weights = put(
+        tmp_path / "site.toml",
+        '[per_element]\n"shell (ELFORM 99)" = 1.0\nQBAT = 1.0\nBT = 1.0\n',
+    )
+    assert (
+        run("parts", "--deck", str(other), "--weights", str(weights), MATSUM).exit_code
+        == 0
+    )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "command", [("suggest", "--td", "0.37"), ("plan",), ("verify", "--tr", "0.0960392", "--td", "0.37")]
+    "command",
+    [
+        ("suggest", "--td", "0.37"),
+        ("plan",),
+        ("verify", "--tr", "0.0960392", "--td", "0.37"),
+    ],
 )
 def test_a_deck_takes_the_place_of_a_cost_share(command: tuple[str, ...]) -> None:
     def share(*more: str) -> float:
         text = run(*command, "--no-verify", "-q", "-f", "json", *more, MATSUM).stdout
         found = json.loads(text)
         rows = found.get("windows") or found.get("candidates") or [found]
-        return float(next(row["run_time_share"] for row in rows if row.get("recommended", True)))
+        return float(
+            next(row["run_time_share"] for row in rows if row.get("recommended", True))
+        )
 
     cost = answer("parts", *WITH_DECK)["sets"][0]["cost_share"]
     by_deck = share("--part", "1,2", "--deck", str(DECK))
@@ -125,12 +165,19 @@ def test_a_deck_is_never_written_over(tmp_path: Path, command: str) -> None:
 
 
 def test_a_cost_that_is_not_known_is_a_warning(tmp_path: Path) -> None:
-    cut = put(tmp_path / "main.k", DECK.read_text("utf-8").replace("*END", "*INCLUDE\nabsent.k\n*END"))
+    cut = put(
+        tmp_path / "main.k",
+        DECK.read_text("utf-8").replace("*END", "*INCLUDE\nabsent.k\n*END"),
+    )
     found = checked("plan", "--part", "1,2", "--deck", str(cut), MATSUM)
     assert found["run_time_share"] is None
-    assert "absent.k was not read" in next(one["message"] for one in found["warnings"] if one["code"] == "cost-unknown")
+    assert "absent.k was not read" in next(
+        one["message"] for one in found["warnings"] if one["code"] == "cost-unknown"
+    )
     whole = answer("suggest", "--td", "0.37", *WITH_DECK)
-    assert "cost-unknown" in [one["code"] for one in whole["warnings"]]  # no parts are named
+    assert "cost-unknown" in [
+        one["code"] for one in whole["warnings"]
+    ]  # no parts are named
 
 
 def test_calibrate_writes_what_weights_reads(tmp_path: Path) -> None:
@@ -142,8 +189,13 @@ def test_calibrate_writes_what_weights_reads(tmp_path: Path) -> None:
         assert "QEPH" in run("calibrate", "-f", form, folder).stdout
     site = tmp_path / "site.toml"
     assert run("calibrate", "-f", "toml", "-o", str(site), folder).exit_code == 0
-    result = run("parts", "-q", "-f", "json", "--weights", str(site), "--exit-zero", *WITH_DECK)
-    assert json.loads(result.stdout)["weights"]["per_element"].keys() == {"QEPH", "point"}
+    result = run(
+        "parts", "-q", "-f", "json", "--weights", str(site), "--exit-zero", *WITH_DECK
+    )
+    assert json.loads(result.stdout)["weights"]["per_element"].keys() == {
+        "QEPH",
+        "point",
+    }
     (tmp_path / "empty").mkdir()
     assert run("calibrate", str(tmp_path / "empty")).exit_code == 2
 
@@ -156,13 +208,18 @@ def test_calibrate_writes_what_weights_reads(tmp_path: Path) -> None:
         ("explore", "--td-window", "0.3", "0.37", "--steps", "2"),
     ],
 )  # fmt: skip
-def test_what_is_doubtful_in_a_deck_is_said_wherever_it_counts(asked: tuple[str, ...], tmp_path: Path) -> None:
+def test_what_is_doubtful_in_a_deck_is_said_wherever_it_counts(
+    asked: tuple[str, ...], tmp_path: Path
+) -> None:
     def codes(*args: str) -> set[str]:
         part = ("--no-verify", *(() if asked[0] == "parts" else ("--part", "box")))
         return {one["code"] for one in answer(*asked, *part, *args)["warnings"]}
 
     assert codes(*WITH_DECK) >= {"weights-by-analogy"}
-    deck = put(tmp_path / "main.k", DECK.read_text("utf-8").replace("*END", "*ELEMENT_GENERALIZED_SHELL\n*END"))
+    deck = put(
+        tmp_path / "main.k",
+        DECK.read_text("utf-8").replace("*END", "*ELEMENT_GENERALIZED_SHELL\n*END"),
+    )
     doubts = codes("--deck", str(deck), MATSUM)
     assert "deck-not-followed" in doubts
     if asked[0] != "parts":
@@ -172,7 +229,18 @@ def test_what_is_doubtful_in_a_deck_is_said_wherever_it_counts(asked: tuple[str,
 
 def test_the_deck_that_a_plan_writes_merges_what_parts_merges(tmp_path: Path) -> None:
     """Else `check` finds nodes that two rigid bodies own, D2R108."""
-    result = run("plan", "-q", "--part", "recommended", "--write-deck", str(tmp_path / "next"), *WITH_DECK)
+    result = run(
+        "plan",
+        "-q",
+        "--part",
+        "recommended",
+        "--write-deck",
+        str(tmp_path / "next"),
+        *WITH_DECK,
+    )
     assert result.exit_code == 0
     assert "0 errors, 0 warnings" in result.stdout
-    assert "\n         2         1      PART\n" in (tmp_path / "next" / "switches.k").read_text()
+    assert (
+        "\n         2         1      PART\n"
+        in (tmp_path / "next" / "switches.k").read_text()
+    )

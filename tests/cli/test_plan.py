@@ -14,7 +14,11 @@ from tests.json_schemas import check_by_schema, checked
 
 pytestmark = pytest.mark.slow
 FINE = 4e-4  # [s] between two states, which tells a landing that comes a little later
-PART = ("--part", "box", "--no-verify")  # no oscillator describes it, and none is sought
+PART = (
+    "--part",
+    "box",
+    "--no-verify",
+)  # no oscillator describes it, and none is sought
 
 
 @pytest.fixture(scope="module")
@@ -26,15 +30,27 @@ def test_all_forms_hold_the_same_windows(history: list[str]) -> None:
     plan = d2.plan(d2.read(history), parts="box", replay=False)
     found = plan.to_dict()
     check_by_schema(found)
-    supported = [(row["tr"], row["td"]) for row in found["windows"] if row["status"] == "supported"]
-    every = [(row["tr"], row["td"]) for row in found["windows"] if row["tr"] is not None]
-    assert all((row["quality"] is None) is (row["tr"] is None) for row in found["windows"])
+    supported = [
+        (row["tr"], row["td"])
+        for row in found["windows"]
+        if row["status"] == "supported"
+    ]
+    every = [
+        (row["tr"], row["td"]) for row in found["windows"] if row["tr"] is not None
+    ]
+    assert all(
+        (row["quality"] is None) is (row["tr"] is None) for row in found["windows"]
+    )
     assert 1 < len(supported) < len(every)
     values = run("plan", "-q", "-f", "value", "--all", *PART, *history).stdout
     for text, wanted in ((plan.text("value", Shown()), supported), (values, every)):
-        assert [tuple(map(float, line.split(" "))) for line in text.splitlines()] == wanted
+        assert [
+            tuple(map(float, line.split(" "))) for line in text.splitlines()
+        ] == wanted
     table = plan.text("csv", Shown())
-    assert [row["td"] for row in csv_rows(table)] == [row["td"] for row in found["windows"]]
+    assert [row["td"] for row in csv_rows(table)] == [
+        row["td"] for row in found["windows"]
+    ]
     for form in ("table", "markdown"):
         text = plan.text(form, Shown())
         assert all(f"{tr:.6g}" in text and f"{td:.6g}" in text for tr, td in every)
@@ -48,7 +64,10 @@ def csv_rows(text: str) -> list[dict[str, object]]:
 
     rows = csv.DictReader(io.StringIO(text))
     return [
-        {key: float(cell) if key in ("tr", "td") and cell else cell or None for key, cell in row.items()}
+        {
+            key: float(cell) if key in ("tr", "td") and cell else cell or None
+            for key, cell in row.items()
+        }
         for row in rows
     ]
 
@@ -61,25 +80,49 @@ def test_a_poor_window_is_called_poor() -> None:
     rows = [row for row in found["windows"] if row["status"] == "supported"]
     assert [row["quality"] for row in rows] == ["good", "poor"]
     for row in rows:
-        alone = answer("suggest", "--part", "all", "--td-window", str(row["flight_start"]), str(row["flight_end"]), box)
+        alone = answer(
+            "suggest",
+            "--part",
+            "all",
+            "--td-window",
+            str(row["flight_start"]),
+            str(row["flight_end"]),
+            box,
+        )
         assert alone["quality"] == row["quality"]
     text = plan.text("table", Shown())
-    assert f"flight {rows[1]['flight']}   poor: how the deformations at tr and td lie" in text
+    assert (
+        f"flight {rows[1]['flight']}   poor: how the deformations at tr and td lie"
+        in text
+    )
 
 
-def test_the_card_holds_the_supported_windows_and_passes_check(history: list[str], tmp_path: Path) -> None:
+def test_the_card_holds_the_supported_windows_and_passes_check(
+    history: list[str], tmp_path: Path
+) -> None:
     card = tmp_path / "switches.k"
     result = run("plan", "-q", "-f", "card", *PART, "-o", str(card), *history)
     assert (result.exit_code, result.stdout) == (0, "")
     windows = json.loads(run("check", "-q", "-f", "json", str(card)).stdout)["windows"]
     lines = run("plan", "-q", "-f", "value", *PART, *history).stdout.split()
-    assert [time for one in windows for time in (one["tr"], one["td"])] == pytest.approx(
-        list(map(float, lines)), abs=1e-7
-    )
+    assert [
+        time for one in windows for time in (one["tr"], one["td"])
+    ] == pytest.approx(list(map(float, lines)), abs=1e-7)
 
 
 def test_radioss_gets_a_leg_for_each_switch(history: list[str]) -> None:
-    card = run("plan", "-q", "-f", "card", "--solver", "radioss", "--node", "7", *PART, *history).stdout
+    card = run(
+        "plan",
+        "-q",
+        "-f",
+        "card",
+        "--solver",
+        "radioss",
+        "--node",
+        "7",
+        *PART,
+        *history,
+    ).stdout
     lines = run("plan", "-q", "-f", "value", *PART, *history).stdout.splitlines()
     assert card.count("/RBODY/ON") == len(lines)
     assert card.count("/RBODY/OFF") >= len(lines)
@@ -87,7 +130,12 @@ def test_radioss_gets_a_leg_for_each_switch(history: list[str]) -> None:
 
 def test_pictures_and_pages_are_written(history: list[str], tmp_path: Path) -> None:
     plot, page = tmp_path / "plan.svg", tmp_path / "plan.html"
-    assert run("plan", "-q", *PART, "--plot", str(plot), "--report", str(page), *history).exit_code == 0
+    assert (
+        run(
+            "plan", "-q", *PART, "--plot", str(plot), "--report", str(page), *history
+        ).exit_code
+        == 0
+    )
     assert plot.read_text().startswith("<?xml")
     text = page.read_text()
     assert "*DEFORMABLE_TO_RIGID_AUTOMATIC" in text
@@ -95,14 +143,24 @@ def test_pictures_and_pages_are_written(history: list[str], tmp_path: Path) -> N
 
 
 def test_nothing_to_recommend_is_an_objection(history: list[str]) -> None:
-    assert run("plan", "-q", "--min-rigid", "5", "-f", "card", *PART, *history).exit_code == 1
-    assert run("plan", "-q", "--min-rigid", "5", "--exit-zero", *PART, *history).exit_code == 0
+    assert (
+        run("plan", "-q", "--min-rigid", "5", "-f", "card", *PART, *history).exit_code
+        == 1
+    )
+    assert (
+        run("plan", "-q", "--min-rigid", "5", "--exit-zero", *PART, *history).exit_code
+        == 0
+    )
 
 
 def test_one_oscillator_is_one_flight() -> None:
     found = answer("plan", ENERGY)
     (row,) = found["windows"]
-    assert (row["status"], row["basis"], row["margin_source"]) == ("supported", "oscillator", "no-contact")
+    assert (row["status"], row["basis"], row["margin_source"]) == (
+        "supported",
+        "oscillator",
+        "no-contact",
+    )
     assert row["residual"] < 1e-3
 
 
@@ -110,39 +168,75 @@ def test_where_nothing_vibrates_no_level_is_held_against_another() -> None:
     file = stored("drop2T01.gz")
     asked = ("--part", "flying", "--tr", "0", "--td", "0.27")
     told = run("verify", "-q", *asked, file).stdout.splitlines()[0]
-    assert told.endswith("by the energy level alone: tr lies in the flight, and nothing vibrates there")
+    assert told.endswith(
+        "by the energy level alone: tr lies in the flight, and nothing vibrates there"
+    )
     chosen = run("suggest", "-q", "--part", "flying", "--td", "0.27", file).stdout
     assert "keeps        everything: nothing vibrates in the flight up to td" in chosen
-    card = run("card", "-q", "--part", "1", *asked[2:], "--solver", "ls-dyna", "--history", file).stdout
+    card = run(
+        "card",
+        "-q",
+        "--part",
+        "1",
+        *asked[2:],
+        "--solver",
+        "ls-dyna",
+        "--history",
+        file,
+    ).stdout
     assert "at-rest: nothing vibrates" in card
     assert "evel error" not in card
 
 
-def test_the_next_window_is_planned_from_the_switched_run(history: list[str], tmp_path: Path) -> None:
+def test_the_next_window_is_planned_from_the_switched_run(
+    history: list[str], tmp_path: Path
+) -> None:
     done = tmp_path / "switches.txt"
     run("plan", "-q", "-f", "value", *PART, "-o", str(done), *history)
-    windows = [(float(tr), float(td)) for tr, td in map(str.split, done.read_text().splitlines())]
+    windows = [
+        (float(tr), float(td))
+        for tr, td in map(str.split, done.read_text().splitlines())
+    ]
     switched = written(drop(*windows, interval=FINE), tmp_path / "next")
     before = [text for name in history for text in ("--before", name)]
     found = checked("plan", *PART, "--done", str(done), *before, *switched)
-    assert [(row["tr"], row["td"]) for row in found["windows"] if row["status"] == "done"] == windows
-    assert all(row["landing"] > row["td"] for row in found["windows"] if row["status"] == "done")
+    assert [
+        (row["tr"], row["td"]) for row in found["windows"] if row["status"] == "done"
+    ] == windows
+    assert all(
+        row["landing"] > row["td"]
+        for row in found["windows"]
+        if row["status"] == "done"
+    )
     told = run("plan", "-q", *PART, "--done", str(done), *before, *switched).stdout
     assert "as planned" in told
     assert "than planned" in told
     assert "run from the start with those that are done and these" in told
-    new = [(row["tr"], row["td"]) for row in found["windows"] if row["status"] == "supported"]
-    lines = run("plan", "-q", "-f", "value", *PART, "--done", str(done), *before, *switched).stdout.splitlines()
+    new = [
+        (row["tr"], row["td"])
+        for row in found["windows"]
+        if row["status"] == "supported"
+    ]
+    lines = run(
+        "plan", "-q", "-f", "value", *PART, "--done", str(done), *before, *switched
+    ).stdout.splitlines()
     assert [tuple(map(float, line.split())) for line in lines] == [*windows, *new]
-    assert "said to be done" in refused("plan", "-q", *PART, "--done", str(done), *history)
+    assert "said to be done" in refused(
+        "plan", "-q", *PART, "--done", str(done), *history
+    )
 
 
-def test_the_cards_of_the_next_run_hold_the_windows_that_are_done(history: list[str], tmp_path: Path) -> None:
+def test_the_cards_of_the_next_run_hold_the_windows_that_are_done(
+    history: list[str], tmp_path: Path
+) -> None:
     """It is computed from the start; what is done cannot be judged by a run that was rigid there."""
     done, main, folder = tmp_path / "done.txt", tmp_path / "main.k", tmp_path / "next"
     main.write_text(DECK)
     run("plan", "-q", "-f", "value", *PART, "-o", str(done), *history)
-    windows = [(float(tr), float(td)) for tr, td in map(str.split, done.read_text().splitlines())]
+    windows = [
+        (float(tr), float(td))
+        for tr, td in map(str.split, done.read_text().splitlines())
+    ]
     switched = written(drop(*windows, interval=FINE), tmp_path / "switched")
     args = ("plan", "-q", *PART, "--done", str(done))
     card = run(*args, "-f", "card", *switched)
@@ -160,7 +254,9 @@ def test_the_cards_of_the_next_run_hold_the_windows_that_are_done(history: list[
     assert (nothing.exit_code, nothing.stdout) == (1, "")
 
 
-def test_a_radioss_run_gets_its_starter_and_a_leg_for_each_switch(tmp_path: Path) -> None:
+def test_a_radioss_run_gets_its_starter_and_a_leg_for_each_switch(
+    tmp_path: Path,
+) -> None:
     """Of the falling box; its first fall is free, so that the run itself stands for one that is switched there."""
     name, node = "DROP2", "535"
     deck = put(tmp_path / f"{name}_0000.rad", starter("DROP2"))
@@ -168,7 +264,17 @@ def test_a_radioss_run_gets_its_starter_and_a_leg_for_each_switch(tmp_path: Path
     (tmp_path / f"{name}_0001.rad").write_text(engine)
     history, done = stored("drop2T01.gz"), tmp_path / "done.txt"
     done.write_text("0.0 0.277\n")
-    args = ("plan", "-q", "--part", "all", "--node", node, "--deck", str(deck), "--write-deck")
+    args = (
+        "plan",
+        "-q",
+        "--part",
+        "all",
+        "--node",
+        node,
+        "--deck",
+        str(deck),
+        "--write-deck",
+    )
     for folder, more in ((tmp_path / "a", ()), (tmp_path / "b", ("--done", str(done)))):
         result = run(*args, str(folder), *more, history)
         assert result.exit_code == 0, result.stdout
@@ -182,9 +288,14 @@ def test_a_radioss_run_gets_its_starter_and_a_leg_for_each_switch(tmp_path: Path
     assert legs[0].splitlines()[1].strip() == "0.277"
     lacking = starter("DROP2").partition(b"/RBODY")
     deck.write_bytes(lacking[0] + lacking[2][lacking[2].index(b"/SURF") :])
-    (tmp_path / f"{name}_0001.rad").write_text(engine.replace(f"/RBODY/OFF\n{node}\n", ""))
+    (tmp_path / f"{name}_0001.rad").write_text(
+        engine.replace(f"/RBODY/OFF\n{node}\n", "")
+    )
     result = run("plan", *args[2:4], *args[6:], str(tmp_path / "c"), history)
-    assert (result.exit_code, "/RBODY with main node 536 is new, for parts 1-5" in result.stderr) == (0, True)
+    assert (
+        result.exit_code,
+        "/RBODY with main node 536 is new, for parts 1-5" in result.stderr,
+    ) == (0, True)
     assert "parts 1-5: rigid from" in result.stdout
 
 
@@ -205,16 +316,36 @@ step
 """
 
 
-def test_a_copy_of_the_deck_holds_the_cards_and_passes_the_check(history: list[str], tmp_path: Path) -> None:
+def test_a_copy_of_the_deck_holds_the_cards_and_passes_the_check(
+    history: list[str], tmp_path: Path
+) -> None:
     main, folder = tmp_path / "main.k", tmp_path / "next"
     main.write_text(DECK)
-    args = ("plan", "-q", "--part", "flying", "--deck", str(main), "--write-deck", str(folder), *history)
+    args = (
+        "plan",
+        "-q",
+        "--part",
+        "flying",
+        "--deck",
+        str(main),
+        "--write-deck",
+        str(folder),
+        *history,
+    )
     result = run(*args)
     assert result.exit_code == 0, result.stdout
     assert "0 errors, 0 warnings" in result.stdout
-    assert (folder / "main.k").read_text() == DECK.replace("*END", "*INCLUDE\nswitches.k\n*END")
-    judged = run("check", str(folder / "main.k"), *(text for name in history for text in ("--history", name)))
+    assert (folder / "main.k").read_text() == DECK.replace(
+        "*END", "*INCLUDE\nswitches.k\n*END"
+    )
+    judged = run(
+        "check",
+        str(folder / "main.k"),
+        *(text for name in history for text in ("--history", name)),
+    )
     assert judged.exit_code == 0, judged.stdout
     assert "the file exists; choose another folder or --overwrite" in refused(*args)
     assert run(*args, "--overwrite").exit_code == 0
-    assert "--write-deck needs --deck" in refused("plan", "--part", "box", "--write-deck", str(folder), *history)
+    assert "--write-deck needs --deck" in refused(
+        "plan", "--part", "box", "--write-deck", str(folder), *history
+    )

@@ -5,7 +5,16 @@ from pathlib import Path
 
 import pytest
 
-from tests.command import BOX, DECK, ENERGY, GLSTAT, MATSUM, OSCILLATOR, ROLLOVER, refused
+from tests.command import (
+    BOX,
+    DECK,
+    ENERGY,
+    GLSTAT,
+    MATSUM,
+    OSCILLATOR,
+    ROLLOVER,
+    refused,
+)
 from tests.computed import stored
 from tests.sample_deck import DECK as SAMPLE
 
@@ -199,7 +208,9 @@ rollover --speed 1e300 --t-end 0.001 --mesh 4 | infinite
 """
 
 
-@pytest.mark.parametrize("row", [row for row in REFUSALS.strip().split("\n") if not row.startswith("# ")])
+@pytest.mark.parametrize(
+    "row", [row for row in REFUSALS.strip().split("\n") if not row.startswith("# ")]
+)
 def test_what_cannot_be_run_is_told_in_one_line(row: str, here: Path) -> None:
     line, *parts = row.split(" | ")
     message = f"{refused(*shlex.split(line))}$"

@@ -21,7 +21,18 @@ from tests.json_schemas import check_by_schema
 
 SMALL = ("--mesh", "4", "--dt", "5e-4")
 SHORT = (*SMALL, "--t-end", "0.12")
-SCAN = ("rollover", "--scan", "--jobs", "1", "--mesh", "4", "--dt", "1e-3", "--t-end", "0.11")
+SCAN = (
+    "rollover",
+    "--scan",
+    "--jobs",
+    "1",
+    "--mesh",
+    "4",
+    "--dt",
+    "1e-3",
+    "--t-end",
+    "0.11",
+)
 COLUMNS = (
     "time,x,z,roll,vx,vz,omega,internal_energy,kinetic_energy,momentum_x,momentum_z,step_internal_energy,"
     "step_kinetic_energy,contact_energy,frictional_contact_energy,stonewall_energy,damping_energy,external_work,"
@@ -31,22 +42,39 @@ COLUMNS = (
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["run.csv", "run.h5", "run.glstat", "run.matsum"])
-def test_every_format_is_read_back_with_the_energies_of_the_run(name: str, tmp_path: Path) -> None:
-    table = np.genfromtxt(io.StringIO(run("rollover", *SHORT).stdout), delimiter=",", names=True)
+def test_every_format_is_read_back_with_the_energies_of_the_run(
+    name: str, tmp_path: Path
+) -> None:
+    table = np.genfromtxt(
+        io.StringIO(run("rollover", *SHORT).stdout), delimiter=",", names=True
+    )
     assert ",".join(table.dtype.names or ()) == COLUMNS
     file = tmp_path / name
     assert run("rollover", *SHORT, "-o", str(file)).exit_code == 0
     part = ("--part", "box") if name.endswith("matsum") else ()
-    read = np.genfromtxt(io.StringIO(run("extract", *part, str(file)).stdout), delimiter=",", names=True)
+    read = np.genfromtxt(
+        io.StringIO(run("extract", *part, str(file)).stdout), delimiter=",", names=True
+    )
     np.testing.assert_allclose(read["time"], table["time"], rtol=1e-4)
-    step = 10.0 if name.endswith("glstat") else 1e-3  # the glstat has the energy of the step as well
-    np.testing.assert_allclose(read["internal_energy"], table["internal_energy"], rtol=1e-3, atol=step)
+    step = (
+        10.0 if name.endswith("glstat") else 1e-3
+    )  # the glstat has the energy of the step as well
+    np.testing.assert_allclose(
+        read["internal_energy"], table["internal_energy"], rtol=1e-3, atol=step
+    )
 
 
 @pytest.mark.slow
-def test_a_switched_run_is_rigid_in_between_and_differs_after_it(tmp_path: Path) -> None:
-    texts = [run("rollover", *SMALL, *window).stdout for window in ((), ("--tr", "0.1", "--td", "0.2"))]
-    whole, switched = (np.genfromtxt(io.StringIO(text), delimiter=",", names=True) for text in texts)
+def test_a_switched_run_is_rigid_in_between_and_differs_after_it(
+    tmp_path: Path,
+) -> None:
+    texts = [
+        run("rollover", *SMALL, *window).stdout
+        for window in ((), ("--tr", "0.1", "--td", "0.2"))
+    ]
+    whole, switched = (
+        np.genfromtxt(io.StringIO(text), delimiter=",", names=True) for text in texts
+    )
     time = whole["time"]
     before = time < 0.1 - 1e-6
     np.testing.assert_array_equal(switched[before], whole[before])
@@ -54,29 +82,62 @@ def test_a_switched_run_is_rigid_in_between_and_differs_after_it(tmp_path: Path)
     assert np.ptp(switched["internal_energy"][rigid]) < 1e-9
     assert np.ptp(switched["internal_energy"][time > 0.2]) > 0.1
     plot = tmp_path / "motion.svg"
-    assert run("rollover", *SMALL, "--tr", "0.1", "--td", "0.2", "--plot", str(plot)).stdout == ""
+    assert (
+        run(
+            "rollover", *SMALL, "--tr", "0.1", "--td", "0.2", "--plot", str(plot)
+        ).stdout
+        == ""
+    )
     assert b"<svg" in plot.read_bytes()
 
 
 def test_a_box_that_falls_is_switched_in_several_windows(tmp_path: Path) -> None:
     file = tmp_path / "tumbling.csv"
     windows = ("--tr", "0", "--td", "0.28", "--tr", "0.42", "--td", "0.5")
-    assert run("rollover", *SMALL, "--drop", "0.4", "--tilt", "40", *windows, "-o", str(file)).stderr == ""
+    assert (
+        run(
+            "rollover",
+            *SMALL,
+            "--drop",
+            "0.4",
+            "--tilt",
+            "40",
+            *windows,
+            "-o",
+            str(file),
+        ).stderr
+        == ""
+    )
     table = np.genfromtxt(file, delimiter=",", names=True)
     time, energy = table["time"], table["internal_energy"]
     assert time[-1] == pytest.approx(1.2)
     for tr, td in ((0, 0.28), (0.42, 0.5)):
         assert np.ptp(energy[(time > tr + 1e-3) & (time < td - 1e-3)]) < 1e-9
     assert energy[(time > 0.29) & (time < 0.42)].max() > 1
-    total = table["internal_energy"] + table["kinetic_energy"] + table["step_internal_energy"]
-    total += table["step_kinetic_energy"] + table["contact_energy"] + table["stonewall_energy"]
-    np.testing.assert_allclose(total + table["damping_energy"], table["total_energy"], atol=1e-6)
+    total = (
+        table["internal_energy"]
+        + table["kinetic_energy"]
+        + table["step_internal_energy"]
+    )
+    total += (
+        table["step_kinetic_energy"]
+        + table["contact_energy"]
+        + table["stonewall_energy"]
+    )
+    np.testing.assert_allclose(
+        total + table["damping_energy"], table["total_energy"], atol=1e-6
+    )
 
 
 def test_the_figure_of_a_motion_superposes_the_outlines_of_both_runs() -> None:
     window = RigidWindow(0.05, 0.2)
-    reference, switched = (simulate(Parameters(mesh=4), 0.25, *rigid, interval=5e-4) for rigid in ((), (window,)))
-    figure = figures_models.draw_rollover(Parameters(mesh=4), reference, switched, (window,))
+    reference, switched = (
+        simulate(Parameters(mesh=4), 0.25, *rigid, interval=5e-4)
+        for rigid in ((), (window,))
+    )
+    figure = figures_models.draw_rollover(
+        Parameters(mesh=4), reference, switched, (window,)
+    )
     outlines, roll, roll_off, height, height_off = figure.axes
     drawn = [points(line) for line in outlines.lines]
     assert set(drawn[0][:, 1]) == {-Parameters().ground}
@@ -88,10 +149,15 @@ def test_the_figure_of_a_motion_superposes_the_outlines_of_both_runs() -> None:
     for axes in (roll, height):
         named = axes.get_legend_handles_labels()[1]
         assert named == ["without switching", "switched", "rigid", "sled pushed last"]
-    off = (np.degrees(switched.roll - reference.roll), 1e3 * (switched.centre - reference.centre).imag)
+    off = (
+        np.degrees(switched.roll - reference.roll),
+        1e3 * (switched.centre - reference.centre).imag,
+    )
     wanted = (np.degrees(switched.roll), reference.centre.imag, *off)
     for line, values in zip(
-        (roll.lines[1], height.lines[0], roll_off.lines[0], height_off.lines[0]), wanted, strict=True
+        (roll.lines[1], height.lines[0], roll_off.lines[0], height_off.lines[0]),
+        wanted,
+        strict=True,
     ):
         np.testing.assert_allclose(points(line)[:, 1], values)
 
@@ -104,16 +170,24 @@ def points(line: Line2D) -> np.ndarray:
 @pytest.mark.slow
 def test_a_scan_gives_one_answer_in_every_form(tmp_path: Path) -> None:
     plot = tmp_path / "scan.png"
-    found = json.loads(run(*SCAN, "--td", "0.1", "-q", "-f", "json", "--plot", str(plot)).stdout)
+    found = json.loads(
+        run(*SCAN, "--td", "0.1", "-q", "-f", "json", "--plot", str(plot)).stdout
+    )
     check_by_schema(found)
     assert plot.read_bytes().startswith(b"\x89PNG")
     assert found["recommended"] in [one["tr"] for one in found["runs"]]
     reference = simulate(Parameters(mesh=4), 0.11, interval=1e-3)
     chosen = suggest(history_of(reference), 0.1, Settings())
-    scanned = Scan(reference, [Outcome(**one) for one in found["runs"]], chosen, chosen.cautions)
-    assert json.loads(write("rollover", "json", scanned, Shown()))["runs"] == found["runs"]
+    scanned = Scan(
+        reference, [Outcome(**one) for one in found["runs"]], chosen, chosen.cautions
+    )
+    assert (
+        json.loads(write("rollover", "json", scanned, Shown()))["runs"] == found["runs"]
+    )
     rows = csv.DictReader(io.StringIO(write("rollover", "csv", scanned, Shown())))
-    assert [{name: float(cell) for name, cell in row.items()} for row in rows] == found["runs"]
+    assert [{name: float(cell) for name, cell in row.items()} for row in rows] == found[
+        "runs"
+    ]
     assert write("rollover", "markdown", scanned, Shown()).startswith("| tr |")
     text = write("rollover", "table", scanned, Shown())
     assert "\n* " in text
@@ -140,5 +214,7 @@ def test_a_scan_at_whose_td_nothing_can_be_recommended_says_so() -> None:
 
 
 def test_a_run_that_does_not_balance_its_energy_says_so() -> None:
-    assert "warning: energy-balance:" in run("rollover", *SHORT, "--damping", "300").stderr
+    assert (
+        "warning: energy-balance:" in run("rollover", *SHORT, "--damping", "300").stderr
+    )
     assert run("rollover", *SHORT).stderr == ""

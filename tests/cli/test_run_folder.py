@@ -14,7 +14,8 @@ pytestmark = pytest.mark.usefixtures("by_level")
 
 DATABASES = "*DATABASE_MATSUM\n     0.001\n*DATABASE_GLSTAT\n     0.001\n"
 NODAL_BODY = (
-    "*SET_NODE_LIST\n         5\n         1         2\n*CONSTRAINED_NODAL_RIGID_BODY\n         9         0         5\n"
+    "*SET_NODE_LIST\n         5\n         1         2\n"
+    "*CONSTRAINED_NODAL_RIGID_BODY\n         9         0         5\n"
 )
 
 
@@ -53,18 +54,33 @@ def test_the_only_main_deck_is_used_and_named(command: str, box: Path) -> None:
     part = [] if command == "parts" else ["--part", "flying"]
     part += ["--steps", "3"] if command == "explore" else []
     alone = answer(command, *part, str(box))
-    (named,) = [one["message"] for one in alone["warnings"] if one["code"] == "deck-in-folder"]
-    assert named.startswith(f"{box / 'main.k'} is the main deck in the folder of the run")
+    (named,) = [
+        one["message"] for one in alone["warnings"] if one["code"] == "deck-in-folder"
+    ]
+    assert named.startswith(
+        f"{box / 'main.k'} is the main deck in the folder of the run"
+    )
     with_deck = answer(command, *part, "--deck", str(box / "main.k"), str(box))
     without = [one for one in alone["warnings"] if one["code"] != "deck-in-folder"]
-    same = {key: value for key, value in alone.items() if key not in ("command", "warnings")}
-    assert same == {key: value for key, value in with_deck.items() if key not in ("command", "warnings")}
+    same = {
+        key: value for key, value in alone.items() if key not in ("command", "warnings")
+    }
+    assert same == {
+        key: value
+        for key, value in with_deck.items()
+        if key not in ("command", "warnings")
+    }
     assert without == with_deck["warnings"]
 
 
 def test_python_uses_the_same_deck(box: Path) -> None:
     found = d2.plan(d2.read(box), parts="flying", replay=False)
-    assert found.windows == d2.plan(d2.read(box), parts="flying", replay=False, deck=box / "main.k").windows
+    assert (
+        found.windows
+        == d2.plan(
+            d2.read(box), parts="flying", replay=False, deck=box / "main.k"
+        ).windows
+    )
     assert "deck-in-folder" in [one.code for one in found.warnings]
     without = d2.plan(d2.read(box), parts="flying", replay=False, deck=False)
     assert "deck-in-folder" not in [one.code for one in without.warnings]
@@ -76,24 +92,33 @@ def test_the_overview_reads_the_same_deck(box: Path) -> None:
     assert f"deck-in-folder: {box / 'main.k'}" in run("info", str(box)).stderr
     assert "deck-in-folder" not in run("info", "--no-deck", str(box)).stderr
     by_python, by_command = d2.read(box).overview(), answer("info", str(box))
-    assert [flight.start for _, flight in by_python.flights] == [one["start"] for one in by_command["flights"]]
+    assert [flight.start for _, flight in by_python.flights] == [
+        one["start"] for one in by_command["flights"]
+    ]
     shutil.copy(box / "main.k", box / "other.k")
     assert d2.read(box).overview().flights  # nothing is asked here: none is read
 
 
-def test_parts_that_share_nodes_are_merged_and_the_pasted_card_is_clean(box: Path) -> None:
+def test_parts_that_share_nodes_are_merged_and_the_pasted_card_is_clean(
+    box: Path,
+) -> None:
     card, told = card_in(box)
     assert "         2         1      PART" in card
     assert "card-objection" not in told
     assert "parts 1, 2: rigid" in checked_in(box, card)
 
 
-def test_without_a_deck_the_card_says_that_nobody_knows_what_is_joined(box: Path) -> None:
+def test_without_a_deck_the_card_says_that_nobody_knows_what_is_joined(
+    box: Path,
+) -> None:
     card, told = card_in(box, "--no-deck")
     assert "parts-not-joined: no deck of the run was read" in told
     assert "error D2R108" in checked_in(box, card)
     assert (
-        "parts-not-joined" not in run("card", "--tr", "0.1", "--td", "0.3", "--history", MATSUM, "--part", "1").stderr
+        "parts-not-joined"
+        not in run(
+            "card", "--tr", "0.1", "--td", "0.3", "--history", MATSUM, "--part", "1"
+        ).stderr
     )
 
 
@@ -105,24 +130,38 @@ def test_what_check_would_say_is_said_when_the_card_is_printed(tmp_path: Path) -
     assert "warning D2R111" in checked_in(box, card)
     (by_python,) = d2.plan(d2.read(box), parts="flying", replay=False).card().cautions  # type: ignore[union-attr]
     assert by_python.code == "card-objection"
-    assert str(tmp_path) not in by_python.message  # the folder in which it was tried is nobody's business
+    assert (
+        str(tmp_path) not in by_python.message
+    )  # the folder in which it was tried is nobody's business
 
 
 def test_ids_of_the_deck_are_not_used_again(tmp_path: Path) -> None:
-    first, second = f"{901:10d}{0:10d}{0.01:10g}", f"{0:10d}{0:10d}{0:10d}{0.0:10g}{1:10d}"
+    first, second = (
+        f"{901:10d}{0:10d}{0.01:10g}",
+        f"{0:10d}{0:10d}{0:10d}{0.0:10g}{1:10d}",
+    )
     taken = f"*DEFORMABLE_TO_RIGID_AUTOMATIC\n{first}\n{second}\n{3:10d}\n"
-    box = folder_of_run(tmp_path / "run", f"{DATABASES}*SET_PART_LIST\n       950\n         1         2\n{taken}")
+    box = folder_of_run(
+        tmp_path / "run",
+        f"{DATABASES}*SET_PART_LIST\n       950\n         1         2\n{taken}",
+    )
     card, told = card_in(box)
     assert "\n       951         0 " in card
     assert "\n       952         0 " in card
     assert "D2R004" not in told + checked_in(box, card)
 
 
-def test_nodal_rigid_bodies_on_the_parts_are_deleted_while_these_are_rigid(tmp_path: Path) -> None:
+def test_nodal_rigid_bodies_on_the_parts_are_deleted_while_these_are_rigid(
+    tmp_path: Path,
+) -> None:
     box = folder_of_run(tmp_path / "run", DATABASES + NODAL_BODY)
     card, _ = card_in(box)
     lines = card.splitlines()
-    flags = [lines[at + 1][:20] for at, line in enumerate(lines) if line.startswith("$#    nrbf")]
+    flags = [
+        lines[at + 1][:20]
+        for at, line in enumerate(lines)
+        if line.startswith("$#    nrbf")
+    ]
     assert flags == [f"{1:10d}{0:10d}", f"{2:10d}{0:10d}"]
     assert "D2R112" not in checked_in(box, card)
 
@@ -152,10 +191,16 @@ def test_a_file_has_no_folder_whose_deck_is_used(box: Path) -> None:
 
 
 def test_what_needs_a_deck_is_refused_where_the_folder_has_none(box: Path) -> None:
-    assert run("suggest", "--part", "flying", "--step-ratio", "2", str(box)).exit_code == 0
+    assert (
+        run("suggest", "--part", "flying", "--step-ratio", "2", str(box)).exit_code == 0
+    )
     (box / "main.k").unlink()
-    assert "--step-ratio needs --cost-share or --deck" in refused("suggest", "--step-ratio", "2", str(box))
-    assert "--deck and --no-deck exclude each other" in refused("plan", "--deck", "a.k", "--no-deck", str(box))
+    assert "--step-ratio needs --cost-share or --deck" in refused(
+        "suggest", "--step-ratio", "2", str(box)
+    )
+    assert "--deck and --no-deck exclude each other" in refused(
+        "plan", "--deck", "a.k", "--no-deck", str(box)
+    )
 
 
 ENGINE = "/RUN/CAR/1\n0.26\n/VERS/2022\n/DT\n0.9 0.0\n/TFILE/4\n0.0001\n"
@@ -165,12 +210,19 @@ def radioss_run(path: Path, root: str) -> Path:
     """Write a box of two plates that fall, with the history of the sample box."""
     path.mkdir()
     head = "#RADIOSS STARTER\n/BEGIN\nCAR\n      2022         0\n/TITLE\nplates\n/MAT/ELAST/1\nsteel\n"
-    rows = [f"{7850.0:20g}\n{2.1e11:20g}{0.3:20g}\n/PROP/SHELL/1\nshell\n        24\n\n"]
+    rows = [
+        f"{7850.0:20g}\n{2.1e11:20g}{0.3:20g}\n/PROP/SHELL/1\nshell\n        24\n\n"
+    ]
     rows += [f"{3:10d}{0:10d}{0.005:20g}\n/NODE\n"]
     places = [(x, y) for x in (0.0, 1.0, 2.0) for y in (0.0, 1.0)]
-    rows += [f"{at:10d}{x:20g}{y:20g}{0.0:20g}\n" for at, (x, y) in enumerate(places, start=1)]
+    rows += [
+        f"{at:10d}{x:20g}{y:20g}{0.0:20g}\n"
+        for at, (x, y) in enumerate(places, start=1)
+    ]
     for part, nodes in ((1, (1, 3, 4, 2)), (2, (3, 5, 6, 4))):
-        rows += [f"/PART/{part}\n{('box', 'step')[part - 1]}\n{1:10d}{1:10d}\n/SHELL/{part}\n"]
+        rows += [
+            f"/PART/{part}\n{('box', 'step')[part - 1]}\n{1:10d}{1:10d}\n/SHELL/{part}\n"
+        ]
         rows += ["".join(f"{one:10d}" for one in (part, *nodes)) + "\n"]
     put(path / f"{root}_0000.rad", head + "".join(rows) + "/END\n")
     put(path / f"{root}_0001.rad", ENGINE.replace("0.26", "0.43"))
@@ -178,7 +230,9 @@ def radioss_run(path: Path, root: str) -> Path:
     return path
 
 
-def test_the_last_leg_ends_with_the_run_of_the_deck_under_the_name_of_its_files(tmp_path: Path) -> None:
+def test_the_last_leg_ends_with_the_run_of_the_deck_under_the_name_of_its_files(
+    tmp_path: Path,
+) -> None:
     """The record ends one output interval before the run, and the engine finds its restart by the name of its file."""
     box = radioss_run(tmp_path / "run", "BOX")
     times = ("--tr", "0.1", "--td", "0.37", "--part", "1,2", "--after", "0.09")

@@ -24,22 +24,56 @@ NEEDED: Final[dict[str, tuple[str, ...]]] = {
     "card": ("--tr", "1", "--td", "2"),
     "first": ("x", "-o", "y"),
     "rule": (),
-    "replay": ("--stiffness", "1", "--mass", "1", "--v0", "1", "--t-end", "1", "--dt", "1"),
+    "replay": (
+        "--stiffness",
+        "1",
+        "--mass",
+        "1",
+        "--v0",
+        "1",
+        "--t-end",
+        "1",
+        "--dt",
+        "1",
+    ),
     "rollover": (),
     "reproduce": ("--output-dir", "x"),
 }
 FORBIDDEN: Final = {
-    **dict.fromkeys(("output-file", "plot", "report", "write-deck", "output-dir", "resume", ""), "'x'"),
+    **dict.fromkeys(
+        ("output-file", "plot", "report", "write-deck", "output-dir", "resume", ""),
+        "'x'",
+    ),
     **dict.fromkeys(("starter", "engine", "scheduler"), "'x'"),
     **dict.fromkeys(("overwrite", "debug", "verbose", "show-settings"), "true"),
 }
 # One or more values of every type that TOML has.
 VALUES: Final = (
-    *("'text'", "''", "'a\tb'", '"\\u0000"', '"\\u001b[31m"', "'0.06 0.07'", "'1'", "'\U0001f4a9'"),
+    *(
+        "'text'",
+        "''",
+        "'a\tb'",
+        '"\\u0000"',
+        '"\\u001b[31m"',
+        "'0.06 0.07'",
+        "'1'",
+        "'\U0001f4a9'",
+    ),
     *("0", "1", "-1", "0x7fffffffffffffff", "9223372036854775808", "1" + "0" * 400),
     *("1.5", "-0.0", "1e999", "inf", "-inf", "nan", "true", "false"),
     *("1979-05-27", "07:32:00", "1979-05-27T07:32:00", "1979-05-27T07:32:00Z"),
-    *("[]", "[1]", "[1, 2]", "['a']", "['a', 'b']", "[[1, 2], [3, 4]]", "[true]", "[1979-05-27]", "[{}]", "[1, 'a']"),
+    *(
+        "[]",
+        "[1]",
+        "[1, 2]",
+        "['a']",
+        "['a', 'b']",
+        "[[1, 2], [3, 4]]",
+        "[true]",
+        "[1979-05-27]",
+        "[{}]",
+        "[1, 'a']",
+    ),
     *("{}", "{a = 1}", "{a = {b = [1979-05-27]}}"),
 )
 
@@ -48,7 +82,9 @@ def options_of(command: str) -> list[str]:
     """Keys of the settings of a command."""
     made = d2rpick.get_command(click.Context(d2rpick), command)
     assert made
-    return [spelled(option) for option in made.params if isinstance(option, click.Option)]
+    return [
+        spelled(option) for option in made.params if isinstance(option, click.Option)
+    ]
 
 
 def asked_with(command: str, text: str) -> str:
@@ -57,7 +93,11 @@ def asked_with(command: str, text: str) -> str:
     result = run(command, *NEEDED.get(command, ("x",)), "--show-settings")
     assert "internal error" not in result.stderr, text
     if result.exit_code:
-        assert (result.exit_code, result.stdout, result.stderr.count("\n")) == (2, "", 1), text
+        assert (result.exit_code, result.stdout, result.stderr.count("\n")) == (
+            2,
+            "",
+            1,
+        ), text
     return result.stderr
 
 
@@ -67,8 +107,14 @@ def table_of(command: str, key: str, value: str) -> str:
 
 @pytest.mark.usefixtures("here")
 @pytest.mark.parametrize("command", [*COMMANDS])
-def test_no_program_no_output_and_no_overwriting_comes_from_a_file(command: str) -> None:
-    dangerous = [key for key in options_of(command) if key in FORBIDDEN and (command, key) != ("drive", "resume")]
+def test_no_program_no_output_and_no_overwriting_comes_from_a_file(
+    command: str,
+) -> None:
+    dangerous = [
+        key
+        for key in options_of(command)
+        if key in FORBIDDEN and (command, key) != ("drive", "resume")
+    ]
     assert {"debug", "verbose", "show-settings"} <= {*dangerous}
     for key in dangerous:
         said = asked_with(command, table_of(command, key, FORBIDDEN[key]))
@@ -78,7 +124,11 @@ def test_no_program_no_output_and_no_overwriting_comes_from_a_file(command: str)
 
 @pytest.mark.usefixtures("here")
 @settings(max_examples=5)
-@given(st.sampled_from([(command, key) for command in COMMANDS for key in options_of(command)]))
+@given(
+    st.sampled_from(
+        [(command, key) for command in COMMANDS for key in options_of(command)]
+    )
+)
 def test_a_value_of_any_type_is_taken_or_refused(option: tuple[str, str]) -> None:
     for value in VALUES:
         asked_with(option[0], table_of(*option, value))
@@ -94,7 +144,10 @@ def test_each_key_with_each_type_of_value_is_taken_or_refused(command: str) -> N
 
 
 @pytest.mark.usefixtures("here")
-@pytest.mark.parametrize("key", ["select", "severity", "severity.D2R101", "suggest", "check", '""', "td", "margin"])
+@pytest.mark.parametrize(
+    "key",
+    ["select", "severity", "severity.D2R101", "suggest", "check", '""', "td", "margin"],
+)
 def test_a_shared_key_takes_or_refuses_a_value_of_any_type(key: str) -> None:
     for value in VALUES:
         asked_with("suggest", f"{key} = {value}\n")
@@ -113,10 +166,15 @@ def test_a_shared_key_takes_or_refuses_a_value_of_any_type(key: str) -> None:
         ("limit = 1.5", "limit is 1.5, a whole number was expected"),
         ("weights = 3", "weights is 3, a text was expected"),
         ("energy = [true]", "energy is [True], a number or a text was expected"),
-        (f"margin = {'9' * 99}", f"margin is {'9' * 60} ..., a number or a text was expected"),
+        (
+            f"margin = {'9' * 99}",
+            f"margin is {'9' * 60} ..., a number or a text was expected",
+        ),
     ],
 )
-def test_a_value_of_the_wrong_type_is_refused_with_what_was_expected(line: str, said: str) -> None:
+def test_a_value_of_the_wrong_type_is_refused_with_what_was_expected(
+    line: str, said: str
+) -> None:
     put(Path("d2rpick.toml"), f"[suggest]\n{line}\n")
     assert said in refused("suggest", ENERGY)
 
@@ -162,7 +220,9 @@ def test_the_settings_of_a_folder_above_count() -> None:
 
 @pytest.mark.parametrize("sign", [".git", ".hg"])
 @pytest.mark.parametrize("depth", [0, 1])
-def test_the_search_ends_at_the_root_of_the_repository(inner: Path, sign: str, depth: int) -> None:
+def test_the_search_ends_at_the_root_of_the_repository(
+    inner: Path, sign: str, depth: int
+) -> None:
     root = [inner, inner.parent][depth]
     (root / sign).mkdir()
     assert margin_of() == "none"
@@ -175,7 +235,9 @@ def test_a_work_tree_has_its_root_where_its_file_of_git_lies(inner: Path) -> Non
     assert margin_of() == "none"
 
 
-def test_the_search_ends_at_the_home_of_the_user(inner: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_search_ends_at_the_home_of_the_user(
+    inner: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     link = inner.parents[1] / "home"
     link.symlink_to(inner.parent)
     monkeypatch.setenv("HOME", str(link))
@@ -199,11 +261,16 @@ def foreign(inner: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return inner
 
 
-@pytest.mark.parametrize("text", ["margin = 0.002", "margin = [", "[drive]\nstarter = 'rm -r .'", ""])
+@pytest.mark.parametrize(
+    "text", ["margin = 0.002", "margin = [", "[drive]\nstarter = 'rm -r .'", ""]
+)
 def test_a_file_of_another_user_is_not_used_and_named(foreign: Path, text: str) -> None:
     file = put(foreign / "d2rpick.toml", text)
     result = run(*ASKED)
-    assert result.stderr == f"note: {file}: not used, since another user owns it; copy it to use its settings\n"
+    assert (
+        result.stderr
+        == f"note: {file}: not used, since another user owns it; copy it to use its settings\n"
+    )
     assert result.exit_code == 0
     assert not run(*ASKED, "-q").stderr
     assert margin_of() == "none"
@@ -211,9 +278,15 @@ def test_a_file_of_another_user_is_not_used_and_named(foreign: Path, text: str) 
 
 @pytest.mark.parametrize(
     ("text", "named"),
-    [("[project]\nname = 'd2rpick'", False), ("[tool.d2rpick", False), ("[ tool . 'd2rpick' ]\nmargin = 1", True)],
+    [
+        ("[project]\nname = 'd2rpick'", False),
+        ("[tool.d2rpick", False),
+        ("[ tool . 'd2rpick' ]\nmargin = 1", True),
+    ],
 )
-def test_a_pyproject_of_another_user_is_named_if_it_has_settings(foreign: Path, text: str, named: bool) -> None:
+def test_a_pyproject_of_another_user_is_named_if_it_has_settings(
+    foreign: Path, text: str, named: bool
+) -> None:
     put(foreign / "pyproject.toml", text)
     assert ("not used" in run(*ASKED).stderr) == named
 
@@ -232,7 +305,9 @@ def test_a_rule_is_not_silenced_by_a_file_of_another_user(foreign: Path) -> None
     assert result.stderr.count(f"note: {file}: not used") == 1
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root gives files away")
+@pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root gives files away"
+)
 def test_a_link_to_a_file_of_another_user_is_not_used(inner: Path) -> None:
     elsewhere = put(inner.parents[1] / "other.toml", "margin = 0.002\n")
     os.chown(elsewhere, 12345, 12345)

@@ -22,7 +22,18 @@ from tests.json_schemas import check_by_definition, check_by_schema, checked
 from tests.variants import STUDY
 
 FORMATS = ("table", "json", "csv", "markdown", "ndjson")
-KEYS = ("source", "tr", "tr_low", "tr_high", "energy_td", "residual", "status", "message", "td", "common_error")
+KEYS = (
+    "source",
+    "tr",
+    "tr_low",
+    "tr_high",
+    "energy_td",
+    "residual",
+    "status",
+    "message",
+    "td",
+    "common_error",
+)
 
 
 @pytest.fixture
@@ -44,7 +55,9 @@ def lines_of(text: str) -> list[dict[str, Any]]:
 # Results.
 
 
-@pytest.mark.parametrize("extra", [(), ("absent.csv",), ("--td", "0.064"), ("--max-residual", "0.001")])
+@pytest.mark.parametrize(
+    "extra", [(), ("absent.csv",), ("--td", "0.064"), ("--max-residual", "0.001")]
+)
 def test_json_follows_the_schema(runs: list[str], extra: tuple[str, ...]) -> None:
     found = checked(*STUDY, *runs, *extra)
     assert found["tool_version"] == __version__
@@ -65,13 +78,24 @@ def test_every_format_says_the_same(runs: list[str]) -> None:
         check_line(line, "line")
     check_line(last, "last")
     errors = last["common_errors"]
-    again = [{**line, "common_error": error} for line, error in zip(lines, errors, strict=True)]
-    assert [{key: line[key] for key in one} for line, one in zip(again, found["runs"], strict=True)] == found["runs"]
-    assert {**last, "command": 0} == {**{key: found[key] for key in found if key != "runs"}, "command": 0}
+    again = [
+        {**line, "common_error": error}
+        for line, error in zip(lines, errors, strict=True)
+    ]
+    assert [
+        {key: line[key] for key in one}
+        for line, one in zip(again, found["runs"], strict=True)
+    ] == found["runs"]
+    assert {**last, "command": 0} == {
+        **{key: found[key] for key in found if key != "runs"},
+        "command": 0,
+    }
     for form in ("table", "markdown"):
         text = run(*STUDY, *sources, "-f", form).stdout
         assert f"{found['common_tr']:g}, acceptable in 3 of 3 runs" in text
-        assert form == "table" or all(source in text for source in sources)  # a table folds long names
+        assert form == "table" or all(
+            source in text for source in sources
+        )  # a table folds long names
 
 
 @pytest.mark.slow
@@ -81,15 +105,24 @@ def test_a_window_for_td_lets_each_run_choose_its_own(runs: list[str]) -> None:
     for name, one in zip(runs, found["runs"], strict=True):
         pair = answer("suggest", "--td-window", "0.06", "0.07", name)["recommended"]
         assert (one["tr"], one["td"]) == (pair["tr"], pair["td"])
-        verdict = answer("verify", "--tr", repr(found["common_tr"]), "--td", repr(one["td"]), name)
+        verdict = answer(
+            "verify", "--tr", repr(found["common_tr"]), "--td", repr(one["td"]), name
+        )
         assert verdict["verified"]
         assert one["common_error"] == pytest.approx(verdict["residual"], abs=1e-3)
-    assert "of each run in 0.06 to 0.07" in run("study", "--td-window", "0.06", "0.07", *runs).stdout
+    assert (
+        "of each run in 0.06 to 0.07"
+        in run("study", "--td-window", "0.06", "0.07", *runs).stdout
+    )
 
 
 def test_options_of_suggest_hold_for_each_run() -> None:
     found = answer("study", "--td", "0.37", "--part", "box", BOX, BOX, "--jobs", "2")
-    (expected,) = [c for c in answer("suggest", "--td", "0.37", "--part", "box", BOX)["candidates"] if c["recommended"]]
+    (expected,) = [
+        c
+        for c in answer("suggest", "--td", "0.37", "--part", "box", BOX)["candidates"]
+        if c["recommended"]
+    ]
     assert [row["tr"] for row in found["runs"]] == [expected["tr"]] * 2
     assert found["runs"][0]["basis"] == "energy"
     later = answer(*STUDY, "--after", "0.02", ENERGY)
@@ -116,17 +149,25 @@ def test_options_of_suggest_hold_for_each_run() -> None:
         (("--energy", "a", "--part", "1"), 2),
     ],
 )
-def test_the_exit_code_does_not_depend_on_the_format(runs: list[str], extra: tuple[str, ...], code: int) -> None:
+def test_the_exit_code_does_not_depend_on_the_format(
+    runs: list[str], extra: tuple[str, ...], code: int
+) -> None:
     args = (*STUDY, *runs, *extra)
-    assert [run(*args, "-f", form).exit_code for form in ("table", "ndjson")] == [code] * 2
+    assert [run(*args, "-f", form).exit_code for form in ("table", "ndjson")] == [
+        code
+    ] * 2
     assert run(*args, "--exit-zero").exit_code == {0: 0, 1: 0, 2: 2}[code]
 
 
 def test_when_none_can_be_read_the_first_reason_is_told() -> None:
     result = run(*STUDY, "absent.csv", "missing.csv")
     assert result.exit_code == 2
-    assert re.search("^absent.csv +unreadable +no such file", result.stdout, re.MULTILINE)
-    assert result.stderr.startswith("d2rpick: no run could be judged; the first: absent.csv: no such file")
+    assert re.search(
+        "^absent.csv +unreadable +no such file", result.stdout, re.MULTILINE
+    )
+    assert result.stderr.startswith(
+        "d2rpick: no run could be judged; the first: absent.csv: no such file"
+    )
 
 
 @pytest.mark.parametrize("args", [STUDY, (*STUDY, "--from", "-")])
@@ -159,7 +200,12 @@ def test_a_pattern_stands_for_runs_and_a_folder_for_one() -> None:
     found = answer(*STUDY, "*/glstat", "one", "no*")
     statuses = [(row["source"], row["status"]) for row in found["runs"]]
     expected = [os.path.join(name, "glstat") for name in ("one", "two")]  # noqa: PTH118
-    assert statuses == [(expected[0], "ok"), (expected[1], "ok"), ("one", "ok"), ("no*", "unreadable")]
+    assert statuses == [
+        (expected[0], "ok"),
+        (expected[1], "ok"),
+        ("one", "ok"),
+        ("no*", "unreadable"),
+    ]
     assert found["agree"] is True
 
 
@@ -169,7 +215,9 @@ def test_a_pattern_stands_for_runs_and_a_folder_for_one() -> None:
 def wait_for(ledger: Path, lines: int) -> None:
     """Wait until a ledger has so many lines."""
     for _ in range(1000):
-        with suppress(FileNotFoundError):  # it is tried whether it can be written before the first line is
+        with suppress(
+            FileNotFoundError
+        ):  # it is tried whether it can be written before the first line is
             if ledger.read_bytes().count(b"\n") >= lines:
                 return
         time.sleep(0.02)
@@ -180,11 +228,16 @@ def wait_for(ledger: Path, lines: int) -> None:
 def test_all_processes_give_the_answer_of_one(runs: list[str]) -> None:
     sources = [*runs, "absent.csv", *runs]
     expected = run(*STUDY, *sources).stdout
-    assert run("study", "--td", str(variants.TD), "--jobs", "3", *sources).stdout == expected
+    assert (
+        run("study", "--td", str(variants.TD), "--jobs", "3", *sources).stdout
+        == expected
+    )
 
 
 @pytest.mark.slow
-def test_rows_come_in_order_as_soon_as_they_can(runs: list[str], tmp_path: Path) -> None:
+def test_rows_come_in_order_as_soon_as_they_can(
+    runs: list[str], tmp_path: Path
+) -> None:
     os.mkfifo(tmp_path / "slow.csv")  # whoever reads it waits
     args = (*STUDY[:-1], "2", "-f", "ndjson", "run1.csv", "slow.csv", "run2.csv")
     with started(*args, cwd=tmp_path, text=True) as process:
@@ -192,29 +245,52 @@ def test_rows_come_in_order_as_soon_as_they_can(runs: list[str], tmp_path: Path)
         assert json.loads(process.stdout.readline())["source"] == "run1.csv"
         (tmp_path / "slow.csv").write_bytes(Path(runs[2]).read_bytes())
         rest, _ = process.communicate(timeout=30)
-    assert [line.get("source") for line in lines_of(rest)] == ["slow.csv", "run2.csv", None]
+    assert [line.get("source") for line in lines_of(rest)] == [
+        "slow.csv",
+        "run2.csv",
+        None,
+    ]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", ["1", "2"])
-def test_a_killed_study_loses_nothing_that_was_finished(runs: list[str], tmp_path: Path, jobs: str) -> None:
+def test_a_killed_study_loses_nothing_that_was_finished(
+    runs: list[str], tmp_path: Path, jobs: str
+) -> None:
     slow, ledger = tmp_path / "slow.csv", tmp_path / "ledger.ndjson"
-    args = (*STUDY[:-1], jobs, "-f", "json", *runs[:2], str(slow), runs[2], "--resume", str(ledger))
+    args = (
+        *STUDY[:-1],
+        jobs,
+        "-f",
+        "json",
+        *runs[:2],
+        str(slow),
+        runs[2],
+        "--resume",
+        str(ledger),
+    )
     os.mkfifo(slow)  # whoever reads it waits
     finished = 2 if jobs == "1" else 3
     with started(*args, cwd=tmp_path, text=True) as process:
         wait_for(ledger, finished)
         process.send_signal(signal.SIGKILL)
-        text, _ = process.communicate(timeout=30)  # no process of the pool keeps the streams open
+        text, _ = process.communicate(
+            timeout=30
+        )  # no process of the pool keeps the streams open
     assert (process.returncode, text) == (-signal.SIGKILL, "")
     with ledger.open("ab") as file:
-        file.write(ledger.read_bytes().splitlines()[0][:200])  # as if it had been writing
+        file.write(
+            ledger.read_bytes().splitlines()[0][:200]
+        )  # as if it had been writing
     slow.unlink()
     variants.write(slow, variants.variant(1.0005))
     again = run(*args)
     assert again.stderr.startswith(f"note: {finished} of 4 runs reused from {ledger}\n")
     whole = run(*(arg for arg in args if arg not in ("--resume", str(ledger))))
-    assert {**json.loads(again.stdout), "command": 0} == {**json.loads(whole.stdout), "command": 0}
+    assert {**json.loads(again.stdout), "command": 0} == {
+        **json.loads(whole.stdout),
+        "command": 0,
+    }
     assert run(*args).stderr.startswith(f"note: 4 of 4 runs reused from {ledger}\n")
 
 
@@ -231,7 +307,11 @@ def test_an_interrupted_study_ends_at_once_with_a_line(
         time.sleep(0.1)
         (os.killpg if everyone else os.kill)(process.pid, signal.SIGINT)
         text, said = process.communicate(timeout=30)
-    assert (process.returncode, text, said.strip()) == (-signal.SIGINT, "", "d2rpick: interrupted")
+    assert (process.returncode, text, said.strip()) == (
+        -signal.SIGINT,
+        "",
+        "d2rpick: interrupted",
+    )
 
 
 @pytest.mark.slow
@@ -263,7 +343,9 @@ def test_an_unforeseen_error_is_the_row_of_its_run(
     runs: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, jobs: str
 ) -> None:
     (tmp_path / "odd.csv").write_bytes(gzip.compress(Path(runs[0]).read_bytes()))
-    (tmp_path / "sitecustomize.py").write_text("import zlib\nzlib.decompressobj = lambda **_: 1 / 0\n")
+    (tmp_path / "sitecustomize.py").write_text(
+        "import zlib\nzlib.decompressobj = lambda **_: 1 / 0\n"
+    )
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), str(ROOT)]))
     args = (*STUDY[:-1], jobs, "-f", "json", "--exit-zero", runs[0], "odd.csv", runs[1])
     with started(*args, cwd=tmp_path, text=True) as process:
@@ -271,7 +353,9 @@ def test_an_unforeseen_error_is_the_row_of_its_run(
     found = json.loads(text)
     check_by_schema(found)
     assert [row["status"] for row in found["runs"]] == ["ok", "internal-error", "ok"]
-    assert found["runs"][1]["message"].startswith("odd.csv: internal error, please report it (ZeroDivisionError")
+    assert found["runs"][1]["message"].startswith(
+        "odd.csv: internal error, please report it (ZeroDivisionError"
+    )
     assert process.returncode == 2
 
 
@@ -280,16 +364,23 @@ def test_an_unforeseen_error_is_the_row_of_its_run(
 
 def taken(args: Sequence[str]) -> str:
     """Say how many runs were taken from the ledger."""
-    return next((line for line in run(*args).stderr.splitlines() if "reused from" in line), "")
+    return next(
+        (line for line in run(*args).stderr.splitlines() if "reused from" in line), ""
+    )
 
 
-def test_runs_are_computed_again_after_a_change(runs: list[str], tmp_path: Path) -> None:
+def test_runs_are_computed_again_after_a_change(
+    runs: list[str], tmp_path: Path
+) -> None:
     ledger = str(tmp_path / "ledger.ndjson")
     args = (*STUDY, *runs, "--resume", ledger)
     assert taken(args) == ""
     assert taken(args) == f"note: 3 of 3 runs reused from {ledger}"
     changed = "have changed, or were computed with other options"
-    assert taken((*args, "--tolerance", "0.19")) == f"note: 0 of 3 runs reused from {ledger}; 3 {changed}"
+    assert (
+        taken((*args, "--tolerance", "0.19"))
+        == f"note: 0 of 3 runs reused from {ledger}; 3 {changed}"
+    )
     os.utime(runs[1])
     assert taken(args) == f"note: 2 of 3 runs reused from {ledger}; 1 {changed}"
     assert taken((*args, "--tolerance", "0.19")).startswith("note: 2 of 3")
@@ -297,14 +388,21 @@ def test_runs_are_computed_again_after_a_change(runs: list[str], tmp_path: Path)
 
 
 def test_what_ndjson_gave_can_be_taken_up(runs: list[str], tmp_path: Path) -> None:
-    ledger = put(tmp_path / "result.ndjson", run(*STUDY, *runs[:2], "-f", "ndjson").stdout)
-    assert taken((*STUDY, *runs, "--resume", str(ledger))) == f"note: 2 of 3 runs reused from {ledger}"
+    ledger = put(
+        tmp_path / "result.ndjson", run(*STUDY, *runs[:2], "-f", "ndjson").stdout
+    )
+    assert (
+        taken((*STUDY, *runs, "--resume", str(ledger)))
+        == f"note: 2 of 3 runs reused from {ledger}"
+    )
     *_, third = lines_of(ledger.read_text())
     assert third["source"] == runs[2]
 
 
 @pytest.mark.slow
-def test_a_figure_of_runs_that_were_kept_without_outline_reads_them_again(runs: list[str], tmp_path: Path) -> None:
+def test_a_figure_of_runs_that_were_kept_without_outline_reads_them_again(
+    runs: list[str], tmp_path: Path
+) -> None:
     ledger, figure = str(tmp_path / "ledger.ndjson"), str(tmp_path / "figure.svg")
     run(*STUDY, *runs, "--resume", ledger)
     args = (*STUDY, *runs, "--resume", ledger, "--plot", figure, "--overwrite")
@@ -315,15 +413,24 @@ def test_a_figure_of_runs_that_were_kept_without_outline_reads_them_again(runs: 
 
 
 @pytest.mark.parametrize("option", ["-o", "--plot", "--report"])
-def test_a_ledger_is_never_replaced_by_a_result(runs: list[str], tmp_path: Path, option: str) -> None:
+def test_a_ledger_is_never_replaced_by_a_result(
+    runs: list[str], tmp_path: Path, option: str
+) -> None:
     name = str(tmp_path / "file.svg")
-    assert "are the same file" in refused(*STUDY, *runs, "--resume", name, option, name, "--overwrite")
+    assert "are the same file" in refused(
+        *STUDY, *runs, "--resume", name, option, name, "--overwrite"
+    )
     assert not Path(name).exists()
 
 
 def test_a_ledger_is_not_the_standard_output(runs: list[str], tmp_path: Path) -> None:
     ledger = tmp_path / "ledger.ndjson"
-    with ledger.open("w") as file, started(*STUDY, *runs, "--resume", str(ledger), stdout=file, text=True) as process:
+    with (
+        ledger.open("w") as file,
+        started(
+            *STUDY, *runs, "--resume", str(ledger), stdout=file, text=True
+        ) as process,
+    ):
         _, said = process.communicate(timeout=30)
     assert process.returncode == 2
     assert "standard output are the same file" in said
@@ -333,27 +440,41 @@ def test_a_ledger_is_not_the_standard_output(runs: list[str], tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("option", ["-o", "--plot", "--report"])
-def test_a_file_in_the_folder_of_a_run_is_never_written_to(tmp_path: Path, option: str) -> None:
+def test_a_file_in_the_folder_of_a_run_is_never_written_to(
+    tmp_path: Path, option: str
+) -> None:
     # a database by its content; its name is none that a plot would have
     (tmp_path / "binout0.svg").symlink_to(tmp_path / "glstat")
     (tmp_path / "glstat").write_bytes(Path(GLSTAT).read_bytes())
     before = (tmp_path / "glstat").read_bytes()
-    result = run(*STUDY, str(tmp_path), option, str(tmp_path / "binout0.svg"), "--overwrite")
+    result = run(
+        *STUDY, str(tmp_path), option, str(tmp_path / "binout0.svg"), "--overwrite"
+    )
     assert (result.exit_code, "this is an input" in result.stderr) == (2, True)
     assert (tmp_path / "glstat").read_bytes() == before
 
 
 # Svg grows most with the number of curves; from eleven runs on they are drawn as many.
 @pytest.mark.slow
-@pytest.mark.parametrize(("number", "suffix"), [(3, "png"), (12, "pdf"), (3, "svg"), (12, "svg")])
-def test_a_plot_shows_the_runs(runs: list[str], tmp_path: Path, number: int, suffix: str) -> None:
+@pytest.mark.parametrize(
+    ("number", "suffix"), [(3, "png"), (12, "pdf"), (3, "svg"), (12, "svg")]
+)
+def test_a_plot_shows_the_runs(
+    runs: list[str], tmp_path: Path, number: int, suffix: str
+) -> None:
     figure = tmp_path / f"figure.{suffix}"
     sources = (runs * 20)[:number]
     assert run(*STUDY, *sources, "absent.csv", "--plot", str(figure)).exit_code == 1
     content = figure.read_bytes()
-    assert content.startswith({"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[suffix])
+    assert content.startswith(
+        {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[suffix]
+    )
     if suffix == "svg":  # few have a name beside their curve, many are told together
-        label = f"internal energy of {number} runs" if number > 10 else Path(sources[0]).name
+        label = (
+            f"internal energy of {number} runs"
+            if number > 10
+            else Path(sources[0]).name
+        )
         assert f"<!-- {label} -->" in content.decode()
     assert len(content) < 1e6
 
@@ -374,7 +495,18 @@ def test_the_report_is_one_page_with_all_of_it(runs: list[str], tmp_path: Path) 
     assert "Switch times of 5 runs" in text
     assert "a&lt;b&gt;&amp;.csv" in text
     assert "a<b>" not in text
-    assert all(name in text for name in (*runs, "absent.csv", "no such file", "runs-left-out", "d2rpick study --td"))
+    assert all(
+        name in text
+        for name in (
+            *runs,
+            "absent.csv",
+            "no such file",
+            "runs-left-out",
+            "d2rpick study --td",
+        )
+    )
     assert "http://" not in text.replace("http://www.w3.org", "")
-    assert run(*STUDY, "absent.csv", "--report", str(page), "--overwrite").exit_code == 2
+    assert (
+        run(*STUDY, "absent.csv", "--report", str(page), "--overwrite").exit_code == 2
+    )
     assert "None: no run could be judged" in page.read_text()

@@ -20,7 +20,11 @@ def messages(folder: str) -> Iterator[str]:
         nodes = list(ast.walk(ast.parse(path.read_text())))
         stated = {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
         for node in nodes:
-            if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in stated:
+            if (
+                isinstance(node, ast.Constant)
+                and isinstance(node.value, str)
+                and id(node) not in stated
+            ):
                 yield node.value
 
 
@@ -29,7 +33,12 @@ def test_messages_name_arguments_and_no_options(folder: str) -> None:
     texts = list(messages(folder))
     assert texts
     assert [text for text in texts if re.search(r"(^|\s|\()--[a-z]", text)] == []
-    assert [name for text in texts for name in re.findall(r"`(\w+)`", text) if not option_of(name)] == []
+    assert [
+        name
+        for text in texts
+        for name in re.findall(r"`(\w+)`", text)
+        if not option_of(name)
+    ] == []
 
 
 @pytest.mark.slow
@@ -40,7 +49,15 @@ def test_every_argument_has_an_option_that_exists() -> None:
 
 def test_the_command_line_names_the_option_that_cures() -> None:
     assert with_options("`after` and `unknown`") == "--after and `unknown`"
-    assert "--after 9 lies outside the record" in run("suggest", "--td", "0.064", "--after", "9", ENERGY).stderr
+    assert (
+        "--after 9 lies outside the record"
+        in run("suggest", "--td", "0.064", "--after", "9", ENERGY).stderr
+    )
     assert "choose with --energy: " in run("suggest", "--td", "0.37", ROLLOVER).stderr
-    assert "choose with --energy: " in unwrapped(run("study", "--td", "0.37", ROLLOVER).stdout)
-    assert "choose with `energy`: " in run("study", "--td", "0.37", "-f", "json", ROLLOVER).stdout
+    assert "choose with --energy: " in unwrapped(
+        run("study", "--td", "0.37", ROLLOVER).stdout
+    )
+    assert (
+        "choose with `energy`: "
+        in run("study", "--td", "0.37", "-f", "json", ROLLOVER).stdout
+    )

@@ -27,9 +27,14 @@ from tests.sample_deck import DECK
 WINDOW = [(1, 0.02, 0.09)]
 RUN = RULES["D2R401"].passing[0]
 LATER = "$ moved\n" * 3 + GOOD.replace("0.09", "0.07").replace("door", "a long door")
-CARDS, OTHER_CARDS = {"cards.k": THERE + BACK}, "$\n" + BACK + THERE.replace("0.02", "0.03")
+CARDS, OTHER_CARDS = (
+    {"cards.k": THERE + BACK},
+    "$\n" + BACK + THERE.replace("0.02", "0.03"),
+)
 ONCE = f"*KEYWORD\n{PARTS}*INCLUDE\ncards.k\n*END\n"
-TWICE = ONCE.replace("*END", f"*INCLUDE_TRANSFORM\ncards.k\n{0:10d}{0:10d}{1:10d}\n*END")
+TWICE = ONCE.replace(
+    "*END", f"*INCLUDE_TRANSFORM\ncards.k\n{0:10d}{0:10d}{1:10d}\n*END"
+)
 
 
 # Bytes beside what a deck holds: a file of more than 256 KiB stays on its disk, one of more than 4 MiB is searched by
@@ -41,7 +46,9 @@ def grown(text: str, size: str) -> str:
     """A deck with so many comments in its middle, where a cut leaves half of it."""
     middle = text.index("\n", len(text) // 2) + 1
     sign = "#" if text[0] in "#/" else "$"
-    return text[:middle] + (sign + "x" * 98 + "\n") * (SIZES[size] // 100) + text[middle:]
+    return (
+        text[:middle] + (sign + "x" * 98 + "\n") * (SIZES[size] // 100) + text[middle:]
+    )
 
 
 @contextmanager
@@ -96,14 +103,19 @@ CHANGES = [cut, empty, rewrite, rewrite_in_place, replace]
 def verdict(path: str) -> Hashable:
     found = check_deck(path)
     return (
-        tuple((window.part, window.tr, window.td, window.place.line) for window in found.windows),
+        tuple(
+            (window.part, window.tr, window.td, window.place.line)
+            for window in found.windows
+        ),
         tuple((one.rule, one.file, one.line, one.message) for one in found.findings),
     )
 
 
 def parts(path: str) -> Hashable:
     found = read_inventory(path)
-    return tuple((part, *counts.items()) for part, counts in sorted(found.counts.items())), found.notes
+    return tuple(
+        (part, *counts.items()) for part, counts in sorted(found.counts.items())
+    ), found.notes
 
 
 def answer(ask: Callable[[str], Hashable], path: str) -> Hashable:
@@ -128,7 +140,10 @@ CASES = {
     "engine": (verdict, RUN.deck, RUN.files, "box_0002.rad", "#\n" + RUN.files["box_0002.rad"].replace(".09", ".07")),
     "elements": (parts, DECK.read_text(), {}, "main.k", DECK.read_text().replace("*ELEMENT", "$\n*ELEMENT")[:9000]),
 }  # fmt: skip
-THREADED = ("deck", "elements")  # what is asked of one file does not depend on how many there are
+THREADED = (
+    "deck",
+    "elements",
+)  # what is asked of one file does not depend on how many there are
 
 
 @pytest.mark.slow
@@ -137,7 +152,11 @@ THREADED = ("deck", "elements")  # what is asked of one file does not depend on 
     [
         *((case, "big", change) for case in CASES for change in CHANGES),
         *((case, "small", cut) for case in CASES),
-        *((case, "big, by threads", change) for case in THREADED for change in (cut, replace)),
+        *(
+            (case, "big, by threads", change)
+            for case in THREADED
+            for change in (cut, replace)
+        ),
     ],
 )
 def test_a_change_at_any_moment_gives_one_of_the_states_or_an_error(
@@ -163,7 +182,10 @@ def test_a_change_at_any_moment_gives_one_of_the_states_or_an_error(
     errors = {one for one in found if isinstance(one, str)} - {before, after}
     assert found - errors <= {before, after}
     assert not [one for one in errors if "\n" in one]
-    assert all("rewritten or replaced while it was read" in one or "was found" in one for one in errors)
+    assert all(
+        "rewritten or replaced while it was read" in one or "was found" in one
+        for one in errors
+    )
     if size != "small":
         assert any("rewritten or replaced while it was read" in one for one in errors)
 
@@ -180,7 +202,10 @@ def test_rows_that_are_read_late_are_those_of_the_keywords(
     if size == "small":
         assert spans(deck) == WINDOW
     else:
-        with pytest.raises(DeckError, match=r"main\.k: the file was rewritten or replaced while it was read; read it"):
+        with pytest.raises(
+            DeckError,
+            match=r"main\.k: the file was rewritten or replaced while it was read; read it",
+        ):
             spans(deck)
 
 
@@ -189,7 +214,11 @@ def test_what_is_written_is_what_was_checked(size: str, tmp_path: Path) -> None:
     """Whenever both files are written anew with cards in them, which would have been refused."""
     mesh = grown("*NODE\n$ of a mesh\n", size)
     text, files = f"*KEYWORD\n{PARTS}{mesh}*INCLUDE\nmore.k\n*END\n", {"more.k": mesh}
-    asked = str(tmp_path / "main.k"), cards([(0.02, 0.09)], Printing(part=(1,))), str(tmp_path / "next")
+    asked = (
+        str(tmp_path / "main.k"),
+        cards([(0.02, 0.09)], Printing(part=(1,))),
+        str(tmp_path / "next"),
+    )
 
     def change() -> None:
         rewrite(tmp_path / "main.k", LATER)
@@ -242,8 +271,13 @@ def test_a_deck_that_changes_all_the_time_is_an_error(
 ) -> None:
     text, number = grown(GOOD, size), itertools.count()
     path = write(tmp_path, text)
-    monkeypatch.setattr(time, "sleep", lambda _: write(tmp_path, f"${'x' * next(number)}\n{text}"))
-    with pytest.raises(DeckError, match=r"main\.k: the file keeps changing while it is read; read it again"):
+    monkeypatch.setattr(
+        time, "sleep", lambda _: write(tmp_path, f"${'x' * next(number)}\n{text}")
+    )
+    with pytest.raises(
+        DeckError,
+        match=r"main\.k: the file keeps changing while it is read; read it again",
+    ):
         read_deck(path)
     assert main_decks(str(tmp_path)) == [path]  # it is not passed over
 
@@ -259,7 +293,9 @@ def test_a_pipe_gives_its_bytes_once_and_hangs_no_folder(tmp_path: Path) -> None
 
 
 @pytest.mark.usefixtures("new_files")
-def test_no_folder_of_decks_waits_for_what_a_solver_writes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_folder_of_decks_waits_for_what_a_solver_writes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     main, waited = write(tmp_path, GOOD), list[float]()
     with (tmp_path / "d3plot").open("wb") as results:
         results.truncate(20 << 30)

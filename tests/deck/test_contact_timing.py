@@ -13,7 +13,9 @@ from d2rpick.base.errors import DeckError
 from d2rpick.deck.contact_timing import Pushes, time_pair, time_sensor
 from tests.command import answer, put, refused, run
 
-PUSHES = Pushes(((0.0, 0.01), (0.05, 0.06), (0.062, 0.07), (0.12, 0.13), (0.2, 0.21)), speed=3.0)
+PUSHES = Pushes(
+    ((0.0, 0.01), (0.05, 0.06), (0.062, 0.07), (0.12, 0.13), (0.2, 0.21)), speed=3.0
+)
 
 
 def flat(windows: Sequence[tuple[float, float]]) -> list[float]:
@@ -41,30 +43,42 @@ def test_the_offset_is_what_the_parts_fly_from_td_to_the_contact() -> None:
 def test_chatter_between_two_windows_is_waited_for() -> None:
     timing = time_sensor([(0.013, 0.05), (0.0705, 0.12)], PUSHES)
     assert flat(timing.windows) == pytest.approx([0.013, 0.05, 0.073, 0.12])
-    with pytest.raises(DeckError, match="no wait lets a sensor switch"):  # the gap from 0.06 to 0.062 is left open
+    with pytest.raises(
+        DeckError, match="no wait lets a sensor switch"
+    ):  # the gap from 0.06 to 0.062 is left open
         time_sensor([(0.011, 0.05), (0.0705, 0.12)], PUSHES)
 
 
 def test_a_flight_without_a_window_is_left_out_by_a_pair_alone() -> None:
     planned = [(0.02, 0.049), (0.14, 0.199)]
-    assert [tr for tr, _ in time_pair(planned, PUSHES).windows] == pytest.approx([0.02, 0.14])
-    with pytest.raises(DeckError, match=r"in the planned windows \(0.02 to 0.049, 0.14 to 0.199\)"):
+    assert [tr for tr, _ in time_pair(planned, PUSHES).windows] == pytest.approx(
+        [0.02, 0.14]
+    )
+    with pytest.raises(
+        DeckError, match=r"in the planned windows \(0.02 to 0.049, 0.14 to 0.199\)"
+    ):
         time_sensor(planned, PUSHES)
 
 
 def test_without_a_contact_behind_it_a_pair_switches_nothing_back() -> None:
     with pytest.raises(DeckError, match="no wait lets a pair"):
         time_pair([(0.22, 0.3)], PUSHES)
-    assert flat(time_sensor([(0.22, 0.3)], PUSHES).windows) == pytest.approx([0.22, 0.3])
+    assert flat(time_sensor([(0.22, 0.3)], PUSHES).windows) == pytest.approx(
+        [0.22, 0.3]
+    )
 
 
 @given(st.lists(st.floats(0.5, 9.0), min_size=3, max_size=9), st.floats(0.0, 0.9))
-def test_windows_after_every_contact_are_met_by_a_common_wait(gaps: list[float], share: float) -> None:
+def test_windows_after_every_contact_are_met_by_a_common_wait(
+    gaps: list[float], share: float
+) -> None:
     """Contacts of length 1 with gaps; planned is each gap from the same time after its contact on."""
     starts = [sum(gaps[:at]) + at for at in range(len(gaps) + 1)]
     contacts = tuple((start, start + 1.0) for start in starts)
     wait = share * min(gaps)
-    planned = [(end + wait, start) for (_, end), (start, _) in itertools.pairwise(contacts)]
+    planned = [
+        (end + wait, start) for (_, end), (start, _) in itertools.pairwise(contacts)
+    ]
     timing = time_sensor(planned, Pushes(contacts))
     assert flat(timing.windows) == pytest.approx(flat(planned))
     assert timing.wait == pytest.approx(wait, abs=1e-9)
@@ -76,20 +90,33 @@ def test_windows_after_every_contact_are_met_by_a_common_wait(gaps: list[float],
 @pytest.fixture(scope="module")
 def falls(tmp_path_factory: pytest.TempPathFactory) -> str:
     path = str(tmp_path_factory.mktemp("falls") / "falls.matsum")
-    assert run("rollover", "--drop", "0.4", "--mesh", "6", "--dt", "5e-4", "-o", path).exit_code == 0
+    assert (
+        run(
+            "rollover", "--drop", "0.4", "--mesh", "6", "--dt", "5e-4", "-o", path
+        ).exit_code
+        == 0
+    )
     return path
 
 
 BY_CONTACT = ("--solver", "ls-dyna-contact", "--contact", "7")
 
 
-def test_the_printed_pair_is_read_back_with_its_windows(falls: str, tmp_path: Path) -> None:
-    card = d2.plan(d2.read(falls), parts="box", replay=False).card(solver="ls-dyna-contact", contact=7)
+def test_the_printed_pair_is_read_back_with_its_windows(
+    falls: str, tmp_path: Path
+) -> None:
+    card = d2.plan(d2.read(falls), parts="box", replay=False).card(
+        solver="ls-dyna-contact", contact=7
+    )
     assert card is not None
     assert len(card.card.windows) == 2
-    found = answer("check", str(put(tmp_path / "pair.k", card.card.text)), "--history", falls)
+    found = answer(
+        "check", str(put(tmp_path / "pair.k", card.card.text)), "--history", falls
+    )
     read = [(one["tr"], one["td"]) for one in found["windows"]]
-    assert flat(read) == pytest.approx(flat(card.card.windows), abs=1e-5)  # digits of the card
+    assert flat(read) == pytest.approx(
+        flat(card.card.windows), abs=1e-5
+    )  # digits of the card
 
 
 def test_the_printed_sensor_names_its_wait_and_wall(falls: str) -> None:
@@ -110,8 +137,12 @@ def test_the_printed_sensor_names_its_wait_and_wall(falls: str) -> None:
         (("--contact", "7"), "--contact is an option of --solver ls-dyna-contact"),
     ],
 )
-def test_what_pushes_has_to_be_named_once(falls: str, options: tuple[str, ...], message: str) -> None:
-    assert message in refused("plan", "-q", "--part", "box", "--no-verify", "-f", "card", *options, falls)
+def test_what_pushes_has_to_be_named_once(
+    falls: str, options: tuple[str, ...], message: str
+) -> None:
+    assert message in refused(
+        "plan", "-q", "--part", "box", "--no-verify", "-f", "card", *options, falls
+    )
 
 
 def test_without_momenta_nothing_shows_when_something_pushes() -> None:

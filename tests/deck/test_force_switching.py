@@ -5,24 +5,41 @@ from itertools import pairwise
 import pytest
 from hypothesis import given, strategies as st
 
-from d2rpick.deck.force_switching import ForceSwitch, find_delay_without_chatter, follow_pair
+from d2rpick.deck.force_switching import (
+    ForceSwitch,
+    find_delay_without_chatter,
+    follow_pair,
+)
 
 TO_RIGID, BACK = ForceSwitch(True, False), ForceSwitch(False, True)
 BOUNCES = [(0.0, 0.01), (0.02, 0.021), (0.0215, 0.03), (0.06, 0.07)]
 
 
 def test_a_pair_switches_with_every_force() -> None:
-    assert follow_pair(TO_RIGID, BACK, BOUNCES, 0.1) == [(0.01, 0.02), (0.021, 0.0215), (0.03, 0.06), (0.07, None)]
+    assert follow_pair(TO_RIGID, BACK, BOUNCES, 0.1) == [
+        (0.01, 0.02),
+        (0.021, 0.0215),
+        (0.03, 0.06),
+        (0.07, None),
+    ]
 
 
 def test_a_delay_after_the_way_back_keeps_chatter_out() -> None:
     waits = BACK._replace(delay=0.002)
-    assert follow_pair(TO_RIGID, waits, BOUNCES, 0.1) == [(0.01, 0.02), (0.03, 0.06), (0.07, None)]
+    assert follow_pair(TO_RIGID, waits, BOUNCES, 0.1) == [
+        (0.01, 0.02),
+        (0.03, 0.06),
+        (0.07, None),
+    ]
 
 
 def test_a_delay_after_becoming_rigid_misses_a_contact() -> None:
-    late = TO_RIGID._replace(delay=0.0105)  # the second contact is over when it may switch back
-    assert follow_pair(late, BACK, [(0.0, 0.01), (0.02, 0.0203), (0.05, 0.06)], 0.1) == [(0.01, 0.05), (0.06, None)]
+    late = TO_RIGID._replace(
+        delay=0.0105
+    )  # the second contact is over when it may switch back
+    assert follow_pair(
+        late, BACK, [(0.0, 0.01), (0.02, 0.0203), (0.05, 0.06)], 0.1
+    ) == [(0.01, 0.05), (0.06, None)]
 
 
 def test_sets_act_between_their_times() -> None:
@@ -44,13 +61,22 @@ def test_swapped_codes_are_rigid_in_the_contacts() -> None:
     assert follow_pair(*swapped, BOUNCES, 0.1) == [*BOUNCES]
 
 
-@given(st.lists(st.integers(1, 1000), min_size=2, max_size=12, unique=True).filter(lambda cuts: len(cuts) % 2 == 0))
+@given(
+    st.lists(st.integers(1, 1000), min_size=2, max_size=12, unique=True).filter(
+        lambda cuts: len(cuts) % 2 == 0
+    )
+)
 def test_windows_follow_each_other_and_no_force_acts_in_them(cuts: list[int]) -> None:
     times = sorted(cuts)
-    contacts = [(float(a), float(b)) for a, b in zip(times[::2], times[1::2], strict=True)]
+    contacts = [
+        (float(a), float(b)) for a, b in zip(times[::2], times[1::2], strict=True)
+    ]
     windows = follow_pair(TO_RIGID, BACK, contacts, 2000.0)
     assert windows[-1][1] is None
-    assert all(before[1] is not None and before[1] < after[0] for before, after in pairwise(windows))
+    assert all(
+        before[1] is not None and before[1] < after[0]
+        for before, after in pairwise(windows)
+    )
     for tr, td in windows:
         assert not any(start < (td or 2000.0) and tr < end for start, end in contacts)
 

@@ -20,11 +20,23 @@ from tests.decks import read, row, wide
 RHO, E, NU = 8000.0, 2.0e11, 0.25
 SPEED = math.sqrt(E / RHO)
 CARDS = f"*MAT_ELASTIC\n{1:10d}{RHO:10.1f}{E:10.2e}{NU:10.2f}\n"
-PLACES = [(0, 0, 0), (2, 0, 0), (2, 1, 0), (0, 1, 0), (0, 0, 3), (2, 0, 3), (2, 1, 3), (0, 1, 3)]
+PLACES = [
+    (0, 0, 0),
+    (2, 0, 0),
+    (2, 1, 0),
+    (0, 1, 0),
+    (0, 0, 3),
+    (2, 0, 3),
+    (2, 1, 3),
+    (0, 1, 3),
+]
 NODES = "*NODE\n" + "".join(
-    f"{n:8d}" + "".join(f"{float(x):16.4f}" for x in place) + "\n" for n, place in enumerate(PLACES, start=1)
+    f"{n:8d}" + "".join(f"{float(x):16.4f}" for x in place) + "\n"
+    for n, place in enumerate(PLACES, start=1)
 )
-SHELL = "*SECTION_SHELL\n         1         2\n      0.01      0.01      0.01      0.01\n"
+SHELL = (
+    "*SECTION_SHELL\n         1         2\n      0.01      0.01      0.01      0.01\n"
+)
 IN_SHELLS = SPEED / math.sqrt(1 - NU**2)
 IN_SOLIDS = SPEED * math.sqrt((1 - NU) / ((1 + NU) * (1 - 2 * NU)))
 
@@ -42,16 +54,24 @@ IN_SOLIDS = SPEED * math.sqrt((1 - NU) / ((1 + NU) * (1 - 2 * NU)))
          2 / SPEED),
     ],
 )  # fmt: skip
-def test_by_hand(tmp_path: Path, section: str, elements: str, mass: float, step: float) -> None:
+def test_by_hand(
+    tmp_path: Path, section: str, elements: str, mass: float, step: float
+) -> None:
     part = "*KEYWORD\n*PART\na\n" + row(7, 1, 1, width=10)
-    found = masses_and_steps(ls_dyna_inventory.read(read(tmp_path, f"{part}{section}{CARDS}{NODES}{elements}*END\n")))
+    found = masses_and_steps(
+        ls_dyna_inventory.read(
+            read(tmp_path, f"{part}{section}{CARDS}{NODES}{elements}*END\n")
+        )
+    )
     assert list(found[7]) == pytest.approx([mass, step])
 
 
 @pytest.mark.parametrize("lost", ["*MAT", "*SECTION", "*NODE"])
 def test_what_is_not_in_the_deck_is_not_guessed(tmp_path: Path, lost: str) -> None:
     part = "*KEYWORD\n*PART\na\n" + row(7, 1, 1, width=10)
-    text = f"{part}{SHELL}{CARDS}{NODES}*ELEMENT_SHELL\n{row(1, 7, 1, 2, 3, 4)}*END\n".replace(lost, "*OTHER")
+    text = f"{part}{SHELL}{CARDS}{NODES}*ELEMENT_SHELL\n{row(1, 7, 1, 2, 3, 4)}*END\n".replace(
+        lost, "*OTHER"
+    )
     mass, step = masses_and_steps(ls_dyna_inventory.read(read(tmp_path, text)))[7]
     assert mass is None
     assert (step is None) == (lost != "*SECTION")
@@ -59,12 +79,21 @@ def test_what_is_not_in_the_deck_is_not_guessed(tmp_path: Path, lost: str) -> No
 
 def test_cards_without_a_usable_element_have_no_mass(tmp_path: Path) -> None:
     part = "*KEYWORD\n*PART\na\n" + row(7, 1, 1, width=10)
-    assert masses_and_steps(ls_dyna_inventory.read(read(tmp_path, f"{part}*ELEMENT_SHELL\n{row(1, 7, 1)}*END\n"))) == {}
+    assert (
+        masses_and_steps(
+            ls_dyna_inventory.read(
+                read(tmp_path, f"{part}*ELEMENT_SHELL\n{row(1, 7, 1)}*END\n")
+            )
+        )
+        == {}
+    )
 
 
 def test_masses_of_the_car_are_those_that_the_solver_printed(tmp_path: Path) -> None:
     (tmp_path / "CAR_0000.rad").write_bytes(starter("CAR"))
-    found = masses_and_steps(radioss_inventory.read(read_run(str(tmp_path / "CAR_0000.rad"))))
+    found = masses_and_steps(
+        radioss_inventory.read(read_run(str(tmp_path / "CAR_0000.rad")))
+    )
     lines = Path(stored("car_parts.csv")).read_text("ascii").splitlines()
     head, *rows = (line.split(",") for line in lines)
     for cells in rows:
@@ -83,13 +112,28 @@ ALONG, ACROSS = 12, 5
 
 def plate(far: float = 0.0) -> Inventory:
     """A plate of 3.6 x 1.5 of one part in shells, turned into the plane x = far, and a part of two springs."""
-    y, z = np.meshgrid(np.linspace(0, 3.6, ALONG + 1), np.linspace(0, 1.5, ACROSS + 1), indexing="ij")
+    y, z = np.meshgrid(
+        np.linspace(0, 3.6, ALONG + 1), np.linspace(0, 1.5, ACROSS + 1), indexing="ij"
+    )
     coordinates = np.stack([np.full(y.size, far), y.ravel(), z.ravel()], axis=1)
-    first = np.array([i * (ACROSS + 1) + j for i in range(ALONG) for j in range(ACROSS)])
-    shells = np.stack([first, first + 1, first + ACROSS + 2, first + ACROSS + 1], axis=1)
+    first = np.array(
+        [i * (ACROSS + 1) + j for i in range(ALONG) for j in range(ACROSS)]
+    )
+    shells = np.stack(
+        [first, first + 1, first + ACROSS + 2, first + ACROSS + 1], axis=1
+    )
     springs = np.array([[0, 1], [0, ACROSS]])
-    elements = (Elements("shell", np.full(len(shells), 3), shells), Elements("spring", np.full(2, 4), springs))
-    return Inventory("radioss", {}, elements, coordinates, watched=np.array([0, ACROSS, coordinates.shape[0] - 1]))
+    elements = (
+        Elements("shell", np.full(len(shells), 3), shells),
+        Elements("spring", np.full(2, 4), springs),
+    )
+    return Inventory(
+        "radioss",
+        {},
+        elements,
+        coordinates,
+        watched=np.array([0, ACROSS, coordinates.shape[0] - 1]),
+    )
 
 
 @pytest.mark.parametrize("far", [0.0, 1e6])
@@ -98,12 +142,17 @@ def test_a_plate_lies_at_its_middle_and_spreads_as_its_elements_do(far: float) -
     np.testing.assert_allclose(found[3].centre, [far, 1.8, 0.75], rtol=1e-9)
     spread = [0.0, 3.6**2 / 12 * (1 - 1 / ALONG**2), 1.5**2 / 12 * (1 - 1 / ACROSS**2)]
     np.testing.assert_allclose(found[3].spread, np.diag(spread), rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(found[4].centre, [far, 0.0, (0.15 + 0.75) / 2], rtol=1e-9)
+    np.testing.assert_allclose(
+        found[4].centre, [far, 0.0, (0.15 + 0.75) / 2], rtol=1e-9
+    )
 
 
 def test_watched_nodes_count_once() -> None:
     deck = Placement(plate())
-    np.testing.assert_allclose(deck.watched_centre([3, 4]), np.mean([[0, 0, 0], [0, 0, 1.5], [0, 3.6, 1.5]], axis=0))  # type: ignore[arg-type]
+    np.testing.assert_allclose(
+        deck.watched_centre([3, 4]),  # type: ignore[arg-type]
+        np.mean([[0, 0, 0], [0, 0, 1.5], [0, 3.6, 1.5]], axis=0),  # type: ignore[arg-type]
+    )
     np.testing.assert_allclose(deck.watched_centre([4]), [0, 0, 0.75])  # type: ignore[arg-type]
     assert deck.watched_centre([]) is None
     assert deck.hanging_together([3, 4]) == {3, 4}
@@ -160,10 +209,15 @@ PLATE_MESH = f"{dyna.HEAD}*NODE\n{dyna.nodes()}{PLATE}"
         (f"{PLATE_MESH}*PART_MOVE\n         7       1.0\n*END\n", False),
         (f"{dyna.HEAD}*INCLUDE_TRANSFORM\nmesh.k\n\n\n\n         0\n*END\n", True),
         (f"{dyna.HEAD}*INCLUDE_TRANSFORM\nmesh.k\n\n\n\n         3\n*END\n", False),
-        (f"{dyna.HEAD}*INCLUDE_TRANSFORM\nmesh.k\n\n\n\n     &turn\n*END\n", False),  # not known, so not at rest
+        (
+            f"{dyna.HEAD}*INCLUDE_TRANSFORM\nmesh.k\n\n\n\n     &turn\n*END\n",
+            False,
+        ),  # not known, so not at rest
     ],
 )
-def test_where_a_deck_moves_its_nodes_no_part_is_placed(tmp_path: Path, text: str, placed: bool) -> None:
+def test_where_a_deck_moves_its_nodes_no_part_is_placed(
+    tmp_path: Path, text: str, placed: bool
+) -> None:
     found = dyna.inventory(tmp_path, text, mesh=f"*NODE\n{dyna.nodes()}{PLATE}*END\n")
     assert found.counts == {7: {"shell": 1}}
     assert ({*Placement(found).parts} == {7}) is placed
@@ -179,7 +233,18 @@ def test_a_starter_that_moves_its_nodes_places_no_part(tmp_path: Path) -> None:
 def test_the_car_lies_where_its_generator_put_it(tmp_path: Path) -> None:
     deck = put(tmp_path / "CAR_0000.rad", starter("CAR"))
     found = Placement(read_inventory(str(deck)))
-    np.testing.assert_allclose(found.parts[12].centre, [0.6, 0.0, 0.375], atol=1e-9)  # the engine, 0.6 x 0.6 x 0.45
-    np.testing.assert_allclose(found.parts[12].spread, np.diag([0.0281, 0.0281, 0.015]), atol=1e-4)
-    np.testing.assert_allclose(found.watched_centre(range(1, 12)), [2.025, 0.0, 0.7], atol=1e-9)  # type: ignore[arg-type]
-    assert found.hanging_together(range(1, 15)) == {*range(1, 12), 13}  # all but engine and wheels
+    np.testing.assert_allclose(
+        found.parts[12].centre, [0.6, 0.0, 0.375], atol=1e-9
+    )  # the engine, 0.6 x 0.6 x 0.45
+    np.testing.assert_allclose(
+        found.parts[12].spread, np.diag([0.0281, 0.0281, 0.015]), atol=1e-4
+    )
+    np.testing.assert_allclose(
+        found.watched_centre(range(1, 12)),  # type: ignore[arg-type]
+        [2.025, 0.0, 0.7],  # type: ignore[arg-type]
+        atol=1e-9,
+    )
+    assert found.hanging_together(range(1, 15)) == {
+        *range(1, 12),
+        13,
+    }  # all but engine and wheels

@@ -25,12 +25,17 @@ def period(folder: Path, deck: str) -> tuple[float, ...] | None:
     stiffness=st.lists(st.floats(1e3, 1e6), min_size=1, max_size=3),
 )
 def test_two_masses_on_parallel_springs(
-    tmp_path_factory: pytest.TempPathFactory, masses: list[float], stiffness: list[float]
+    tmp_path_factory: pytest.TempPathFactory,
+    masses: list[float],
+    stiffness: list[float],
 ) -> None:
     """All act along x: both ends of the bracket are the closed form of two masses."""
     one, other = masses
     expected = 2 * math.pi * math.sqrt(one * other / (one + other) / sum(stiffness))
-    found = period(tmp_path_factory.mktemp("deck"), cubes((one, other), [(10, 20, k) for k in stiffness]))
+    found = period(
+        tmp_path_factory.mktemp("deck"),
+        cubes((one, other), [(10, 20, k) for k in stiffness]),
+    )
     assert found is not None
     assert found == pytest.approx((expected, expected))
 
@@ -39,7 +44,9 @@ def test_the_longest_of_several_counts_and_light_pieces_do_not(tmp_path: Path) -
     deck = cubes((5.0, 5.0, 0.01), [(10, 20, 1e6), (20, 30, 1.0)])
     found = period(tmp_path, deck)
     assert found
-    assert found[0] < 1  # [s]; the light one on its soft spring swings in 0.6 s and against half of all
+    assert (
+        found[0] < 1
+    )  # [s]; the light one on its soft spring swings in 0.6 s and against half of all
     softer = period(tmp_path, cubes((5.0, 5.0, 0.01), [(10, 20, 1e6), (20, 30, 0.1)]))
     assert softer == pytest.approx(found, rel=1e-5)
     heavier = period(tmp_path, cubes((5.0, 5.0, 1.0), [(10, 20, 1e6), (20, 30, 1.0)]))
@@ -51,9 +58,14 @@ def test_springs_at_an_angle_make_a_bracket(tmp_path: Path) -> None:
     """Two springs k at an angle: k (1 + cos) where they are stiffest, 2 k is what no direction has more of."""
     side, stiffness = 2.0, 1e5
     mass = DENSITY * side**3
-    found = period(tmp_path, cubes((mass, mass), [(10, 20, stiffness), (10, 23, stiffness)]))
+    found = period(
+        tmp_path, cubes((mass, mass), [(10, 20, stiffness), (10, 23, stiffness)])
+    )
     angle = math.atan(side / 10)
-    both = (2 * math.pi * math.sqrt(mass / 2 / stiffness / share) for share in (1 + math.cos(angle), 2))
+    both = (
+        2 * math.pi * math.sqrt(mass / 2 / stiffness / share)
+        for share in (1 + math.cos(angle), 2)
+    )
     assert found == pytest.approx(tuple(both))
 
 
@@ -67,7 +79,14 @@ def test_springs_at_an_angle_make_a_bracket(tmp_path: Path) -> None:
         cubes((5.0, 5.0), [(10, 20, 1e5)]).replace("/END", "#include other.inc\n/END"),
         cubes((5.0, 5.0), [(10, 20, 1e5)]).replace(f"{DENSITY:>20}", f"{0.0:>20}"),
     ],
-    ids=["no springs", "no stiffness", "another kind", "by a function", "not whole", "no density"],
+    ids=[
+        "no springs",
+        "no stiffness",
+        "another kind",
+        "by a function",
+        "not whole",
+        "no density",
+    ],
 )
 def test_what_the_deck_does_not_give_is_not_guessed(tmp_path: Path, deck: str) -> None:
     assert period(tmp_path, deck) is None

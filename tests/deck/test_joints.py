@@ -30,8 +30,12 @@ JOINTS = {
     "extra nodes": "*CONSTRAINED_EXTRA_NODES_NODE\n" + wide(9, 2),
     "extra nodes of a set": SET + "*CONSTRAINED_EXTRA_NODES_SET\n" + wide(9, 5),
     "tied contact": "*CONTACT_TIED_SHELL_EDGE_TO_SURFACE\n" + wide(7, 9, 3, 3),
-    "tied contact of an id": "*CONTACT_TIED_NODES_TO_SURFACE_ID\n" + wide(1) + wide(7, 9, 3, 3),
-    "tied contact of nodes": SET + "*CONTACT_TIED_NODES_TO_SURFACE\n" + wide(5, 9, 4, 3),
+    "tied contact of an id": "*CONTACT_TIED_NODES_TO_SURFACE_ID\n"
+    + wide(1)
+    + wide(7, 9, 3, 3),
+    "tied contact of nodes": SET
+    + "*CONTACT_TIED_NODES_TO_SURFACE\n"
+    + wide(5, 9, 4, 3),
 }
 
 
@@ -49,11 +53,19 @@ def test_what_joins_two_parts_makes_one_body_of_them(tmp_path: Path, form: str) 
     assert (read.ties, read.complete) == ((), True)
 
 
-def test_without_a_joint_each_is_a_body_and_a_joint_within_a_part_is_none(tmp_path: Path) -> None:
-    for text in ("", "*CONSTRAINED_SPOTWELD\n" + wide(1, 2), "*CONSTRAINED_SPOTWELD\n" + wide(4, 999)):
+def test_without_a_joint_each_is_a_body_and_a_joint_within_a_part_is_none(
+    tmp_path: Path,
+) -> None:
+    for text in (
+        "",
+        "*CONSTRAINED_SPOTWELD\n" + wide(1, 2),
+        "*CONSTRAINED_SPOTWELD\n" + wide(4, 999),
+    ):
         read = found(tmp_path, text)
         assert read.groups([7, 9, 11]) == ((7,), (9,), (11,))
-        assert {part: dict(others) for part, others in read.joined.items() if others} == {}
+        assert {
+            part: dict(others) for part, others in read.joined.items() if others
+        } == {}
 
 
 def test_several_welds_on_the_lines_of_a_keyword_join_a_chain(tmp_path: Path) -> None:
@@ -65,19 +77,33 @@ def test_several_welds_on_the_lines_of_a_keyword_join_a_chain(tmp_path: Path) ->
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("*CONTACT_TIED_NODES_TO_SURFACE\n" + wide(1, 2, 0, 0), "*CONTACT_TIED_NODES_TO_SURFACE"),
+        (
+            "*CONTACT_TIED_NODES_TO_SURFACE\n" + wide(1, 2, 0, 0),
+            "*CONTACT_TIED_NODES_TO_SURFACE",
+        ),
         ("*CONTACT_SPOTWELD\n" + wide(1, 2, 2, 2), "*CONTACT_SPOTWELD"),
-        ("*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_TIEBREAK\n" + wide(1, 2, 2, 2), "TIEBREAK"),
+        (
+            "*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_TIEBREAK\n" + wide(1, 2, 2, 2),
+            "TIEBREAK",
+        ),
         ("*CONTACT_TIED_NODES_TO_SURFACE_MPP\n" + wide(0) + wide(7, 9, 3, 3), "MPP"),
-        ("*CONSTRAINED_NODAL_RIGID_BODY\n" + wide(1, 0, 77), "nodal rigid body"),  # of a set that is not there
+        (
+            "*CONSTRAINED_NODAL_RIGID_BODY\n" + wide(1, 0, 77),
+            "nodal rigid body",
+        ),  # of a set that is not there
         ("*CONSTRAINED_SPR2\n" + wide(7, 9), "*CONSTRAINED_SPR2"),
-        ("*CONSTRAINED_INTERPOLATION\n" + wide(1, 2, 123456), "*CONSTRAINED_INTERPOLATION"),
+        (
+            "*CONSTRAINED_INTERPOLATION\n" + wide(1, 2, 123456),
+            "*CONSTRAINED_INTERPOLATION",
+        ),
         ("*CONSTRAINED_BEAM_IN_SOLID_ID\n" + wide(1), "*CONSTRAINED_BEAM_IN_SOLID_ID"),
         ("*CONSTRAINED_LINEAR_GLOBAL\n" + wide(1), "*CONSTRAINED_LINEAR_GLOBAL"),
         ("*CONSTRAINED_TIE-BREAK\n" + wide(1, 2), "*CONSTRAINED_TIE-BREAK"),
     ],
 )
-def test_a_tie_that_is_not_followed_is_named_and_leaves_the_bodies_open(tmp_path: Path, text: str, told: str) -> None:
+def test_a_tie_that_is_not_followed_is_named_and_leaves_the_bodies_open(
+    tmp_path: Path, text: str, told: str
+) -> None:
     read = found(tmp_path, text)
     (tie,) = read.ties
     assert told in tie
@@ -88,7 +114,8 @@ def test_a_tie_that_is_not_followed_is_named_and_leaves_the_bodies_open(tmp_path
 
 
 RADIOSS = "".join(
-    f"/PART/{n}\np{n}\n{wide(1, 1)}/SHELL/{n}\n{wide(n, *range(4 * n - 3, 4 * n + 1))}" for n in (1, 2, 3)
+    f"/PART/{n}\np{n}\n{wide(1, 1)}/SHELL/{n}\n{wide(n, *range(4 * n - 3, 4 * n + 1))}"
+    for n in (1, 2, 3)
 )
 
 
@@ -105,14 +132,18 @@ def test_tied_interfaces_of_radioss(
     tmp_path: Path, group: str, surface: str, joined: dict[int, set[int]] | None
 ) -> None:
     tie = f"/INTER/TYPE2/1\ntie\n{wide(5, 6)}"
-    read = rad.inventory(tmp_path, rad.nodes(12) + RADIOSS + rad.PROPS + group + surface + tie)
+    read = rad.inventory(
+        tmp_path, rad.nodes(12) + RADIOSS + rad.PROPS + group + surface + tie
+    )
     assert len(read.ties) == (0 if joined else 1)
     assert {part: {*others} for part, others in read.joined.items()} == (joined or {})
     assert bool(bodies_of(read, [1, 2])) == bool(joined)
 
 
 @pytest.mark.parametrize("keyword", ["RBE2", "RBE3", "RLINK", "MPC"])
-def test_other_ties_of_radioss_leave_the_bodies_open(tmp_path: Path, keyword: str) -> None:
+def test_other_ties_of_radioss_leave_the_bodies_open(
+    tmp_path: Path, keyword: str
+) -> None:
     tie = f"/{keyword}/1\ntie\n{wide(4, 0, 0, 5)}"
     read = rad.inventory(tmp_path, rad.nodes(12) + RADIOSS + rad.PROPS + tie)
     assert [one.split()[0] for one in read.ties] == [f"/{keyword}/1"]

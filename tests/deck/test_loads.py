@@ -19,7 +19,11 @@ from d2rpick.histories.surroundings import Surroundings
 from tests import made_car
 from tests.decks import wide
 
-BODY, WHEEL, OTHER = set(made_car.BODY), {7, 8}, {7, 9}  # both wheels have hubs of one part
+BODY, WHEEL, OTHER = (
+    set(made_car.BODY),
+    {7, 8},
+    {7, 9},
+)  # both wheels have hubs of one part
 
 
 def group(number: int, *nodes: int) -> str:
@@ -72,18 +76,32 @@ def test_a_support_holds_what_hangs_together_with_its_nodes(
         ((1, 2, 3, 4), "010 101", set()),
         ((1, 2, 3), "010 101", BODY),  # not all nodes of the plane
         ((5, 6, 7, 8), "010 000", BODY),  # the body lies on both sides
-        ((1, 2, 3, 4), "011 000", BODY),  # they lie at different heights, where gravity pulls
+        (
+            (1, 2, 3, 4),
+            "011 000",
+            BODY,
+        ),  # they lie at different heights, where gravity pulls
         ((1, 2, 3, 4), "010 000", set()),
     ],
 )
-def test_a_symmetry_plane_holds_nothing(tmp_path: Path, nodes: tuple[int, ...], code: str, expected: set[int]) -> None:
+def test_a_symmetry_plane_holds_nothing(
+    tmp_path: Path, nodes: tuple[int, ...], code: str, expected: set[int]
+) -> None:
     assert held(radioss(tmp_path, group(1, *nodes) + bcs(code, 1)))[0] == expected
-    assert held(radioss(tmp_path, group(1, *nodes) + bcs(code, 1, skew=3)))[0] == BODY  # its plane is not known
+    assert (
+        held(radioss(tmp_path, group(1, *nodes) + bcs(code, 1, skew=3)))[0] == BODY
+    )  # its plane is not known
 
 
-def test_imposed_motion_holds_from_its_start_to_its_stop_and_always_where_a_sensor_is_asked(tmp_path: Path) -> None:
+def test_imposed_motion_holds_from_its_start_to_its_stop_and_always_where_a_sensor_is_asked(
+    tmp_path: Path,
+) -> None:
     for sensor, times in ((0, (0.01, 0.05)), (4, (0.0, inf))):
-        moved = "/IMPVEL/1\nmoved\n" + wide(1, "X", 0, sensor, 1) + wide(0, 1, 0.01, 0.05, width=20)
+        moved = (
+            "/IMPVEL/1\nmoved\n"
+            + wide(1, "X", 0, sensor, 1)
+            + wide(0, 1, 0.01, 0.05, width=20)
+        )
         (one,) = radioss(tmp_path, group(1, 1) + moved).boundary.holds
         assert (one.start, one.end) == times
     assert "/IMPVEL/1" in one.name
@@ -120,11 +138,19 @@ def test_birth_and_death(tmp_path: Path) -> None:
 
 
 def test_what_is_not_followed_is_told(tmp_path: Path) -> None:
-    found = radioss(tmp_path, "/GRNOD/BOX/1\nnodes\n" + wide(1) + bcs("111 000", 1)).boundary
+    found = radioss(
+        tmp_path, "/GRNOD/BOX/1\nnodes\n" + wide(1) + bcs("111 000", 1)
+    ).boundary
     assert not found.holds
     assert "/BCS/1" in found.notes[0]
-    found = ls_dyna(tmp_path, "*BOUNDARY_SPC_SET\n" + wide(77, 0, 1, 1, 1) + "*LOAD_BODY_RX\n" + wide(1, 1.0)).boundary
-    assert [note.split(" ")[0] for note in found.notes] == ["*BOUNDARY_SPC_SET", "*LOAD_BODY_RX"]
+    found = ls_dyna(
+        tmp_path,
+        "*BOUNDARY_SPC_SET\n" + wide(77, 0, 1, 1, 1) + "*LOAD_BODY_RX\n" + wide(1, 1.0),
+    ).boundary
+    assert [note.split(" ")[0] for note in found.notes] == [
+        "*BOUNDARY_SPC_SET",
+        "*LOAD_BODY_RX",
+    ]
     assert found.gravity is None
     (tmp_path / "MADE_0001.rad").write_text("/RUN/MADE/1\n0.1\n/BCSR/TRA/X/1\n1\n")
     found = radioss(tmp_path, group(1, 1) + bcs("111 000", 1)).boundary
@@ -132,7 +158,9 @@ def test_what_is_not_followed_is_told(tmp_path: Path) -> None:
     assert "/BCSR" in found.notes[0]
 
 
-def grav(function: int, scale: float, *, sensor: int = 0, group: int = 0, axis: str = "Z") -> str:
+def grav(
+    function: int, scale: float, *, sensor: int = 0, group: int = 0, axis: str = "Z"
+) -> str:
     return f"/GRAV/2\nmore\n{wide(function, axis, 0, sensor, group or '')[:-1]:80}{scale:20g}\n"
 
 
@@ -141,19 +169,30 @@ def told(inventory: Inventory) -> Surroundings:
     return in_deck(Run((), ()), inventory).surroundings
 
 
-RAMP = "/FUNCT/1\nramp\n" + "".join(wide(*point, width=20) for point in ((0, 0), (1, 0), (2, 1), (3, 1)))
+RAMP = "/FUNCT/1\nramp\n" + "".join(
+    wide(*point, width=20) for point in ((0, 0), (1, 0), (2, 1), (3, 1))
+)
 
 
 @pytest.mark.parametrize(
     ("more", "body", "wheel", "whole"),
     [
         ("", (9.81,), (9.81,), (9.81,)),
-        (grav(0, 3.0, axis="X"), ((9.81**2 + 9) ** 0.5,), ((9.81**2 + 9) ** 0.5,), ((9.81**2 + 9) ** 0.5,)),
+        (
+            grav(0, 3.0, axis="X"),
+            ((9.81**2 + 9) ** 0.5,),
+            ((9.81**2 + 9) ** 0.5,),
+            ((9.81**2 + 9) ** 0.5,),
+        ),
         (grav(5, 1.0), None, None, None),  # no such function
     ],
 )
 def test_gravity_by_part(
-    tmp_path: Path, more: str, body: tuple[float, ...], wheel: tuple[float, ...], whole: tuple[float, ...]
+    tmp_path: Path,
+    more: str,
+    body: tuple[float, ...],
+    wheel: tuple[float, ...],
+    whole: tuple[float, ...],
 ) -> None:
     found = told(radioss(tmp_path, more)).gravity
     for part, expected in ((1, body), (8, wheel), (None, whole)):
@@ -165,21 +204,33 @@ def test_gravity_by_part(
     [
         (RAMP + grav(1, -1.62), (0.0, 1.62)),
         (grav(0, -1.62, sensor=3), (0.0, 1.62)),
-        (RAMP.replace(wide(1, 0, width=20), "").replace(wide(3, 1, width=20), "") + grav(1, 1.0), None),
+        (
+            RAMP.replace(wide(1, 0, width=20), "").replace(wide(3, 1, width=20), "")
+            + grav(1, 1.0),
+            None,
+        ),
         ("", (0.0,)),
     ],
 )
-def test_values_that_gravity_keeps(tmp_path: Path, card: str, expected: tuple[float, ...] | None) -> None:
+def test_values_that_gravity_keeps(
+    tmp_path: Path, card: str, expected: tuple[float, ...] | None
+) -> None:
     name = made_car.starter(tmp_path, card)
     text = (tmp_path / "MADE_0000.rad").read_text()
-    (tmp_path / "MADE_0000.rad").write_text(text.partition("/GRAV/1\n")[0] + card + "/END\n")
+    (tmp_path / "MADE_0000.rad").write_text(
+        text.partition("/GRAV/1\n")[0] + card + "/END\n"
+    )
     assert told(read_inventory(name)).gravity.get(1) == expected
 
 
-def test_gravity_on_a_group_of_nodes_is_that_of_the_parts_that_lie_in_it(tmp_path: Path) -> None:
+def test_gravity_on_a_group_of_nodes_is_that_of_the_parts_that_lie_in_it(
+    tmp_path: Path,
+) -> None:
     name = made_car.starter(tmp_path)
     text = (tmp_path / "MADE_0000.rad").read_text().partition("/GRAV/1\n")[0]
-    (tmp_path / "MADE_0000.rad").write_text(text + group(1, *range(21, 25)) + grav(0, -9.81, group=1) + "/END\n")
+    (tmp_path / "MADE_0000.rad").write_text(
+        text + group(1, *range(21, 25)) + grav(0, -9.81, group=1) + "/END\n"
+    )
     found = told(read_inventory(name)).gravity
     assert (found[1], found.get(7)) == ((0.0,), None)  # hubs: some of their nodes
 
@@ -188,11 +239,16 @@ def test_gravity_on_a_group_of_nodes_is_that_of_the_parts_that_lie_in_it(tmp_pat
     ("cards", "expected"),
     [
         ("", (9.81,)),
-        ("*SET_PART_LIST\n" + wide(5) + wide(1, 2) + "*LOAD_BODY_PARTS\n" + wide(5), (0.0,)),
+        (
+            "*SET_PART_LIST\n" + wide(5) + wide(1, 2) + "*LOAD_BODY_PARTS\n" + wide(5),
+            (0.0,),
+        ),
         ("*LOAD_BODY_VECTOR\n" + wide(1, 1.0), None),
     ],
 )
-def test_body_loads_of_ls_dyna(tmp_path: Path, cards: str, expected: tuple[float, ...] | None) -> None:
+def test_body_loads_of_ls_dyna(
+    tmp_path: Path, cards: str, expected: tuple[float, ...] | None
+) -> None:
     found = told(ls_dyna(tmp_path, cards)).gravity
     assert found.get(8) == expected
     assert (found.get(1) == (9.81,)) is (expected is not None)

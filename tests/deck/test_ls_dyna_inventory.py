@@ -22,12 +22,15 @@ def nodes(width: int = 8, real: int = 16, count: int = 24) -> str:
     """Node cards of a row of unit cubes."""
     places = [(i // 4, i % 2, i // 2 % 2) for i in range(count)]
     return "".join(
-        f"{n:{width}d}" + "".join(f"{float(x):{real}.4f}" for x in place) + "\n" for n, place in enumerate(places, 1)
+        f"{n:{width}d}" + "".join(f"{float(x):{real}.4f}" for x in place) + "\n"
+        for n, place in enumerate(places, 1)
     )
 
 
 def inventory(folder: Path, text: str, **files: str) -> Inventory:
-    return ls_dyna_inventory.read(read(folder, text, {f"{name}.k": content for name, content in files.items()}))
+    return ls_dyna_inventory.read(
+        read(folder, text, {f"{name}.k": content for name, content in files.items()})
+    )
 
 
 def counted(found: Inventory) -> dict[int, dict[str, int]]:
@@ -50,11 +53,14 @@ FORMS = {
     "i10 in the name": f"*ELEMENT_SHELL%\n{WIDE}",
     "commas": "*ELEMENT_SHELL\n1,7,1,2,4,3\n2,7,5,6,8,7\n",
     "commas and columns": f"*ELEMENT_SHELL\n1,7,1,2,4,3\n{LINES[1]}",
-    "parameter": "*PARAMETER\nI      pid         7\n*ELEMENT_SHELL\n" + SHELLS.replace("       7", "    &pid", 1),
+    "parameter": "*PARAMETER\nI      pid         7\n*ELEMENT_SHELL\n"
+    + SHELLS.replace("       7", "    &pid", 1),
     "thickness": "*ELEMENT_SHELL_THICKNESS\n" + after_each("             1.0" * 4),
-    "whole thickness": "*ELEMENT_SHELL_THICKNESS\n" + after_each("               1" * 4),
+    "whole thickness": "*ELEMENT_SHELL_THICKNESS\n"
+    + after_each("               1" * 4),
     "beta": "*ELEMENT_SHELL_BETA\n" + after_each("             0.0"),
-    "comments and blank lines": "*ELEMENT_SHELL\n$#   eid     pid\n" + SHELLS.replace("\n", "\n$ 1 7 1 2 3\n\n", 1),
+    "comments and blank lines": "*ELEMENT_SHELL\n$#   eid     pid\n"
+    + SHELLS.replace("\n", "\n$ 1 7 1 2 3\n\n", 1),
     "lower case": f"*Element_Shell\n{SHELLS}",
     "CR LF": f"*ELEMENT_SHELL\n{SHELLS}".replace("\n", "\r\n"),
     "triangles": "*ELEMENT_SHELL\n" + row(1, 7, 1, 2, 4, 4) + row(2, 7, 5, 6, 8),
@@ -74,7 +80,9 @@ def test_two_shells_are_counted_in_every_form(tmp_path: Path, form: str) -> None
 def test_long_format(tmp_path: Path) -> None:
     head = "*KEYWORD LONG=Y\n*PART\na\n" + row(7, 1, 1, width=20)
     shells = row(1, 7, 1, 2, 4, 3, width=20) + row(2, 7, 5, 6, 8, 7, width=20)
-    found = inventory(tmp_path, f"{head}*NODE\n{nodes(20, 20)}*ELEMENT_SHELL\n{shells}*END\n")
+    found = inventory(
+        tmp_path, f"{head}*NODE\n{nodes(20, 20)}*ELEMENT_SHELL\n{shells}*END\n"
+    )
     assert counted(found) == {7: {"shell": 2}}
     assert found.rigid_nodes([7]) == 8
 
@@ -99,22 +107,33 @@ def test_long_format(tmp_path: Path) -> None:
         ("*ELEMENT_MASS\n       1       1             0.5       7\n", {}),
     ],
 )  # fmt: skip
-def test_other_kinds(tmp_path: Path, elements: str, expected: dict[int, dict[str, int]]) -> None:
+def test_other_kinds(
+    tmp_path: Path, elements: str, expected: dict[int, dict[str, int]]
+) -> None:
     found = inventory(tmp_path, f"{HEAD}*NODE\n{nodes()}{elements}*END\n")
     assert counted(found) == expected
     assert found.notes == ()
 
 
 @pytest.mark.slow
-def test_two_line_solids_go_on_over_the_pieces_that_are_read_together(tmp_path: Path) -> None:
+def test_two_line_solids_go_on_over_the_pieces_that_are_read_together(
+    tmp_path: Path,
+) -> None:
     text = "".join(row(n, 7) + row(*range(1, 9)) for n in range(1, 60_001))
     assert len(text) > 4 << 20  # a piece ends in it
-    for shift in ("", "$" * 63 + "\n"):  # then the other line of an element is the last of a piece
-        found = inventory(tmp_path, f"{HEAD}*NODE\n{nodes()}*ELEMENT_SOLID\n{shift}{text}*END\n")
+    for shift in (
+        "",
+        "$" * 63 + "\n",
+    ):  # then the other line of an element is the last of a piece
+        found = inventory(
+            tmp_path, f"{HEAD}*NODE\n{nodes()}*ELEMENT_SOLID\n{shift}{text}*END\n"
+        )
         assert counted(found) == {7: {"solid": 60_000}}
 
 
-def test_ids_move_with_a_transform_and_parts_of_other_files_share_nodes(tmp_path: Path) -> None:
+def test_ids_move_with_a_transform_and_parts_of_other_files_share_nodes(
+    tmp_path: Path,
+) -> None:
     other = f"*KEYWORD\n*PART\nc\n         1         1         1\n*ELEMENT_SHELL\n{row(1, 1, 1, 2, 4, 3)}*END\n"
     transform = "*INCLUDE_TRANSFORM\nother.k\n" + row(4, 0, 20, 0, 0, width=10) + "\n\n"
     main = f"{HEAD}*NODE\n{nodes()}*ELEMENT_SHELL\n{row(1, 7, 1, 2, 4, 3)}{row(2, 9, 5, 6, 8, 7)}{transform}*END\n"
@@ -125,7 +144,12 @@ def test_ids_move_with_a_transform_and_parts_of_other_files_share_nodes(tmp_path
 
 
 def test_what_is_not_followed_is_said(tmp_path: Path) -> None:
-    strange = "*ELEMENT_SOLID_STRANGE\n" + row(1, 7) + "*INCLUDE\nabsent.k\n*ELEMENT_SHELL\n" + row(1, 5, 1, 2, 4, 99)
+    strange = (
+        "*ELEMENT_SOLID_STRANGE\n"
+        + row(1, 7)
+        + "*INCLUDE\nabsent.k\n*ELEMENT_SHELL\n"
+        + row(1, 5, 1, 2, 4, 99)
+    )
     found = inventory(tmp_path, f"{HEAD}*NODE\n{nodes()}{strange}       2")
     assert not found.complete
     told = " ".join(found.notes)
@@ -139,10 +163,14 @@ def test_what_is_not_followed_is_said(tmp_path: Path) -> None:
         assert words in told
 
 
-def test_large_ids_are_kept_apart_and_numbers_beyond_them_are_not_ids(tmp_path: Path) -> None:
+def test_large_ids_are_kept_apart_and_numbers_beyond_them_are_not_ids(
+    tmp_path: Path,
+) -> None:
     head = "*KEYWORD LONG=Y\n*PART\na\n" + row(7, 1, 1, width=20) + "*ELEMENT_SHELL\n"
     first = 4_000_000_000
-    shells = row(1, 7, first, first + 1, first + 2, first + 3, width=20) + row(2, 7, first, 5, 6, first + 9, width=20)
+    shells = row(1, 7, first, first + 1, first + 2, first + 3, width=20) + row(
+        2, 7, first, 5, 6, first + 9, width=20
+    )
     wide = f"{3:20d}{7:20d}{'9' * 20}{first:20d}{first:20d}\n"
     found = inventory(tmp_path, f"{head}{shells}{wide}*END\n")
     assert counted(found) == {7: {"shell": 2}}
@@ -159,7 +187,9 @@ def test_a_deck_cut_at_any_byte_of_its_mesh_says_that_it_is_cut(tmp_path: Path) 
         assert not found.complete
     found = inventory(tmp_path, f"{text}*END\n")
     assert (counted(found), found.complete) == (whole, True)
-    (tmp_path / "mesh.k").write_text(text.removeprefix(HEAD), "utf-8")  # an include may do without *END
+    (tmp_path / "mesh.k").write_text(
+        text.removeprefix(HEAD), "utf-8"
+    )  # an include may do without *END
     found = inventory(tmp_path, f"{HEAD}*INCLUDE\nmesh.k\n")
     assert (counted(found), found.complete) == (whole, True)
 
@@ -178,26 +208,47 @@ def test_materials_and_sections_are_told(tmp_path: Path) -> None:
     )  # fmt: skip
     parts = "".join(f"*PART\np{n}\n{n:10d}{1:10d}{n:10d}\n" for n in range(1, 6))
     solids = "*ELEMENT_SOLID\n" + "".join(row(n, n, *range(1, 9)) for n in range(1, 6))
-    found = inventory(tmp_path, f"*KEYWORD\n{parts}{cards}*NODE\n{nodes()}{solids}*END\n")
-    kinds = {part: data.material.kind for part, data in found.parts.items() if data.material}
+    found = inventory(
+        tmp_path, f"*KEYWORD\n{parts}{cards}*NODE\n{nodes()}{solids}*END\n"
+    )
+    kinds = {
+        part: data.material.kind for part, data in found.parts.items() if data.material
+    }
     assert kinds == {1: "rigid", 2: "spring", 3: "spring", 4: "airbag", 5: "deformable"}
     assert [found.parts[n].section.damped for n in (1, 2, 3)] == [None, False, True]
-    assert not found.parts[5].section.turns  # ELFORM 1 keeps its stresses in global axes
+    assert not found.parts[
+        5
+    ].section.turns  # ELFORM 1 keeps its stresses in global axes
 
 
-@given(shells=st.lists(st.tuples(st.integers(1, 3), st.integers(1, 40)), min_size=1, max_size=30))
+@given(
+    shells=st.lists(
+        st.tuples(st.integers(1, 3), st.integers(1, 40)), min_size=1, max_size=30
+    )
+)
 def test_counts_and_nodes_agree_with_a_plain_count(
     tmp_path_factory: pytest.TempPathFactory, shells: Sequence[tuple[int, int]]
 ) -> None:
     folder = tmp_path_factory.mktemp("deck")
-    lines = [(n, part, node, node + 1, node + 2, node + 3) for n, (part, node) in enumerate(shells, start=1)]
+    lines = [
+        (n, part, node, node + 1, node + 2, node + 3)
+        for n, (part, node) in enumerate(shells, start=1)
+    ]
     parts = "".join(f"*PART\np\n{part:10d}\n" for part in (1, 2, 3))
     text = f"*KEYWORD\n{parts}*NODE\n{nodes(count=44)}*ELEMENT_SHELL\n{''.join(row(*line) for line in lines)}*END\n"
     found = ls_dyna_inventory.read(read_deck(write(folder, text)))
-    assert {part: counts["shell"] for part, counts in found.counts.items()} == Counter(part for part, _ in shells)
-    own = {part: {n for p, node in shells if p == part for n in range(node, node + 4)} for part, _ in shells}
+    assert {part: counts["shell"] for part, counts in found.counts.items()} == Counter(
+        part for part, _ in shells
+    )
+    own = {
+        part: {n for p, node in shells if p == part for n in range(node, node + 4)}
+        for part, _ in shells
+    }
     assert all(found.rigid_nodes([part]) == len(used) for part, used in own.items())
-    touching = {part: {other for other in own if other != part and own[other] & own[part]} for part in own}
+    touching = {
+        part: {other for other in own if other != part and own[other] & own[part]}
+        for part in own
+    }
     assert dict(found.neighbours) == touching
 
 
@@ -209,7 +260,15 @@ def test_the_sample_decks_are_what_their_module_writes() -> None:
 
 
 def test_pieces_of_a_part_are_those_that_share_no_nodes(tmp_path: Path) -> None:
-    shells = [(7, 1, 2, 4, 3), (7, 3, 4, 6, 5), (7, 9, 10, 11, 11), (9, 13, 14, 15, 16), (9, 16, 17, 18, 18)]
+    shells = [
+        (7, 1, 2, 4, 3),
+        (7, 3, 4, 6, 5),
+        (7, 9, 10, 11, 11),
+        (9, 13, 14, 15, 16),
+        (9, 16, 17, 18, 18),
+    ]
     mesh = "".join(row(number, *one) for number, one in enumerate(shells, 1))
-    found = inventory(tmp_path, HEAD + "*NODE\n" + nodes() + "*ELEMENT_SHELL\n" + mesh + "*END\n")
+    found = inventory(
+        tmp_path, HEAD + "*NODE\n" + nodes() + "*ELEMENT_SHELL\n" + mesh + "*END\n"
+    )
     assert [pieces_of(found, [part]) for part in (7, 9, 3)] == [2, 1, 0]

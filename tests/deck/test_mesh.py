@@ -9,13 +9,24 @@ from d2rpick.deck.mesh import NO_NODE, NodeTable
 IDS = st.lists(st.integers(1, 30), max_size=12)
 
 
-@pytest.mark.parametrize("far", [0, 10**8])  # from there on a table of all ids would be too large
+@pytest.mark.parametrize(
+    "far", [0, 10**8]
+)  # from there on a table of all ids would be too large
 @given(IDS, IDS, IDS)
-def test_places_are_those_of_the_ids(far: int, placed: list[int], used: list[int], asked: list[int]) -> None:
+def test_places_are_those_of_the_ids(
+    far: int, placed: list[int], used: list[int], asked: list[int]
+) -> None:
     of_elements = np.array([*(one + far for one in used), 0], np.int64)
     table = NodeTable(np.array(placed, np.int64) + far, [of_elements])
-    assert table.ids.tolist() == [*(one + far for one in placed), *(one + far for one in sorted({*used} - {*placed}))]
+    assert table.ids.tolist() == [
+        *(one + far for one in placed),
+        *(one + far for one in sorted({*used} - {*placed})),
+    ]
     first = {id_: place for place, id_ in reversed([*enumerate(table.ids.tolist())])}
-    assert table.places(of_elements).tolist() == [first.get(one, NO_NODE) for one in of_elements.tolist()]
+    assert table.places(of_elements).tolist() == [
+        first.get(one, NO_NODE) for one in of_elements.tolist()
+    ]
     wanted = np.array([one + far for one in asked] + [far + 99, -3], np.int64)
-    assert table.known(wanted).tolist() == [first[one] for one in wanted.tolist() if one in first]
+    assert table.known(wanted).tolist() == [
+        first[one] for one in wanted.tolist() if one in first
+    ]

@@ -23,7 +23,9 @@ RADIOSS = (
 )
 SPRING = f"/PART/9\nmount\n{wide(2, 1)}/SPRING/9\n"
 # The same for the three shells of LS-DYNA, on the nodes 1 to 12.
-DISCRETE = f"*PART\nmount\n{wide(15, 2)}*SECTION_DISCRETE\n{wide(2)}\n\n*ELEMENT_DISCRETE\n"
+DISCRETE = (
+    f"*PART\nmount\n{wide(15, 2)}*SECTION_DISCRETE\n{wide(2)}\n\n*ELEMENT_DISCRETE\n"
+)
 
 
 def radioss(folder: Path, *more: str, engine: str = "") -> Inventory:
@@ -52,7 +54,11 @@ def test_springs_hold_parts_in_one_body_and_go_with_it(tmp_path: Path) -> None:
     assert found.bodies([1, 2, 3, 9]) == ((1, 2, 9), (3,))
     assert found.bodies([2, 3]) == ((2,), (3,))
     assert found.bodies([2, 9]) == ((2,),)  # the other end of the spring moves
-    assert found.groups([1, 2, 3]) == ((1,), (2,), (3,))  # each may have a body of its own
+    assert found.groups([1, 2, 3]) == (
+        (1,),
+        (2,),
+        (3,),
+    )  # each may have a body of its own
     assert pieces_of(found, [1, 2]) == 1
     assert bodies_of(found, [1, 2]) == (RigidBody((1, 2)),)
 
@@ -62,18 +68,31 @@ def test_springs_of_ls_dyna_hold_parts_too(tmp_path: Path) -> None:
     assert found.bodies([7, 9, 11]) == ((7, 9), (11,))
 
 
-def test_a_rigid_body_that_is_there_to_be_switched_says_which_parts_become_one(tmp_path: Path) -> None:
+def test_a_rigid_body_that_is_there_to_be_switched_says_which_parts_become_one(
+    tmp_path: Path,
+) -> None:
     found = radioss(tmp_path, body(1, *FIRST, *THIRD), engine="/RBODY/OFF\n49\n")
     assert found.bodies([1, 2, 3]) == ((1, 3), (2,))
     assert bodies_of(found, [1, 3]) == (RigidBody((1, 3)),)
-    assert found.bodies([2, 3]) == ((2,), (3,))  # it has another part too: it cannot serve these
+    assert found.bodies([2, 3]) == (
+        (2,),
+        (3,),
+    )  # it has another part too: it cannot serve these
     assert found.groups([1, 2, 3]) == ((1,), (2,), (3,))
     assert found.joined == {}
 
 
-def test_parts_on_springs_stay_apart_where_the_deck_has_a_body_for_each(tmp_path: Path) -> None:
+def test_parts_on_springs_stay_apart_where_the_deck_has_a_body_for_each(
+    tmp_path: Path,
+) -> None:
     spring = SPRING + wide(91, 40, 41)
-    found = radioss(tmp_path, spring, body(1, *FIRST), body(2, *SECOND), engine="/RBODY/OFF\n49 50\n")
+    found = radioss(
+        tmp_path,
+        spring,
+        body(1, *FIRST),
+        body(2, *SECOND),
+        engine="/RBODY/OFF\n49 50\n",
+    )
     assert found.bodies([1, 2]) == ((1,), (2,))
     alone = radioss(tmp_path, spring, body(1, *FIRST), engine="/RBODY/OFF\n49\n")
     assert alone.bodies([1, 2]) == ((1, 2),)
@@ -84,29 +103,49 @@ def test_parts_on_springs_stay_apart_where_the_deck_has_a_body_for_each(tmp_path
     [("/PRINT/-100\n", True), ("/RBODY/ON\n49\n", False), ("", True)],
     ids=["always on", "switched", "no engine file, and no part whole in it"],
 )
-def test_a_rigid_body_that_is_always_on_joins_parts(tmp_path: Path, engine: str, joined: bool) -> None:
+def test_a_rigid_body_that_is_always_on_joins_parts(
+    tmp_path: Path, engine: str, joined: bool
+) -> None:
     nodes = (39, 40, 41, 42) if engine != "/RBODY/ON\n49\n" else (*FIRST, 41, 42)
     found = radioss(tmp_path, body(1, *nodes), engine=engine)
     assert found.bodies([1, 2, 3]) == (((1, 2), (3,)) if joined else ((1,), (2,), (3,)))
     assert found.joined.get(1, {}) == ({2: {"rigid body"}} if joined else {})
 
 
-def test_a_rigid_body_that_is_always_on_with_a_group_that_is_not_followed_is_a_tie(tmp_path: Path) -> None:
-    found = radioss(tmp_path, body(1, 40, 41).replace("/GRNOD/NODE", "/GRNOD/BOX"), engine="/PRINT/-100\n")
+def test_a_rigid_body_that_is_always_on_with_a_group_that_is_not_followed_is_a_tie(
+    tmp_path: Path,
+) -> None:
+    found = radioss(
+        tmp_path,
+        body(1, 40, 41).replace("/GRNOD/NODE", "/GRNOD/BOX"),
+        engine="/PRINT/-100\n",
+    )
     assert [tie.split()[0] for tie in found.ties] == ["/RBODY/1"]
     assert bodies_of(found, [1, 2]) == ()
 
 
 def test_parts_of_a_body_may_lie_in_pieces_that_nothing_joins(tmp_path: Path) -> None:
     """Four parts of a car are one body, hubs and tyres two wheels."""
-    for deck, whole in ((made_car.starter(tmp_path), True), (made_car.keywords(tmp_path), False)):
+    for deck, whole in (
+        (made_car.starter(tmp_path), True),
+        (made_car.keywords(tmp_path), False),
+    ):
         found = read_inventory(deck)
         assert bodies_of(found, [*made_car.BODY, *made_car.WHEELS]) == (
             RigidBody(made_car.BODY), RigidBody(made_car.WHEELS, whole=False)
         )  # fmt: skip
         assert pieces_of(found, made_car.WHEELS) == pieces_of(found, [7]) == 2
-        assert bodies_of(found, [7]) == (RigidBody((7,), whole),)  # Radioss switches each piece by itself
-    welded = read_inventory(made_car.keywords(tmp_path, f"*CONSTRAINED_SPOTWELD\n{wide(21, 31)}"))
+        assert bodies_of(found, [7]) == (
+            RigidBody((7,), whole),
+        )  # Radioss switches each piece by itself
+    welded = read_inventory(
+        made_car.keywords(tmp_path, f"*CONSTRAINED_SPOTWELD\n{wide(21, 31)}")
+    )
     assert pieces_of(welded, [7]) == 1
-    through = read_inventory(made_car.keywords(tmp_path, f"*ELEMENT_SHELL\n{row(99, 1, 21, 22, 32, 31)}"))
-    assert (pieces_of(through, [7]), pieces_of(through, [7], among=range(1, 10))) == (2, 1)
+    through = read_inventory(
+        made_car.keywords(tmp_path, f"*ELEMENT_SHELL\n{row(99, 1, 21, 22, 32, 31)}")
+    )
+    assert (pieces_of(through, [7]), pieces_of(through, [7], among=range(1, 10))) == (
+        2,
+        1,
+    )

@@ -42,14 +42,20 @@ WIDE = 20  # columns of a real number
 def starter() -> str:
     """A strip of four shells, one end of which is given a velocity; SI units."""
     nodes = [(2 * i + j + 1, 0.1 * i, 0.1 * j) for i in range(5) for j in range(2)]
-    text = f"#RADIOSS STARTER\n/BEGIN\nstrip\n{wide(2022, 0)}" + 2 * wide("kg", "m", "s", width=WIDE)
+    text = f"#RADIOSS STARTER\n/BEGIN\nstrip\n{wide(2022, 0)}" + 2 * wide(
+        "kg", "m", "s", width=WIDE
+    )
     text += f"/TITLE\nstrip of shells\n/MAT/ELAST/1\nsteel\n{wide(7850.0, width=WIDE)}{wide(2.1e11, 0.3, width=WIDE)}"
     text += f"/PROP/SHELL/1\nshell\n{wide(24, 0, 0, 0)}{wide(*5 * [0.0], width=WIDE)}"
     text += f"{wide(3, 0)[:-1]}{wide(0.002, 0.0, width=WIDE)[:-1]}{'':10}{wide(1, 1)}"
     text += f"/PART/1\nstrip\n{wide(1, 1)}/NODE\n"
-    text += "".join(wide(node)[:-1] + wide(x, y, 0.0, width=WIDE) for node, x, y in nodes)
+    text += "".join(
+        wide(node)[:-1] + wide(x, y, 0.0, width=WIDE) for node, x, y in nodes
+    )
     text += wide(MAIN)[:-1] + wide(0.2, 0.05, 0.01, width=WIDE)
-    text += "/SHELL/1\n" + "".join(wide(i + 1, 2 * i + 1, 2 * i + 3, 2 * i + 4, 2 * i + 2) for i in range(4))
+    text += "/SHELL/1\n" + "".join(
+        wide(i + 1, 2 * i + 1, 2 * i + 3, 2 * i + 4, 2 * i + 2) for i in range(4)
+    )
     text += f"/GRNOD/NODE/1\nstrip\n{wide(*(node for node, _, _ in nodes))}/GRNOD/NODE/2\nend\n{wide(1, 2)}"
     text += f"/RBODY/1\nstrip\n{wide(MAIN, 0, 0, 0)[:-1]}{wide(0.0, width=WIDE)[:-1]}{wide(1, 0, 0, 0)}"
     text += 2 * wide(0.0, 0.0, 0.0, width=WIDE) + wide(0, 0, 0)
@@ -60,21 +66,31 @@ def solve(folder: Path, name: str) -> None:
     """Run the starter and all engine files; the test is skipped where there is no solver."""
     home = os.environ.get("OPENRADIOSS_PATH")
     if not home:
-        pytest.skip("OPENRADIOSS_PATH names no installation of OpenRadioss; set it to run the printed cards")
+        pytest.skip(
+            "OPENRADIOSS_PATH names no installation of OpenRadioss; set it to run the printed cards"
+        )
     programs = [
         path
         for kind in ("starter", "engine")
-        for path in (Path(home, "bin", f"{kind}_gf"), Path(home, "exec", f"{kind}_linux64_gf"))
+        for path in (
+            Path(home, "bin", f"{kind}_gf"),
+            Path(home, "exec", f"{kind}_linux64_gf"),
+        )
         if path.exists()
     ]
     assert len(programs) == 2, f"no starter and engine in {home}"
-    libraries = os.pathsep.join(str(Path(home, part)) for part in ("exec", "syslib", "extlib/hm_reader/linux64"))
+    libraries = os.pathsep.join(
+        str(Path(home, part)) for part in ("exec", "syslib", "extlib/hm_reader/linux64")
+    )
     environment = {
         **os.environ, "RAD_CFG_PATH": str(Path(home, "hm_cfg_files")), "LD_LIBRARY_PATH": libraries,
         "OMP_STACKSIZE": "400m", "OMP_NUM_THREADS": "1",
     }  # fmt: skip
     calls = [(programs[0], ["-i", f"{name}_0000.rad", "-np", "1", "-nt", "1"])]
-    calls += [(programs[1], ["-i", path.name, "-nt", "1"]) for path in sorted(folder.glob(f"{name}_000[1-9].rad"))]
+    calls += [
+        (programs[1], ["-i", path.name, "-nt", "1"])
+        for path in sorted(folder.glob(f"{name}_000[1-9].rad"))
+    ]
     for program, arguments in calls:
         script = 'ulimit -s unlimited; exec "$@"'
         result = subprocess.run(
@@ -82,12 +98,18 @@ def solve(folder: Path, name: str) -> None:
             cwd=folder, env=environment, capture_output=True, text=True, check=False,
         )  # fmt: skip
         ended = ("NORMAL TERMINATION", "TERMINATION WITH WARNING")
-        assert any(words in result.stdout for words in ended), result.stdout[-2000:] + result.stderr
+        assert any(words in result.stdout for words in ended), (
+            result.stdout[-2000:] + result.stderr
+        )
 
 
 @pytest.mark.parametrize(
     ("windows", "vibrates"),
-    [([(0.004, 0.012)], True), ([(0.003, 0.006), (0.009, 0.014)], True), ([(0.0, 0.005)], False)],
+    [
+        ([(0.004, 0.012)], True),
+        ([(0.003, 0.006), (0.009, 0.014)], True),
+        ([(0.0, 0.005)], False),
+    ],
     ids=["one", "two", "from 0: then nothing ever deforms the strip"],
 )
 def test_printed_legs_run_to_the_end_and_are_rigid_in_their_windows(
@@ -100,8 +122,12 @@ def test_printed_legs_run_to_the_end_and_are_rigid_in_their_windows(
     card = cards(windows, Printing(node=(MAIN,), end=END, name="strip"), "radioss")
     main, *legs = write_deck(str(reference / "strip_0000.rad"), card, str(switched))
     checked = check_deck(main)
-    assert [one.rule for one in checked.findings] == ([] if vibrates else ["D2R407"])  # its main node is not moved
-    assert [(window.part, window.tr, window.td) for window in checked.windows] == [(1, *times) for times in windows]
+    assert [one.rule for one in checked.findings] == (
+        [] if vibrates else ["D2R407"]
+    )  # its main node is not moved
+    assert [(window.part, window.tr, window.td) for window in checked.windows] == [
+        (1, *times) for times in windows
+    ]
     solve(switched, "strip")
     histories = sorted(map(str, switched.glob("stripT0?")))
     assert len(histories) == len(legs)
@@ -111,9 +137,13 @@ def test_printed_legs_run_to_the_end_and_are_rigid_in_their_windows(
     for tr, td in windows:
         held = (history.time > tr + 4e-5) & (history.time < td - 4e-5)
         assert held.sum() > 50
-        assert np.ptp(history.energy[held]) <= 1e-9 * history.energy.max()  # what is locked in stays as it is
+        assert (
+            np.ptp(history.energy[held]) <= 1e-9 * history.energy.max()
+        )  # what is locked in stays as it is
         inside |= held
-    assert bool(np.ptp(history.energy[~inside]) > 0.5 * history.energy.max()) == vibrates
+    assert (
+        bool(np.ptp(history.energy[~inside]) > 0.5 * history.energy.max()) == vibrates
+    )
     assert (history.energy.max() > 0.1) == vibrates  # [J]
 
 
@@ -126,9 +156,17 @@ def test_sensors_switch_in_one_run_as_legs_do(tmp_path: Path) -> None:
     energies = {}
     for solver in ("radioss", "radioss-sensors"):
         # the cap of one run holds while it is deformable, too, where the step is 1.7e-5
-        card = cards(windows, Printing(node=(MAIN,), end=END, name="strip", step_cap=2.5e-5), solver)
-        main = write_deck(str(reference / "strip_0000.rad"), card, str(tmp_path / solver))[0]
-        assert [(window.tr, window.td) for window in check_deck(main).windows] == windows
+        card = cards(
+            windows,
+            Printing(node=(MAIN,), end=END, name="strip", step_cap=2.5e-5),
+            solver,
+        )
+        main = write_deck(
+            str(reference / "strip_0000.rad"), card, str(tmp_path / solver)
+        )[0]
+        assert [
+            (window.tr, window.td) for window in check_deck(main).windows
+        ] == windows
         solve(tmp_path / solver, "strip")
         histories = sorted(map(str, (tmp_path / solver).glob("stripT0?")))
         energies[solver] = open_run(histories).history(Selection(parts=("1",)))
@@ -138,8 +176,13 @@ def test_sensors_switch_in_one_run_as_legs_do(tmp_path: Path) -> None:
         before = int(np.searchsorted(history.time, windows[0][0] - 4e-5))
         assert before > 50
         np.testing.assert_array_equal(history.energy[:before], plain.energy[:before])
-        for tr, td in windows:  # at which step it becomes rigid differs, and with it the energy that is locked in
-            held = history.energy[(history.time > tr + 6e-5) & (history.time < td - 6e-5)]
+        for (
+            tr,
+            td,
+        ) in windows:  # at which step it becomes rigid differs, and with it the energy that is locked in
+            held = history.energy[
+                (history.time > tr + 6e-5) & (history.time < td - 6e-5)
+            ]
             assert held.size > 50
             assert np.ptp(held) <= 1e-9 * history.energy.max()
 
@@ -147,18 +190,28 @@ def test_sensors_switch_in_one_run_as_legs_do(tmp_path: Path) -> None:
 def test_a_first_run_switches_itself_at_the_same_step_twice(tmp_path: Path) -> None:
     """The strip flies 20 mm to a wall, at 5 m/s: rigid after the wait, and released by the force of the wall."""
     head, _, rest = starter().partition("/RBODY/1")
-    reals = [wide(*row, width=WIDE) for row in ((0.0, 0.0, 0.0), (0.0, 0.0, -0.02), (0.0, 0.0, 1.0))]
+    reals = [
+        wide(*row, width=WIDE)
+        for row in ((0.0, 0.0, 0.0), (0.0, 0.0, -0.02), (0.0, 0.0, 1.0))
+    ]
     wall = f"/GRNOD/NODE/5\nall\n{wide(*range(1, 11))}/RWALL/PLANE/8\nground\n{wide(0, 0, 5, 0)}{''.join(reals)}"
     thrown = f"/INIVEL/TRA/3\nthrown\n{wide(0.0, 0.0, -5.0, width=WIDE)[:-1]}{wide(5)}"
     reference = tmp_path / "reference"
     reference.mkdir()
-    (reference / "strip_0000.rad").write_text(f"{head}{wall}{thrown}{rest[rest.index('/TH/PART') :]}")
-    (reference / "strip_0001.rad").write_text(f"/RUN/strip/1\n{END}\n/VERS/2022\n/DT\n0.9 0.0\n/TFILE/4\n2e-05\n")
+    (reference / "strip_0000.rad").write_text(
+        f"{head}{wall}{thrown}{rest[rest.index('/TH/PART') :]}"
+    )
+    (reference / "strip_0001.rad").write_text(
+        f"/RUN/strip/1\n{END}\n/VERS/2022\n/DT\n0.9 0.0\n/TFILE/4\n2e-05\n"
+    )
     ends = []
     for name in ("one", "other"):
         d2.first(reference / "strip_0000.rad", tmp_path / name, parts=1, wait=0.003)
         solve(tmp_path / name, "strip")
-        times = [open_run([str(tmp_path / name / f"stripT0{leg}")]).history(Selection()).time for leg in (1, 2, 3)]
+        times = [
+            open_run([str(tmp_path / name / f"stripT0{leg}")]).history(Selection()).time
+            for leg in (1, 2, 3)
+        ]
         ends.append([time[-1] for time in times])
     assert ends[0] == ends[1]
     assert ends[0] == [pytest.approx(one, abs=5e-5) for one in (0.003, 0.004, END)]

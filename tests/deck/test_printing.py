@@ -19,7 +19,13 @@ from tests.decks import found, read, spans, write
 
 TIMES = st.floats(1e-9, 1e9)
 # Something pushes from the end of each window in the test to the next one.
-ALL = Printing(part=(11,), node=(1001,), end=1e6, contact=3, pushed=((0.09, 0.2), (0.3, 0.5), (0.75, 0.8)))
+ALL = Printing(
+    part=(11,),
+    node=(1001,),
+    end=1e6,
+    contact=3,
+    pushed=((0.09, 0.2), (0.3, 0.5), (0.75, 0.8)),
+)
 
 
 @given(st.integers(-9999, 99999), st.integers(-3, 3))
@@ -33,9 +39,13 @@ def test_few_digits_read_back(digits: int, exponent: int) -> None:
 def test_the_nearest_text_is_taken(value: float) -> None:
     text = shortest(value)
     assert len(text) <= LONGEST
-    others = [f"{value:.{n}f}" for n in range(12)] + [f"{value:.{n}g}" for n in range(1, 12)]
+    others = [f"{value:.{n}f}" for n in range(12)] + [
+        f"{value:.{n}g}" for n in range(1, 12)
+    ]
     others += [other.removeprefix("0") for other in others if "." in other]
-    assert abs(float(text) - value) <= min(abs(float(other) - value) for other in others if len(other) <= LONGEST)
+    assert abs(float(text) - value) <= min(
+        abs(float(other) - value) for other in others if len(other) <= LONGEST
+    )
 
 
 def test_a_number_too_wide_is_refused() -> None:
@@ -72,7 +82,9 @@ def test_every_solver_prints_what_it_is_given(solver: str) -> None:
     assert card.windows == tuple(windows)
     assert " a\\nremark\n" in card.text
     assert all("cycles at least" in note for note in card.notes)
-    assert len(card.notes) == (solver in ("radioss-sensors", "radioss-contact"))  # one step for the whole run
+    assert len(card.notes) == (
+        solver in ("radioss-sensors", "radioss-contact")
+    )  # one step for the whole run
     assert all(content in card.text for content in card.files.values())
     assert hasattr(ALL, SOLVERS[solver].switches)
     assert all(hasattr(ALL, name) for name in SOLVERS[solver].takes)
@@ -80,7 +92,9 @@ def test_every_solver_prints_what_it_is_given(solver: str) -> None:
 
 def test_the_solver_is_that_of_the_history() -> None:
     formats = {name: solver_of(name) for name in READERS}
-    assert {name for name, solver in formats.items() if solver == "radioss"} == {"radioss-th"}
+    assert {name for name, solver in formats.items() if solver == "radioss"} == {
+        "radioss-th"
+    }
     assert solver_of("glstat + matsum") == "ls-dyna"
     claimed = [name for solver in SOLVERS.values() for name in solver.histories]
     assert len(claimed) == len(set(claimed))
@@ -94,7 +108,10 @@ def test_the_command_line_offers_the_solvers_there_are() -> None:
 
 
 def test_a_file_of_windows() -> None:
-    assert read_windows("# tr td\n0.02 0.09\n\n .2  3e-1\n", "w.txt") == ((0.02, 0.09), (0.2, 0.3))
+    assert read_windows("# tr td\n0.02 0.09\n\n .2  3e-1\n", "w.txt") == (
+        (0.02, 0.09),
+        (0.2, 0.3),
+    )
     assert check_windows([(-0.0, 1.0)])[0][0].hex() == "0x0.0p+0"
 
 
@@ -103,17 +120,22 @@ def test_windows_are_read_from_the_journal_of_a_driven_run() -> None:
     legs = [("load", 1, 0.0, 0.06), ("probe", 2, 0.06, 0.1), ("probe", 3, 0.1, 0.2), ("rigid", 3, 0.1, 0.145),
             ("load", 4, 0.145, 0.16), ("probe", 5, 0.16, 0.17), ("load", 5, 0.16, 0.2), ("probe", 6, 0.2, 0.3),
             ("probe", 7, 0.3, 0.32), ("load", 7, 0.3, 0.4), ("load", 8, 0.4, 0.5)]  # fmt: skip
-    lines = [json.dumps({"event": "ended", "order": [*leg, 0.0], "seen": []}) for leg in legs]
+    lines = [
+        json.dumps({"event": "ended", "order": [*leg, 0.0], "seen": []}) for leg in legs
+    ]
     text = "\n".join(['{"event": "prepared"}', *lines, lines[-1][:40]])
     assert read_windows(text, "drive.ndjson") == ((0.06, 0.145), (0.2, 0.3))
-    back = "\n".join([*lines, '{"event": "back", "legs": 5}'])  # to before the second flight
+    back = "\n".join(
+        [*lines, '{"event": "back", "legs": 5}']
+    )  # to before the second flight
     assert read_windows(back, "drive.ndjson") == ((0.06, 0.145),)
     with pytest.raises(DeckError, match="no window was found"):
         read_windows('{"event": "prepared"}\n', "drive.ndjson")
 
 
 @pytest.mark.parametrize(
-    ("text", "message"), [("0.02\n", "w.txt:1: '0.02'"), ("1 2\na b\n", "w.txt:2"), ("", "w.txt: no")]
+    ("text", "message"),
+    [("0.02\n", "w.txt:1: '0.02'"), ("1 2\na b\n", "w.txt:2"), ("", "w.txt: no")],
 )
 def test_what_is_not_a_file_of_windows(text: str, message: str) -> None:
     with pytest.raises(DeckError, match=message):
@@ -158,7 +180,10 @@ def test_the_card_to_the_letter() -> None:
     st.lists(st.integers(1, 10**9 - 1), min_size=1, max_size=30, unique=True),
 )
 def test_the_check_finds_in_a_card_what_was_asked_for(
-    tmp_path_factory: pytest.TempPathFactory, start: float, factors: list[float], parts: list[int]
+    tmp_path_factory: pytest.TempPathFactory,
+    start: float,
+    factors: list[float],
+    parts: list[int],
 ) -> None:
     times = [start]
     for factor in factors:
@@ -167,9 +192,15 @@ def test_the_check_finds_in_a_card_what_was_asked_for(
     card = cards(windows, Printing(part=tuple(parts), merge=parts[-1]))
     folder = tmp_path_factory.mktemp("card")
     assert check_deck(write(folder, card.text)).findings == ()
-    assert spans(read(folder, card.text)) == [(part, tr, td) for part in sorted(parts) for tr, td in card.windows]
+    assert spans(read(folder, card.text)) == [
+        (part, tr, td) for part in sorted(parts) for tr, td in card.windows
+    ]
     assert all(len(line) <= 100 for line in card.text.split("\n"))
-    assert all(a == " " or b == " " for row in rows(card.text) for a, b in zip(row[9::10], row[10::10], strict=False))
+    assert all(
+        a == " " or b == " "
+        for row in rows(card.text)
+        for a, b in zip(row[9::10], row[10::10], strict=False)
+    )
 
 
 def test_rounding_is_reported() -> None:
@@ -193,10 +224,12 @@ def test_warnings_are_those_that_apply() -> None:
 
 
 def test_every_window_has_sets_of_its_own(tmp_path: Path) -> None:
-    text = cards([(0.02, 0.09), (0.2, 0.3), (0.4, 0.5)], MERGED._replace(swset=(8, 7))).text
-    assert re.findall(r"^ +(\d+) +0 +\S+ +0.0 +0.0 +0 +0 +0$", text, flags=re.MULTILINE) == [
-        *("8", "7", "9", "10", "11", "12")
-    ]
+    text = cards(
+        [(0.02, 0.09), (0.2, 0.3), (0.4, 0.5)], MERGED._replace(swset=(8, 7))
+    ).text
+    assert re.findall(
+        r"^ +(\d+) +0 +\S+ +0.0 +0.0 +0 +0 +0$", text, flags=re.MULTILINE
+    ) == [*("8", "7", "9", "10", "11", "12")]
     assert not found(tmp_path, text)
 
 
@@ -214,7 +247,11 @@ def test_three_engine_files() -> None:
         ["/RUN/run/3", "                0.15", "/RBODY/OFF"],
     ]
     assert [leg[3:5] for leg in parts] == [["1 2 3 4 5 6 7 8 9 10", "11 12"]] * 3
-    assert ["/DTIX\n5.1e-05 5.1e-05" in leg for leg in card.files.values()] == [False, True, False]
+    assert ["/DTIX\n5.1e-05 5.1e-05" in leg for leg in card.files.values()] == [
+        False,
+        True,
+        False,
+    ]
     assert re.findall(r"# ---- (\S+)", card.text) == list(card.files)
     capped = radioss_cards([(0.01, 0.02)], Printing(node=(1,), end=0.03, step_cap=1e-6))
     assert "/DTIX\n1e-06 1e-06" in capped.text
@@ -223,7 +260,12 @@ def test_three_engine_files() -> None:
 def test_every_window_has_a_leg_and_one_from_the_start_none_before_it() -> None:
     card = radioss_cards([(0.0, 0.02), (0.05, 0.09)], BOX)
     found = re.findall(r"/RUN/run/(\d)\n +(\S+)\n/RBODY/(\w+)", card.text)
-    assert found == [("1", "0.02", "ON"), ("2", "0.05", "OFF"), ("3", "0.09", "ON"), ("4", "0.15", "OFF")]
+    assert found == [
+        ("1", "0.02", "ON"),
+        ("2", "0.05", "OFF"),
+        ("3", "0.09", "ON"),
+        ("4", "0.15", "OFF"),
+    ]
 
 
 ONE, LONE = [(0.02, 0.09)], Printing(node=(1,))
@@ -238,13 +280,23 @@ ONE, LONE = [(0.02, 0.09)], Printing(node=(1,))
         ("ls-dyna", ONE, PARTS._replace(merge=10**9), "id 1000000000 does not fit"),
         ("ls-dyna", ONE, PARTS._replace(swset=(5, 5)), "both switch sets are 5"),
         ("ls-dyna", [(1.0000000001, 1.0000000002)], PARTS, "different times"),
-        ("ls-dyna", [(1.0, 2.00000000001), (2.00000000002, 3.0)], PARTS, "different times"),
+        (
+            "ls-dyna",
+            [(1.0, 2.00000000001), (2.00000000002, 3.0)],
+            PARTS,
+            "different times",
+        ),
         ("radioss", ONE, LONE._replace(end=0.05), "the run ends at 0.05"),
         ("radioss", ONE, LONE, "not given"),
         ("radioss", ONE, LONE._replace(end=float("inf")), "the run ends"),
         ("radioss", ONE, Printing(end=1.0), "no id was given"),
         ("radioss", ONE, LONE._replace(end=1.0, name="a/b"), "the name of the run"),
-        ("radioss", [(i, i + 0.5) for i in range(1, 60)], LONE._replace(end=100.0), "at most 99"),
+        (
+            "radioss",
+            [(i, i + 0.5) for i in range(1, 60)],
+            LONE._replace(end=100.0),
+            "at most 99",
+        ),
     ],
 )
 def test_what_a_solver_cannot_be_told_is_refused(

@@ -54,7 +54,11 @@ def text_of(written: Written) -> str:
 
     def line(*values: object) -> str:
         texts = [str(value) for value in values]
-        return ",".join(texts) if written.style == "comma" else "".join(text.rjust(width) for text in texts)
+        return (
+            ",".join(texts)
+            if written.style == "comma"
+            else "".join(text.rjust(width) for text in texts)
+        )
 
     swset = 0
     for part, *times in written.windows:
@@ -88,7 +92,9 @@ def test_offsets_move_every_window(written: Written) -> None:
     outer = f"*INCLUDE_TRANSFORM\ninner.k\n{0:10d}{0:10d}{written.offset:10d}\n"
     with TemporaryDirectory() as folder:
         deck = read(Path(folder), outer, {"inner.k": text_of(written)})
-        assert spans(deck) == [(part + written.offset, tr, td) for part, tr, td in written.windows]
+        assert spans(deck) == [
+            (part + written.offset, tr, td) for part, tr, td in written.windows
+        ]
 
 
 def survives(content: bytes) -> None:
@@ -128,7 +134,9 @@ def test_a_good_deck_with_damage(data: st.DataObject) -> None:
     content = bytearray(GOOD.encode())
     for _ in range(data.draw(st.integers(1, 5))):
         at = data.draw(st.integers(0, len(content) - 1))
-        content[at : at + data.draw(st.integers(0, 12))] = data.draw(st.binary(max_size=12))
+        content[at : at + data.draw(st.integers(0, 12))] = data.draw(
+            st.binary(max_size=12)
+        )
     survives(bytes(content))
 
 

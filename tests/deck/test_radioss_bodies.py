@@ -25,22 +25,44 @@ def quad(part: int, left: float) -> tuple[str, str]:
     """Nodes and shell of a square part of side 1 from x = left on, and its /PART."""
     ids = [10 * part + i for i in range(4)]
     corners = ((left, 0.0), (left + 1, 0.0), (left + 1, 1.0), (left, 1.0))
-    nodes = "".join(wide(n)[:-1] + wide(x, y, 0.0, width=REAL) for n, (x, y) in zip(ids, corners, strict=True))
-    return nodes, f"/PART/{part}\np{part}\n{wide(part, 1)}/SHELL/{part}\n{wide(part, *ids)}"
+    nodes = "".join(
+        wide(n)[:-1] + wide(x, y, 0.0, width=REAL)
+        for n, (x, y) in zip(ids, corners, strict=True)
+    )
+    return (
+        nodes,
+        f"/PART/{part}\np{part}\n{wide(part, 1)}/SHELL/{part}\n{wide(part, *ids)}",
+    )
 
 
 def starter(more: str = "", thickness: tuple[float, ...] = (1.0, 2.0, 1.0)) -> str:
     """Parts 1 and 2 on springs (part 4), part 3 apart from them."""
-    nodes, parts = zip(*(quad(part, left) for part, left in ((1, 0.0), (2, 2.0), (3, 9.0))), strict=True)
-    text = "#RADIOSS STARTER\n/BEGIN\nbox\n" + wide(2022, 0) + 2 * wide("kg", "m", "s", width=REAL)
+    nodes, parts = zip(
+        *(quad(part, left) for part, left in ((1, 0.0), (2, 2.0), (3, 9.0))),
+        strict=True,
+    )
+    text = (
+        "#RADIOSS STARTER\n/BEGIN\nbox\n"
+        + wide(2022, 0)
+        + 2 * wide("kg", "m", "s", width=REAL)
+    )
     text += f"/MAT/ELAST/1\nsteel\n{wide(7850.0, width=REAL)}{wide(2.1e11, 0.3, width=REAL)}"
     for part, depth in enumerate(thickness, start=1):
         text += (
-            f"/PROP/SHELL/{part}\nshell\n{wide(24)}{wide(0.0, width=REAL)}{wide(3, 0)[:-1]}{wide(depth, width=REAL)}"
+            f"/PROP/SHELL/{part}\nshell\n"
+            f"{wide(24)}{wide(0.0, width=REAL)}{wide(3, 0)[:-1]}{wide(depth, width=REAL)}"
         )
     text += f"/PROP/SPRING/4\nspring\n{wide(0.0, width=REAL)}{wide(1e4, width=REAL)}"
-    text += "/NODE\n" + "".join(nodes) + wide(99)[:-1] + wide(1.5, 0.5, 0.1, width=REAL) + "".join(parts)
-    return text + f"/PART/4\nspring\n{wide(4, 1)}/SPRING/4\n{wide(41, 11, 20)}{more}/END\n"
+    text += (
+        "/NODE\n"
+        + "".join(nodes)
+        + wide(99)[:-1]
+        + wide(1.5, 0.5, 0.1, width=REAL)
+        + "".join(parts)
+    )
+    return (
+        text + f"/PART/4\nspring\n{wide(4, 1)}/SPRING/4\n{wide(41, 11, 20)}{more}/END\n"
+    )
 
 
 def deck(folder: Path, more: str = "", engine: str = ENGINE) -> str:
@@ -55,19 +77,25 @@ def group(number: int, *ids: int, kind: str = "NODE") -> str:
 
 
 def velocity(number: int) -> str:
-    return f"/INIVEL/TRA/3\nthrown\n{wide(10.0, 0.0, 0.0, width=REAL)[:-1]}{wide(number)}"
+    return (
+        f"/INIVEL/TRA/3\nthrown\n{wide(10.0, 0.0, 0.0, width=REAL)[:-1]}{wide(number)}"
+    )
 
 
 def gravity(number: int) -> str:
     return f"/GRAV/5\ndown\n{wide(0, 'Z', 0, 0, number)[:-1]}{wide(1.0, -9.81, width=REAL)}"
 
 
-def written(tmp_path: Path, more: str = "", parts: tuple[int, ...] = ALL) -> tuple[tuple[int, ...], Run, str]:
+def written(
+    tmp_path: Path, more: str = "", parts: tuple[int, ...] = ALL
+) -> tuple[tuple[int, ...], Run, str]:
     """Write the deck with the bodies, and read it again."""
     main = deck(tmp_path / "deck", more)
     found = bodies_for(main, parts)
     printing = Printing(node=found.nodes, end=0.4, name="box", starter=found.cards)
-    name = write_deck(main, cards([(0.1, 0.2)], printing, "radioss"), str(tmp_path / "next"))[0]
+    name = write_deck(
+        main, cards([(0.1, 0.2)], printing, "radioss"), str(tmp_path / "next")
+    )[0]
     return found.nodes, read_run(name), name
 
 
@@ -83,8 +111,13 @@ def test_each_group_of_joined_parts_gets_a_body(tmp_path: Path) -> None:
     assert after.endswith("/END\n")
     checked = check_deck(name)
     assert not checked.findings
-    assert {(w.part, w.tr, w.td) for w in checked.windows} == {(part, 0.1, 0.2) for part in ALL}
-    assert f"/RBODY/OFF\n{nodes[0]} {nodes[1]}\n" in (Path(name).parent / "box_0001.rad").read_text()
+    assert {(w.part, w.tr, w.td) for w in checked.windows} == {
+        (part, 0.1, 0.2) for part in ALL
+    }
+    assert (
+        f"/RBODY/OFF\n{nodes[0]} {nodes[1]}\n"
+        in (Path(name).parent / "box_0001.rad").read_text()
+    )
 
 
 def test_the_main_node_lies_at_the_centre_of_mass(tmp_path: Path) -> None:
@@ -93,17 +126,31 @@ def test_the_main_node_lies_at_the_centre_of_mass(tmp_path: Path) -> None:
     assert run.starter
     ids, places = nodes_of(run.starter.named("NODE"))
     own = [places[ids == node][0].tolist() for node in nodes]
-    assert own == [pytest.approx([(0.5 + 2 * 2.5) / 3, 0.5, 0.0], abs=1e-9), pytest.approx([9.5, 0.5, 0.0], abs=1e-9)]
+    assert own == [
+        pytest.approx([(0.5 + 2 * 2.5) / 3, 0.5, 0.0], abs=1e-9),
+        pytest.approx([9.5, 0.5, 0.0], abs=1e-9),
+    ]
 
 
 def test_what_moves_and_pulls_the_parts_acts_on_the_main_nodes(tmp_path: Path) -> None:
     """Else the starter puts the bodies at rest (D2R407), and gravity leaves them alone."""
     everything = group(1, *(10 * part + i for part in (1, 2, 3) for i in range(4)))
-    wall = "/RWALL/PLANE/3\nground\n" + wide(0, 0, 1, 0) + 2 * wide(0.0, 0.0, 0.0, width=REAL)
-    nodes, run, name = written(tmp_path, everything + velocity(1) + gravity(1) + wall + wide(0.0, 0.0, 1.0, width=REAL))
+    wall = (
+        "/RWALL/PLANE/3\nground\n"
+        + wide(0, 0, 1, 0)
+        + 2 * wide(0.0, 0.0, 0.0, width=REAL)
+    )
+    nodes, run, name = written(
+        tmp_path,
+        everything + velocity(1) + gravity(1) + wall + wide(0.0, 0.0, 1.0, width=REAL),
+    )
     assert not check_deck(name).findings
     assert run.starter
-    pulled = {number for card in run.starter.named("GRAV") for number in [card.integer(card.rows[1], 4).value]}
+    pulled = {
+        number
+        for card in run.starter.named("GRAV")
+        for number in [card.integer(card.rows[1], 4).value]
+    }
     members = [run.starter.group_members(number) for number in sorted(pulled)]
     assert [one and one[0] for one in members[1:]] == [{node} for node in nodes]
     ids = [body.id for body in run.starter.bodies]
@@ -115,7 +162,9 @@ def test_gravity_that_acts_on_all_nodes_needs_nothing_more(tmp_path: Path) -> No
 
 
 def test_a_body_that_the_deck_has_is_taken(tmp_path: Path) -> None:
-    main = deck(tmp_path, group(70, 1, 2, 4, kind="PART") + BODY, ENGINE + "/RBODY/OFF\n99\n")
+    main = deck(
+        tmp_path, group(70, 1, 2, 4, kind="PART") + BODY, ENGINE + "/RBODY/OFF\n99\n"
+    )
     assert bodies_for(main, (1, 2, 4)) == Bodies((99,))
     found = bodies_for(main, ALL)
     assert found.nodes == (99, 100)
@@ -125,14 +174,30 @@ def test_a_body_that_the_deck_has_is_taken(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("held", [(1,), (1, 2, 3, 4)])
-def test_a_body_that_is_never_rigid_gives_its_nodes_to_the_new_one(tmp_path: Path, held: tuple[int, ...]) -> None:
+def test_a_body_that_is_never_rigid_gives_its_nodes_to_the_new_one(
+    tmp_path: Path, held: tuple[int, ...]
+) -> None:
     """A set of parts can be written whatever bodies the deck has for other sets, if its run never puts these on."""
-    main = deck(tmp_path / "deck", group(70, *held, kind="PART") + BODY, ENGINE + "/RBODY/OFF\n99\n")
+    main = deck(
+        tmp_path / "deck",
+        group(70, *held, kind="PART") + BODY,
+        ENGINE + "/RBODY/OFF\n99\n",
+    )
     found = bodies_for(main, (1, 2, 4))
     assert (found.nodes, found.replaced) == ((100,), (99,))
-    assert "/RBODY 7, which every leg of the run keeps off, has to go" in found.notes[-1]
-    printing = Printing(node=found.nodes, end=0.4, name="box", starter=found.cards, replaced=found.replaced)
-    name = write_deck(main, cards([(0.1, 0.2)], printing, "radioss"), str(tmp_path / "next"))[0]
+    assert (
+        "/RBODY 7, which every leg of the run keeps off, has to go" in found.notes[-1]
+    )
+    printing = Printing(
+        node=found.nodes,
+        end=0.4,
+        name="box",
+        starter=found.cards,
+        replaced=found.replaced,
+    )
+    name = write_deck(
+        main, cards([(0.1, 0.2)], printing, "radioss"), str(tmp_path / "next")
+    )[0]
     starter_of_copy = read_run(name).starter
     assert starter_of_copy
     assert [body.id for body in starter_of_copy.bodies] == [8]
@@ -145,7 +210,9 @@ def test_a_body_that_is_never_rigid_gives_its_nodes_to_the_new_one(tmp_path: Pat
 def test_a_body_that_is_rigid_at_some_time_stays(tmp_path: Path) -> None:
     engine = ENGINE + "/RBODY/OFF\n99\n"
     main = deck(tmp_path, group(70, 1, kind="PART") + BODY, engine)
-    (tmp_path / "box_0002.rad").write_text(ENGINE.replace("box/1", "box/2") + "/RBODY/ON\n99\n")
+    (tmp_path / "box_0002.rad").write_text(
+        ENGINE.replace("box/1", "box/2") + "/RBODY/ON\n99\n"
+    )
     with pytest.raises(DeckError, match="not these parts alone and whole"):
         bodies_for(main, (1, 2, 4))
 
@@ -153,19 +220,30 @@ def test_a_body_that_is_rigid_at_some_time_stays(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        (group(70, 2, kind="PART") + BODY, r"box_0000.rad:\d+: /RBODY 7 holds nodes of parts 1, 2"),
+        (
+            group(70, 2, kind="PART") + BODY,
+            r"box_0000.rad:\d+: /RBODY 7 holds nodes of parts 1, 2",
+        ),
         (group(70, 10, 11) + BODY, "not these parts alone and whole"),
         (group(70, 1, 2, 3, kind="PART") + BODY, "not these parts alone and whole"),
-        (group(70, 1, 2, kind="PART") + BODY.replace("99         0", "99         4"), "sensor 4 already"),
+        (
+            group(70, 1, 2, kind="PART") + BODY.replace("99         0", "99         4"),
+            "sensor 4 already",
+        ),
         ("/GRNOD/BOX/70\nbox\n         1\n" + BODY, "nodes of /RBODY 7 are not known"),
-        (group(1, 10, 11) + velocity(1), "does not move all nodes of parts 1, 2, 4 as one body"),
+        (
+            group(1, 10, 11) + velocity(1),
+            "does not move all nodes of parts 1, 2, 4 as one body",
+        ),
         ("/INIVEL/NODE/1\nthrown\n" + wide(20), "does not move all nodes"),
         ("/TRANSFORM/TRA/1\nmoved\n", "/TRANSFORM moves nodes"),
         ("//SUBMODEL/1\nother\n", "ids of a //SUBMODEL may be moved"),
         ("#include other.inc\n", "other.inc was not read"),
     ],
 )
-def test_what_cannot_be_done_is_refused_in_one_line(tmp_path: Path, more: str, message: str) -> None:
+def test_what_cannot_be_done_is_refused_in_one_line(
+    tmp_path: Path, more: str, message: str
+) -> None:
     with pytest.raises(DeckError, match=message) as refusal:
         bodies_for(deck(tmp_path, more), (1, 2, 4))
     assert "\n" not in str(refusal.value)

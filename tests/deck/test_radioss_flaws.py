@@ -22,9 +22,13 @@ SENSOR = f"/SENSOR/TIME/5\nclock\n{wide(0.001, 0.002, width=WIDE)}"
 
 def flaws(folder: Path, more: str = "", *legs: str, deck: str = "") -> tuple[Flaw, ...]:
     """Flaws of the strip with more cards in its starter deck; ``legs`` are the lines of each below /RUN."""
-    (folder / "strip_0000.rad").write_text((deck or starter()).replace("/TH/PART/1", f"{more}/TH/PART/1"))
+    (folder / "strip_0000.rad").write_text(
+        (deck or starter()).replace("/TH/PART/1", f"{more}/TH/PART/1")
+    )
     for number, text in enumerate(legs or (OFF,), start=1):
-        (folder / f"strip_{number:04d}.rad").write_text(f"/RUN/strip/{number}\n{number / 1000}\n{text}")
+        (folder / f"strip_{number:04d}.rad").write_text(
+            f"/RUN/strip/{number}\n{number / 1000}\n{text}"
+        )
     return flaws_of(read_run(str(folder / "strip_0000.rad")), {MAIN})
 
 
@@ -32,7 +36,13 @@ def codes(found: tuple[Flaw, ...]) -> list[str]:
     return [flaw.code for flaw in found]
 
 
-def wall(kind: str, reach: float, *points: tuple[float, ...], diameter: float = 0.0, fields: str = "") -> str:
+def wall(
+    kind: str,
+    reach: float,
+    *points: tuple[float, ...],
+    diameter: float = 0.0,
+    fields: str = "",
+) -> str:
     sizes = wide(reach, 0.0, diameter, 0.0, width=WIDE)[:-1] + wide(0)
     return f"/RWALL/{kind}\nwall\n{fields or wide(0, 0, 0, 0)}{sizes}" + "".join(
         wide(*one, width=WIDE) for one in points
@@ -49,15 +59,44 @@ def wall(kind: str, reach: float, *points: tuple[float, ...], diameter: float = 
         (wall("CYL/1", 0.1, (-0.1, 0, 0), (1, 0, 0), diameter=0.02), 5),
         (wall("SPHER/1", 0.2, (0, 0, 0), diameter=0.1), 5),
         (wall("PARAL/1", 0.1, (0.15, 0, -1), (0.15, 1, -1), (0.15, 0, 1)), 2),
-        (wall("PARAL/1", 0.1, (0.15, 0, -1), (0.15, 0, 1), (0.15, 1, -1), fields=wide(0, 0, 2, 0)), 4),
-        (wall("PLANE/1", 0.25, (1, 0, 0, 0), (1, 0.05, 0.01), fields=wide(MAIN, 0, 0, 0)), 6),
+        (
+            wall(
+                "PARAL/1",
+                0.1,
+                (0.15, 0, -1),
+                (0.15, 0, 1),
+                (0.15, 1, -1),
+                fields=wide(0, 0, 2, 0),
+            ),
+            4,
+        ),
+        (
+            wall(
+                "PLANE/1",
+                0.25,
+                (1, 0, 0, 0),
+                (1, 0.05, 0.01),
+                fields=wide(MAIN, 0, 0, 0),
+            ),
+            6,
+        ),
         (wall("LAGMUL/PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0)), 4),
-        ("/GRNOD/PART/77\nall\n" + wide(1) + wall("PLANE/1", 0, (0, 0, 0), (1, 0, 0), fields=wide(0, 0, 77, 0)), 10),
-        (wall("PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0), fields=wide(0, 0, 0, 0, 1)), 4),  # Iform is none before 2026
+        (
+            "/GRNOD/PART/77\nall\n"
+            + wide(1)
+            + wall("PLANE/1", 0, (0, 0, 0), (1, 0, 0), fields=wide(0, 0, 77, 0)),
+            10,
+        ),
+        (
+            wall("PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0), fields=wide(0, 0, 0, 0, 1)),
+            4,
+        ),  # Iform is none before 2026
     ],
     ids=lambda text: text.split("\n", 1)[0] if isinstance(text, str) else "",
 )
-def test_as_many_nodes_are_taken_from_a_wall_as_the_starter_reports(tmp_path: Path, text: str, taken: int) -> None:
+def test_as_many_nodes_are_taken_from_a_wall_as_the_starter_reports(
+    tmp_path: Path, text: str, taken: int
+) -> None:
     (found,) = flaws(tmp_path, text)
     assert found.code == THROUGH_WALL
     assert f"takes {taken} of" in found.message
@@ -71,12 +110,22 @@ def with_ikrem(deck: str, value: int = 1) -> str:
     return deck.replace(wide(1, 0, 0, 0), wide(1, value, 0, 0))
 
 
-def test_a_wall_keeps_nodes_by_the_ikrem_of_the_body_and_of_that_with_the_highest_id(tmp_path: Path) -> None:
-    other = "/NODE\n" + wide(98)[:-1] + wide(0.2, 0.05, 0.05, width=WIDE) + "/RBODY/{}\nother\n" + wide(98)
+def test_a_wall_keeps_nodes_by_the_ikrem_of_the_body_and_of_that_with_the_highest_id(
+    tmp_path: Path,
+) -> None:
+    other = (
+        "/NODE\n"
+        + wide(98)[:-1]
+        + wide(0.2, 0.05, 0.05, width=WIDE)
+        + "/RBODY/{}\nother\n"
+        + wide(98)
+    )
     assert codes(flaws(tmp_path, GROUND)) == [THROUGH_WALL]
     assert flaws(tmp_path, GROUND, deck=with_ikrem(starter())) == ()
     higher, lower = other.format(2), other.format(2)
-    assert codes(flaws(tmp_path, GROUND + higher, deck=with_ikrem(starter()))) == [THROUGH_WALL]
+    assert codes(flaws(tmp_path, GROUND + higher, deck=with_ikrem(starter()))) == [
+        THROUGH_WALL
+    ]
     deck = with_ikrem(starter()).replace("/RBODY/1", "/RBODY/3")
     assert flaws(tmp_path, GROUND + lower, deck=deck) == ()
 
@@ -88,7 +137,12 @@ def test_a_wall_keeps_the_nodes_of_a_body_with_a_sensor(tmp_path: Path) -> None:
 
 def test_a_wall_with_the_penalty_formulation_keeps_its_nodes(tmp_path: Path) -> None:
     deck = starter().replace(wide(2022, 0), wide(2026, 0))
-    assert flaws(tmp_path, GROUND.replace(wide(0, 0, 0, 0), wide(0, 0, 0, 0, 1)), deck=deck) == ()
+    assert (
+        flaws(
+            tmp_path, GROUND.replace(wide(0, 0, 0, 0), wide(0, 0, 0, 0, 1)), deck=deck
+        )
+        == ()
+    )
     assert codes(flaws(tmp_path, GROUND, deck=deck)) == [THROUGH_WALL]
 
 
@@ -114,16 +168,23 @@ MAINS = f"/GRNOD/NODE/98\nmain\n{wide(MAIN)}"
         (velocity(1) + velocity(98) + MAINS, True),
     ],
 )  # fmt: skip
-def test_a_body_that_the_starter_lets_rest_is_found(tmp_path: Path, text: str, moves: bool) -> None:
+def test_a_body_that_the_starter_lets_rest_is_found(
+    tmp_path: Path, text: str, moves: bool
+) -> None:
     for legs in ((OFF, ON), (ON, OFF)):
         assert codes(flaws(tmp_path, text, *legs)) == ([] if moves else [AT_REST])
 
 
-def test_a_velocity_that_comes_later_or_is_none_lets_no_body_rest(tmp_path: Path) -> None:
+def test_a_velocity_that_comes_later_or_is_none_lets_no_body_rest(
+    tmp_path: Path,
+) -> None:
     assert flaws(tmp_path, velocity(1) + wide(0.0005, width=WIDE)) == ()
     assert flaws(tmp_path, velocity(1) + wide("", "", 5)) == ()
     assert flaws(tmp_path, velocity(1).replace("10.0", " 0.0")) == ()
-    assert flaws(tmp_path, "/INIVEL/FVM/1\nfluid\n" + wide(10.0, 0.0, 0.0, width=WIDE)) == ()
+    assert (
+        flaws(tmp_path, "/INIVEL/FVM/1\nfluid\n" + wide(10.0, 0.0, 0.0, width=WIDE))
+        == ()
+    )
 
 
 def start(*nodes: int, type_: int = 1) -> str:
@@ -144,11 +205,15 @@ CAP = "/DTIX\n1e-5 1e-5\n"
         ((ON + CAP + "/INIV/AXIS/Z/1\n0\n0 0 0 10.0\n1 10\n", OFF), False),
     ],
 )  # fmt: skip
-def test_a_body_that_an_engine_file_lets_rest_is_found(tmp_path: Path, legs: tuple[str, ...], moves: bool) -> None:
+def test_a_body_that_an_engine_file_lets_rest_is_found(
+    tmp_path: Path, legs: tuple[str, ...], moves: bool
+) -> None:
     assert codes(flaws(tmp_path, ALL, *legs)) == ([] if moves else [AT_REST])
 
 
-def test_a_velocity_of_the_first_leg_stands_for_that_of_the_starter(tmp_path: Path) -> None:
+def test_a_velocity_of_the_first_leg_stands_for_that_of_the_starter(
+    tmp_path: Path,
+) -> None:
     """Of a body that is off its nodes are moved, whatever velocity the starter gave them."""
     assert flaws(tmp_path, velocity(1), OFF + start(1, 10)) == ()
 
@@ -156,7 +221,12 @@ def test_a_velocity_of_the_first_leg_stands_for_that_of_the_starter(tmp_path: Pa
 @pytest.mark.parametrize(
     ("text", "legs"),
     [
-        ("/GRNOD/BOX/8\nbox\n" + wide(1) + wall("PLANE/1", 0, (0, 0, 0), (1, 0, 0), fields=wide(0, 0, 8, 0)), ()),
+        (
+            "/GRNOD/BOX/8\nbox\n"
+            + wide(1)
+            + wall("PLANE/1", 0, (0, 0, 0), (1, 0, 0), fields=wide(0, 0, 8, 0)),
+            (),
+        ),
         (GROUND.replace(wide(0, 0, 0, 0), wide(0, 0, 0, 8)), ()),
         ("/TRANSFORM/TRA/1\n" + GROUND, ()),
         (wall("CONE/1", 0.1, (0, 0, 0), (1, 0, 0)), ()),
@@ -165,10 +235,15 @@ def test_a_velocity_of_the_first_leg_stands_for_that_of_the_starter(tmp_path: Pa
         (velocity(8), ()),
         ("", (ON + CAP + start(8, type_=2), OFF)),
         ("//SUBMODEL/1\nmoved\n" + velocity(1), ()),
-        (f"/PART/3\nfluid\n{wide(1, 1)}/SPHCEL/3\n{wide(1, 1)}/GRNOD/PART/8\nfluid\n{wide(3)}{velocity(8)}", ()),
+        (
+            f"/PART/3\nfluid\n{wide(1, 1)}/SPHCEL/3\n{wide(1, 1)}/GRNOD/PART/8\nfluid\n{wide(3)}{velocity(8)}",
+            (),
+        ),
     ],
 )
-def test_what_cannot_be_resolved_is_said_and_not_judged(tmp_path: Path, text: str, legs: tuple[str, ...]) -> None:
+def test_what_cannot_be_resolved_is_said_and_not_judged(
+    tmp_path: Path, text: str, legs: tuple[str, ...]
+) -> None:
     assert set(codes(flaws(tmp_path, text, *legs))) == {NOT_FOLLOWED}
 
 
@@ -192,4 +267,6 @@ def test_the_inventory_has_the_flaws_and_what_the_run_keeps_off(tmp_path: Path) 
     assert read_inventory(str(tmp_path / "strip_0000.rad")).kept_off == ()
     for name in ("strip_0001.rad", "strip_0002.rad"):
         (tmp_path / name).unlink()
-    assert codes(read_inventory(str(tmp_path / "strip_0000.rad")).flaws) == [AT_REST]  # any body may be switched
+    assert codes(read_inventory(str(tmp_path / "strip_0000.rad")).flaws) == [
+        AT_REST
+    ]  # any body may be switched

@@ -29,18 +29,37 @@ def inventory(folder: Path, text: str) -> Inventory:
 
 
 def nodes(count: int) -> str:
-    return "/NODE\n" + "".join(f"{n:10d}{n:20d}{n % 2:20d}{n % 3:20d}\n" for n in range(1, count + 1))
+    return "/NODE\n" + "".join(
+        f"{n:10d}{n:20d}{n % 2:20d}{n % 3:20d}\n" for n in range(1, count + 1)
+    )
 
 
 @pytest.mark.parametrize(
     ("elements", "kind"),
     [
-        ("/SHELL/1\n# a comment\n" + wide(1, 1, 2, 3, 4) + "\n" + wide(2, 3, 4, 5, 6), "shell"),
+        (
+            "/SHELL/1\n# a comment\n"
+            + wide(1, 1, 2, 3, 4)
+            + "\n"
+            + wide(2, 3, 4, 5, 6),
+            "shell",
+        ),
         ("/SH3N/1\n" + wide(1, 1, 2, 3) + wide(2, 3, 4, 5), "triangle"),
         ("/BRICK/1\n" + wide(*range(1, 10)) + wide(2, *range(9, 17)), "solid"),
         ("/TETRA4/1\n" + wide(1, 1, 2, 3, 4) + wide(2, 5, 6, 7, 8), "tetrahedron"),
-        ("/TETRA10/1\n" + wide(1) + wide(*range(1, 11)) + wide(2) + wide(*range(11, 21)), "tetrahedron"),
-        ("/BRIC20/1\n" + (wide(1, *range(1, 9)) + wide(*range(9, 17)) + wide(*range(17, 21))) * 2, "solid"),
+        (
+            "/TETRA10/1\n"
+            + wide(1)
+            + wide(*range(1, 11))
+            + wide(2)
+            + wide(*range(11, 21)),
+            "tetrahedron",
+        ),
+        (
+            "/BRIC20/1\n"
+            + (wide(1, *range(1, 9)) + wide(*range(9, 17)) + wide(*range(17, 21))) * 2,
+            "solid",
+        ),
         ("/SPRING/1\n" + wide(1, 1, 2) + wide(2, 3, 4), "spring"),
     ],
 )
@@ -54,7 +73,10 @@ def test_flags_of_properties_are_read(tmp_path: Path) -> None:
     parts = "".join(f"/PART/{n}\np{n}\n{wide(n, 1)}" for n in range(1, 6))
     bricks = "".join(f"/BRICK/{n}\n{wide(n, *range(1, 9))}" for n in (4, 5))
     springs = "".join(f"/SPRING/{n}\n{wide(10 + n, 1, 2)}" for n in (2, 3))
-    found = inventory(tmp_path, f"{nodes(9)}{parts}/SHELL/1\n{wide(20, 1, 2, 3, 4)}{bricks}{springs}{PROPS}")
+    found = inventory(
+        tmp_path,
+        f"{nodes(9)}{parts}/SHELL/1\n{wide(20, 1, 2, 3, 4)}{bricks}{springs}{PROPS}",
+    )
     assert found.formulation(1, "shell").cost == "QEPH"
     assert [found.parts[n].section.damped for n in (2, 3)] == [True, False]
     assert [found.parts[n].section.turns for n in (4, 5)] == [False, True]
@@ -62,15 +84,24 @@ def test_flags_of_properties_are_read(tmp_path: Path) -> None:
 
 def test_elements_between_the_parts_of_a_body_are_rigid_with_it(tmp_path: Path) -> None:
     parts = "".join(f"/PART/{n}\np{n}\n{wide(1, 1)}" for n in (1, 2, 3))
-    shells = "".join(f"/SHELL/{n}\n{wide(n, *range(4 * n - 3, 4 * n + 1))}" for n in (1, 2))
-    found = inventory(tmp_path, f"{nodes(9)}{parts}{shells}/SHELL/3\n{wide(3, 1, 2, 5, 6)}{PROPS}")
+    shells = "".join(
+        f"/SHELL/{n}\n{wide(n, *range(4 * n - 3, 4 * n + 1))}" for n in (1, 2)
+    )
+    found = inventory(
+        tmp_path, f"{nodes(9)}{parts}{shells}/SHELL/3\n{wide(3, 1, 2, 5, 6)}{PROPS}"
+    )
     assert found.groups([1, 2]) == ((1,), (2,))
-    assert set(found.elements_within([1, 2])) == {1, 2}  # two bodies: what is between them bends
+    assert set(found.elements_within([1, 2])) == {
+        1,
+        2,
+    }  # two bodies: what is between them bends
     assert set(found.elements_within([1, 3])) == {1, 3}
     assert set(found.elements_within([1, 2, 3])) == {1, 2, 3}
 
 
-@pytest.mark.parametrize(("without", "complete"), [("", True), ("/PART/1", False), ("/NODE", False)])
+@pytest.mark.parametrize(
+    ("without", "complete"), [("", True), ("/PART/1", False), ("/NODE", False)]
+)
 def test_what_is_missing_is_said(tmp_path: Path, without: str, complete: bool) -> None:
     text = f"{nodes(4)}/PART/1\na\n{wide(1, 1)}/SHELL/1\n{wide(1, 1, 2, 3, 4)}{PROPS}"
     found = inventory(tmp_path, text.replace(without, "/OTHER") if without else text)
@@ -78,10 +109,15 @@ def test_what_is_missing_is_said(tmp_path: Path, without: str, complete: bool) -
     assert bool(found.notes) != complete
 
 
-def test_rigid_elements_of_the_car_are_those_that_the_solver_put_off(tmp_path: Path) -> None:
+def test_rigid_elements_of_the_car_are_those_that_the_solver_put_off(
+    tmp_path: Path,
+) -> None:
     (tmp_path / "CAR_0000.rad").write_bytes(starter("CAR"))
     found = read_inventory(str(tmp_path / "CAR_0000.rad"))
-    head, *rows = (line.split(",") for line in Path(stored("car_parts.csv")).read_text("ascii").splitlines())
+    head, *rows = (
+        line.split(",")
+        for line in Path(stored("car_parts.csv")).read_text("ascii").splitlines()
+    )
     table = [dict(zip(head, cells, strict=True)) for cells in rows]
     assert {int(one["id"]): int(one["elements"]) for one in table} == {
         part: counts.total() for part, counts in found.counts.items() if part != 18
@@ -89,9 +125,14 @@ def test_rigid_elements_of_the_car_are_those_that_the_solver_put_off(tmp_path: P
     sets = {"all": range(1, 15), "notfirst": [n for n in range(1, 18) if n != 3], "heavy": [12, 13, 14],
             "stopped": [1, 4, 5, 7, 11]}  # fmt: skip
     for name, parts in sets.items():
-        rigid = {part: counts.total() for part, counts in found.elements_within(list(parts)).items()}
+        rigid = {
+            part: counts.total()
+            for part, counts in found.elements_within(list(parts)).items()
+        }
         assert rigid == {
-            int(one["id"]): int(one[f"rigid_in_{name}"]) for one in table if one[f"rigid_in_{name}"] != "0"
+            int(one["id"]): int(one[f"rigid_in_{name}"])
+            for one in table
+            if one[f"rigid_in_{name}"] != "0"
         }
 
 
@@ -108,12 +149,20 @@ def test_a_starter_deck_that_ends_within_its_mesh_is_doubted(tmp_path: Path) -> 
     for end in range(text.rindex("/SHELL/1") + 9, len(text) + 1):
         deck.write_text(text[:end])
         found = radioss_inventory.read(read_run(str(deck)))
-        assert (sum("is it cut" in note for note in found.notes), found.complete) == (1, False)
-        assert [finding.rule for finding in check_deck(str(deck)).findings] == ["D2R011"]
+        assert (sum("is it cut" in note for note in found.notes), found.complete) == (
+            1,
+            False,
+        )
+        assert [finding.rule for finding in check_deck(str(deck)).findings] == [
+            "D2R011"
+        ]
     deck.write_text(f"{text}/END\n")
     assert radioss_inventory.read(read_run(str(deck))).complete
 
 
 def test_titles_may_be_empty(tmp_path: Path) -> None:
-    part = inventory(tmp_path, f"{nodes(4)}/PART/1\n\n{wide(1, 1)}{PROPS}/SHELL/1\n{wide(1, 1, 2, 3, 4)}").parts[1]
+    part = inventory(
+        tmp_path,
+        f"{nodes(4)}/PART/1\n\n{wide(1, 1)}{PROPS}/SHELL/1\n{wide(1, 1, 2, 3, 4)}",
+    ).parts[1]
     assert (part.title, part.section.formulations["shell"].name) == ("", "QEPH")

@@ -83,9 +83,13 @@ def test_fields_know_their_place(tmp_path: Path) -> None:
     assert lines[second.swset.field.line - 1][second.swset.field.column - 1] == "2"
 
 
-def test_comment_blocks_disable_the_rest_of_their_line_and_the_card_below(tmp_path: Path) -> None:
+def test_comment_blocks_disable_the_rest_of_their_line_and_the_card_below(
+    tmp_path: Path,
+) -> None:
     deck = read(tmp_path, GOOD.replace("*DEFORM", "*COMMENT c:*Deform", 1))
-    assert [card.line for card in deck.disabled] == [GOOD[: GOOD.index("*DEFORM")].count("\n") + 1]
+    assert [card.line for card in deck.disabled] == [
+        GOOD[: GOOD.index("*DEFORM")].count("\n") + 1
+    ]
     assert spans(deck) == []
 
 
@@ -180,8 +184,12 @@ INCLUDES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("deck", "files", "expected"), INCLUDES.values(), ids=INCLUDES.keys())
-def test_includes(tmp_path: Path, deck: str, files: dict[str, str], expected: object) -> None:
+@pytest.mark.parametrize(
+    ("deck", "files", "expected"), INCLUDES.values(), ids=INCLUDES.keys()
+)
+def test_includes(
+    tmp_path: Path, deck: str, files: dict[str, str], expected: object
+) -> None:
     main = read(tmp_path, deck, files)
     assert main.unread == []
     assert spans(main) == expected
@@ -198,13 +206,19 @@ def test_a_place_in_an_include_names_the_include(tmp_path: Path) -> None:
     [
         ("*INCLUDE\nnowhere.k\n", {}, "no such file"),
         ("*INCLUDE\nmain.k\n", {}, "itself"),
-        ("*INCLUDE\na.k\n", {"a.k": "*INCLUDE\nb.k\n", "b.k": "*INCLUDE\na.k\n"}, "itself"),
+        (
+            "*INCLUDE\na.k\n",
+            {"a.k": "*INCLUDE\nb.k\n", "b.k": "*INCLUDE\na.k\n"},
+            "itself",
+        ),
         ("*INCLUDE\nsub\n", {"sub/a.k": ""}, "no such file"),
         ("*INCLUDE\n" + "x" * 5000 + "\n", {}, "no such file"),
         ("*INCLUDE\n\0\n", {}, "no such file"),
     ],
 )
-def test_includes_that_cannot_be_read(tmp_path: Path, deck: str, files: dict[str, str], reason: str) -> None:
+def test_includes_that_cannot_be_read(
+    tmp_path: Path, deck: str, files: dict[str, str], reason: str
+) -> None:
     main = read(tmp_path, deck + THERE + BACK, files)
     assert [reason in unread.reason for unread in main.unread] == [True]
     assert spans(main) == WINDOW
@@ -218,7 +232,9 @@ def test_a_chain_of_includes_ends(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_includes_that_multiply_are_an_error(tmp_path: Path) -> None:
-    files = {f"{n}.k": f"*INCLUDE\n{n + 1}.k\n{n + 1}.k\n" for n in range(20)} | {"20.k": ""}
+    files = {f"{n}.k": f"*INCLUDE\n{n + 1}.k\n{n + 1}.k\n" for n in range(20)} | {
+        "20.k": ""
+    }
     with pytest.raises(DeckError, match="more than"):
         read(tmp_path, "*INCLUDE\n0.k\n", files)
 
@@ -237,19 +253,35 @@ def test_lines_that_end_in_cr_alone_are_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["absent.k", ".", "bad\0name"])
 def test_a_deck_that_cannot_be_read(tmp_path: Path, name: str) -> None:
-    with pytest.raises(DeckError, match=r"no such file; check|cannot be read .*; check"):
+    with pytest.raises(
+        DeckError, match=r"no such file; check|cannot be read .*; check"
+    ):
         read_deck(f"{tmp_path}/{name}")
 
 
 @pytest.mark.parametrize(
     ("deck", "told", "place"),
     [
-        ("*PARAMETER_EXPRESSION\nR a       &b*2\n" + automatic(1, "&a", rigid=["1"]), "&b is not defined", "main.k:2"),
-        (automatic(1, "&a", rigid=["1"]) + "*PARAMETER\nR a           0.02\n", "defined only below, at", "main.k:8"),
+        (
+            "*PARAMETER_EXPRESSION\nR a       &b*2\n" + automatic(1, "&a", rigid=["1"]),
+            "&b is not defined",
+            "main.k:2",
+        ),
+        (
+            automatic(1, "&a", rigid=["1"]) + "*PARAMETER\nR a           0.02\n",
+            "defined only below, at",
+            "main.k:8",
+        ),
     ],
 )
-def test_a_parameter_without_a_value_is_named_with_its_place(tmp_path: Path, deck: str, told: str, place: str) -> None:
-    ((field, problem),) = (found for card in read_switching(read(tmp_path, deck)) for found in card.problems)
+def test_a_parameter_without_a_value_is_named_with_its_place(
+    tmp_path: Path, deck: str, told: str, place: str
+) -> None:
+    ((field, problem),) = (
+        found
+        for card in read_switching(read(tmp_path, deck))
+        for found in card.problems
+    )
     assert field.text == "&a"
     assert told in problem
     assert place in problem

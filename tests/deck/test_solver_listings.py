@@ -29,29 +29,46 @@ class Listed(NamedTuple):
     legs: tuple[str, ...]
     rigid: Spans
     version: int = 2023
-    parts: Mapping[int, str] = {}  # lines of /PART below the title, of plates that have others
+    parts: Mapping[
+        int, str
+    ] = {}  # lines of /PART below the title, of plates that have others
 
 
 def head(version: int) -> str:
-    text = f"#RADIOSS STARTER\n/BEGIN\nX\n{wide(version, 0)}" + 2 * wide("kg", "m", "s", width=WIDE)
+    text = f"#RADIOSS STARTER\n/BEGIN\nX\n{wide(version, 0)}" + 2 * wide(
+        "kg", "m", "s", width=WIDE
+    )
     text += f"/TITLE\nplates\n/MAT/ELAST/1\nsteel\n{wide(7850.0, width=WIDE)}{wide(2.1e11, 0.3, width=WIDE)}"
-    return text + f"/PROP/SHELL/1\nshell\n{wide(24, 0, 0, 0)}\n{wide(3, 0)[:-1]}{wide(0.005, width=WIDE)}"
+    return (
+        text
+        + f"/PROP/SHELL/1\nshell\n{wide(24, 0, 0, 0)}\n{wide(3, 0)[:-1]}{wide(0.005, width=WIDE)}"
+    )
 
 
 def plates(lines: Mapping[int, str]) -> str:
     """Write three plates that share no nodes: part i has nodes 10 i + 1 to 4; nodes 101 to 103 lie above them."""
     corners = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
-    places = {10 * part + at: (3.0 * part + x, y, 0.0) for part in (1, 2, 3) for at, (x, y) in enumerate(corners, 1)}
+    places = {
+        10 * part + at: (3.0 * part + x, y, 0.0)
+        for part in (1, 2, 3)
+        for at, (x, y) in enumerate(corners, 1)
+    }
     places |= {100 + part: (3.0 * part + 0.5, 0.5, 0.2) for part in (1, 2, 3)}
-    text = "/NODE\n" + "".join(wide(node)[:-1] + wide(*place, width=WIDE) for node, place in places.items())
+    text = "/NODE\n" + "".join(
+        wide(node)[:-1] + wide(*place, width=WIDE) for node, place in places.items()
+    )
     for part in (1, 2, 3):
         text += f"/PART/{part}\nplate\n{lines.get(part, wide(1, 1))}"
         text += f"/SHELL/{part}\n{wide(part, *(10 * part + at for at in range(1, 5)))}"
-    return text + "".join(f"/GRNOD/PART/{part}\nplate\n{wide(part)}" for part in (1, 2, 3))
+    return text + "".join(
+        f"/GRNOD/PART/{part}\nplate\n{wide(part)}" for part in (1, 2, 3)
+    )
 
 
 def body(number: int, node: int, part: int, sensor: int = 0) -> str:
-    first = wide(node, sensor, 0, 0)[:-1] + wide(0.0, width=WIDE)[:-1] + wide(part, 0, 0, 0)
+    first = (
+        wide(node, sensor, 0, 0)[:-1] + wide(0.0, width=WIDE)[:-1] + wide(part, 0, 0, 0)
+    )
     return f"/RBODY/{number}\nbody\n{first}{2 * wide(0.0, 0.0, 0.0, width=WIDE)}{wide(0, 0, 0)}"
 
 
@@ -60,11 +77,15 @@ def merge(*lines: tuple[int, ...]) -> str:
 
 
 def clock(number: int, delay: float, stop: float | None = None) -> str:
-    return f"/SENSOR/TIME/{number}\nclock\n{wide(delay, width=WIDE)}" + (wide(stop, width=WIDE) if stop else "")
+    return f"/SENSOR/TIME/{number}\nclock\n{wide(delay, width=WIDE)}" + (
+        wide(stop, width=WIDE) if stop else ""
+    )
 
 
 def logic(kind: str, number: int, *others: int, delay: float = 0.0) -> str:
-    return f"/SENSOR/{kind}/{number}\nof others\n{wide(delay, width=WIDE)}{wide(*others)}"
+    return (
+        f"/SENSOR/{kind}/{number}\nof others\n{wide(delay, width=WIDE)}{wide(*others)}"
+    )
 
 
 def irigid(node: int = 0, sensor: int = 0) -> str:
@@ -79,7 +100,9 @@ MIDDLE = [(0.002, 0.004)]
 ALONE = body(1, 101, 1, 5)
 LISTED = {
     "a merged body goes with the main one": Listed(
-        THREE + merge((1, 1, 2, 1)), (OFF + "101 103", ON + "101", OFF + "101"), {1: MIDDLE, 2: MIDDLE}
+        THREE + merge((1, 1, 2, 1)),
+        (OFF + "101 103", ON + "101", OFF + "101"),
+        {1: MIDDLE, 2: MIDDLE},
     ),
     "the engine does not know the main node of a merged body": Listed(
         THREE + merge((1, 1, 2, 1)), (OFF + "101 102", ON + "102", OFF + "102"), {}
@@ -90,10 +113,14 @@ LISTED = {
         dict.fromkeys((1, 2, 3), MIDDLE),
     ),
     "kinds of a merge are bodies where they are left out": Listed(
-        THREE + merge((1, 0, 2, 0), (1, 0, 3)), (OFF + "101", ON + "101", OFF + "101"), dict.fromkeys((1, 2, 3), MIDDLE)
+        THREE + merge((1, 0, 2, 0), (1, 0, 3)),
+        (OFF + "101", ON + "101", OFF + "101"),
+        dict.fromkeys((1, 2, 3), MIDDLE),
     ),
     "a group of nodes is merged": Listed(
-        body(1, 101, 1) + merge((1, 1, 2, 3)), (OFF + "101", ON + "101", OFF + "101"), {1: MIDDLE, 2: MIDDLE}
+        body(1, 101, 1) + merge((1, 1, 2, 3)),
+        (OFF + "101", ON + "101", OFF + "101"),
+        {1: MIDDLE, 2: MIDDLE},
     ),
     "a body beside merged ones is apart": Listed(
         THREE + merge((1, 1, 2, 1)),
@@ -101,24 +128,40 @@ LISTED = {
         {1: [(0.002, None)], 2: [(0.002, None)], 3: MIDDLE},
     ),
     "the starter numbers main nodes by the ids of the bodies": Listed(
-        body(7, 0, 1) + body(2, 0, 2), (OFF + "104", ON + "104", OFF + "104 105"), {1: [(0.0, 0.004)], 2: MIDDLE}
+        body(7, 0, 1) + body(2, 0, 2),
+        (OFF + "104", ON + "104", OFF + "104 105"),
+        {1: [(0.0, 0.004)], 2: MIDDLE},
     ),
     "above all nodes": Listed(
-        "/NODE\n" + wide(5000)[:-1] + wide(9.0, 9.0, 9.0, width=WIDE) + body(7, 0, 1) + body(2, 103, 2) + body(3, 0, 3),
+        "/NODE\n"
+        + wide(5000)[:-1]
+        + wide(9.0, 9.0, 9.0, width=WIDE)
+        + body(7, 0, 1)
+        + body(2, 103, 2)
+        + body(3, 0, 3),
         (OFF + "5001 5002", ON + "5001", OFF + "5001 103"),
         {2: [(0.0, 0.004)], 3: MIDDLE},
     ),
     "0 in a leg names no body": Listed(
-        body(1, 0, 1) + body(2, 102, 2), (OFF + "102 0", ON + "0 102", OFF + "102 104"), {1: [(0.0, 0.004)], 2: MIDDLE}
+        body(1, 0, 1) + body(2, 102, 2),
+        (OFF + "102 0", ON + "0 102", OFF + "102 104"),
+        {1: [(0.0, 0.004)], 2: MIDDLE},
     ),
     "sensors of time join": Listed(body(1, 101, 1, 7) + TWICE, ("",), {1: MIDDLE}),
-    "formats before 2023 know Tstop": Listed(body(1, 101, 1, 7) + TWICE, ("",), {1: MIDDLE}, version=2018),
+    "formats before 2023 know Tstop": Listed(
+        body(1, 101, 1, 7) + TWICE, ("",), {1: MIDDLE}, version=2018
+    ),
     "a second number on the line of Tdelay is no Tstop": Listed(
         ALONE + f"/SENSOR/TIME/5\nclock\n{wide(0.0, 0.002, width=WIDE)}", ("",), {}
     ),
-    "a restart keeps sensors": Listed(body(1, 101, 1, 7) + TWICE, ("", "", ""), {1: MIDDLE}),
+    "a restart keeps sensors": Listed(
+        body(1, 101, 1, 7) + TWICE, ("", "", ""), {1: MIDDLE}
+    ),
     "a delay of a sensor of others has no effect": Listed(
-        body(1, 101, 1, 7) + clock(5, 0.001, 0.003) + clock(6, 0.004) + logic("OR", 7, 5, 6, delay=0.0005),
+        body(1, 101, 1, 7)
+        + clock(5, 0.001, 0.003)
+        + clock(6, 0.004)
+        + logic("OR", 7, 5, 6, delay=0.0005),
         ("",),
         {1: [(0.0, 0.001), (0.003, 0.004)]},
     ),
@@ -132,23 +175,42 @@ LISTED = {
         {1: [(0.001, 0.002), (0.003, 0.004)]},
     ),
     "and": Listed(
-        body(1, 101, 1, 7) + clock(5, 0.001, 0.003) + clock(6, 0.002) + logic("AND", 7, 5, 6),
+        body(1, 101, 1, 7)
+        + clock(5, 0.001, 0.003)
+        + clock(6, 0.002)
+        + logic("AND", 7, 5, 6),
         ("",),
         {1: [(0.0, 0.002), (0.003, None)]},
     ),
-    "a stop before the delay": Listed(ALONE + clock(5, 0.003, 0.001), ("",), {1: [(0.0, None)]}),
+    "a stop before the delay": Listed(
+        ALONE + clock(5, 0.003, 0.001), ("",), {1: [(0.0, None)]}
+    ),
     "a sensor that is reset ends": Listed(
-        ALONE + clock(5, 0.001, 0.006), ("", RESET + "5", ""), {1: [(0.0, 0.001), (0.002, None)]}
+        ALONE + clock(5, 0.001, 0.006),
+        ("", RESET + "5", ""),
+        {1: [(0.0, 0.001), (0.002, None)]},
     ),
     "a sensor that is reset before it begins never does": Listed(
         ALONE + clock(5, 0.003), ("", RESET + "5", ""), {1: [(0.0, None)]}
     ),
-    "a reset of all needs their numbers": Listed(ALONE + clock(5, 0.001), ("", RESET, ""), {1: [(0.0, 0.001)]}),
-    "a sensor overrules the legs": Listed(ALONE + clock(5, 0.003), (OFF + "101", "", ON + "101"), {1: [(0.0, 0.003)]}),
+    "a reset of all needs their numbers": Listed(
+        ALONE + clock(5, 0.001), ("", RESET, ""), {1: [(0.0, 0.001)]}
+    ),
+    "a sensor overrules the legs": Listed(
+        ALONE + clock(5, 0.003), (OFF + "101", "", ON + "101"), {1: [(0.0, 0.003)]}
+    ),
 }
 RIGID_PARTS = {
-    "rigid parts": Listed("", ("",), {1: [(0.0, None)], 3: [(0.0, None)]}, 2612, {1: irigid(), 3: irigid()}),
-    "rigid parts with a sensor": Listed(TWICE, ("",), {1: MIDDLE}, 2612, {1: irigid(0, 7)}),
+    "rigid parts": Listed(
+        "",
+        ("",),
+        {1: [(0.0, None)], 3: [(0.0, None)]},
+        2612,
+        {1: irigid(), 3: irigid()},
+    ),
+    "rigid parts with a sensor": Listed(
+        TWICE, ("",), {1: MIDDLE}, 2612, {1: irigid(0, 7)}
+    ),
     "legs switch a rigid part by its main node": Listed(
         "", (OFF + "101", ON + "101", OFF + "101"), {1: MIDDLE}, 2612, {1: irigid(101)}
     ),
@@ -171,7 +233,9 @@ def place(folder: Path, run: Listed) -> str:
     length = 6 // len(run.legs)
     for number, text in enumerate(run.legs, start=1):
         leg = f"/RUN/X/{number}\n{length * number / 1000}\n/VERS/{run.version}\n/DT\n0.9 0.0\n{text}\n"
-        (folder / f"X_{number:04d}.rad").write_text(f"{leg}/DTIX\n{STEP} {STEP}\n/TFILE/4\n0.0002\n/PRINT/-1\n")
+        (folder / f"X_{number:04d}.rad").write_text(
+            f"{leg}/DTIX\n{STEP} {STEP}\n/TFILE/4\n0.0002\n/PRINT/-1\n"
+        )
     return str(main)
 
 
@@ -184,7 +248,9 @@ def rigid_by_check(main: str) -> dict[int, list[tuple[float, float | None]]]:
 
 
 @pytest.mark.parametrize("name", [*LISTED, *RIGID_PARTS])
-def test_check_gives_the_spans_and_parts_of_the_listings(tmp_path: Path, name: str) -> None:
+def test_check_gives_the_spans_and_parts_of_the_listings(
+    tmp_path: Path, name: str
+) -> None:
     run = (LISTED | RIGID_PARTS)[name]
     assert rigid_by_check(place(tmp_path, run)) == run.rigid
 
@@ -215,7 +281,10 @@ def rigid_by_listing(folder: Path) -> dict[int, list[tuple[float, float]]]:
             spans.append((0.0, now))
         elif spans[-1][1] == inf:
             spans[-1] = spans[-1][0], now
-    kept = {part: [span for span in spans if span[1] - span[0] > 4 * STEP] for part, spans in found.items()}
+    kept = {
+        part: [span for span in spans if span[1] - span[0] > 4 * STEP]
+        for part, spans in found.items()
+    }
     return {part: spans for part, spans in kept.items() if spans}
 
 
@@ -227,12 +296,25 @@ def test_the_listings_of_the_solver_say_so(tmp_path: Path, name: str) -> None:
     listed, checked = rigid_by_listing(tmp_path), rigid_by_check(main)
     assert listed.keys() == checked.keys()
     for part, spans in checked.items():
-        ends = [time for span in spans for time in (span[0], inf if span[1] is None else span[1])]
-        assert [time for span in listed[part] for time in span] == pytest.approx(ends, abs=4 * STEP)
+        ends = [
+            time
+            for span in spans
+            for time in (span[0], inf if span[1] is None else span[1])
+        ]
+        assert [time for span in listed[part] for time in span] == pytest.approx(
+            ends, abs=4 * STEP
+        )
 
 
-def test_a_main_node_that_the_starter_makes_is_named_by_its_number(tmp_path: Path) -> None:
-    main = place(tmp_path, Listed(body(7, 0, 1) + body(2, 102, 2), (OFF + "102", ON + "102", OFF + "102"), {}))
+def test_a_main_node_that_the_starter_makes_is_named_by_its_number(
+    tmp_path: Path,
+) -> None:
+    main = place(
+        tmp_path,
+        Listed(
+            body(7, 0, 1) + body(2, 102, 2), (OFF + "102", ON + "102", OFF + "102"), {}
+        ),
+    )
     (finding,) = check_deck(main).findings
     assert finding.rule == "D2R408"
     assert (
@@ -242,17 +324,29 @@ def test_a_main_node_that_the_starter_makes_is_named_by_its_number(tmp_path: Pat
 
 
 def test_the_main_node_of_a_merged_body_is_none(tmp_path: Path) -> None:
-    found = check_deck(place(tmp_path, LISTED["the engine does not know the main node of a merged body"])).findings
+    found = check_deck(
+        place(
+            tmp_path, LISTED["the engine does not know the main node of a merged body"]
+        )
+    ).findings
     assert {one.rule for one in found} == {"D2R402"}
-    assert "its body is merged into /RBODY 1, whose main node is 101" in found[0].message
+    assert (
+        "its body is merged into /RBODY 1, whose main node is 101" in found[0].message
+    )
 
 
 @pytest.mark.parametrize("name", ["rigid parts", "a body beside merged ones is apart"])
-def test_parts_that_stay_rigid_are_rigid_in_the_inventory(tmp_path: Path, name: str) -> None:
+def test_parts_that_stay_rigid_are_rigid_in_the_inventory(
+    tmp_path: Path, name: str
+) -> None:
     run = (LISTED | RIGID_PARTS)[name]
     found = read_inventory(place(tmp_path, run)).parts
     always = {part for part, spans in run.rigid.items() if spans == [(0.0, None)]}
-    assert {part for part, data in found.items() if data.material and data.material.kind == "rigid"} == always
+    assert {
+        part
+        for part, data in found.items()
+        if data.material and data.material.kind == "rigid"
+    } == always
 
 
 def test_a_body_that_nothing_switches_makes_its_parts_rigid(tmp_path: Path) -> None:
@@ -260,14 +354,18 @@ def test_a_body_that_nothing_switches_makes_its_parts_rigid(tmp_path: Path) -> N
     material = read_inventory(main).parts[1].material
     assert material is not None
     assert material.kind == "rigid"
-    Path(main.replace("0000", "0001")).unlink()  # without engine files it may be switched
+    Path(
+        main.replace("0000", "0001")
+    ).unlink()  # without engine files it may be switched
     material = read_inventory(main).parts[1].material
     assert material is not None
     assert material.kind == "deformable"
 
 
 @pytest.mark.parametrize("name", ["rigid parts with a sensor", "sensors of time join"])
-def test_parts_that_a_sensor_switches_already_are_not_switched_again(tmp_path: Path, name: str) -> None:
+def test_parts_that_a_sensor_switches_already_are_not_switched_again(
+    tmp_path: Path, name: str
+) -> None:
     found = read_inventory(place(tmp_path, (LISTED | RIGID_PARTS)[name])).parts
     assert found[1].unswitchable == "the deck switches it by sensor 7 already"
     assert found[2].unswitchable == ""

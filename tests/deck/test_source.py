@@ -29,8 +29,30 @@ if TYPE_CHECKING:
 HEAD = b"-----BEGIN PGP MESSAGE"
 MARK = b"\xef\xbb\xbf"
 FRAGMENTS = [
-    *(b"*", b" *", b"*END", b"*NODE\n", b"\n", b"\r\n", b"\n*", b" " * 20, b" " * 31 + b"*", b" " * 32 + b"*"),
-    *(HEAD, b"\n" + HEAD, HEAD[:9], HEAD[9:], b"G", b"$", MARK, b"1.5", b"-", b"x" * 70),
+    *(
+        b"*",
+        b" *",
+        b"*END",
+        b"*NODE\n",
+        b"\n",
+        b"\r\n",
+        b"\n*",
+        b" " * 20,
+        b" " * 31 + b"*",
+        b" " * 32 + b"*",
+    ),
+    *(
+        HEAD,
+        b"\n" + HEAD,
+        HEAD[:9],
+        HEAD[9:],
+        b"G",
+        b"$",
+        MARK,
+        b"1.5",
+        b"-",
+        b"x" * 70,
+    ),
 ]
 FILES = st.lists(st.sampled_from(FRAGMENTS), max_size=40).map(b"".join)
 
@@ -38,7 +60,11 @@ FILES = st.lists(st.sampled_from(FRAGMENTS), max_size=40).map(b"".join)
 def line_by_line(data: bytes) -> Iterator[int]:
     """Offsets as a look at every line finds them."""
     start = len(MARK) if data.startswith(MARK) else 0
-    for line in data[start:].splitlines(keepends=True) if b"\r" not in data else re.split(rb"(?<=\n)", data[start:]):
+    for line in (
+        data[start:].splitlines(keepends=True)
+        if b"\r" not in data
+        else re.split(rb"(?<=\n)", data[start:])
+    ):
         if found := re.match(rb" {0,31}\*|" + HEAD, line):
             yield start + (found.end() - 1 if found[0].endswith(b"*") else 0)
         start += len(line)
@@ -62,17 +88,25 @@ def test_pieces_and_threads_find_what_a_look_at_every_line_finds(
     file.write_bytes(data)
     expected = [*line_by_line(data)]
     assert [*find_marks(Held(data))] == expected
-    blocks = [(one.start, one.end, one.head, one.line, [*one.lines()]) for one in SourceFile("held", data).blocks()]
+    blocks = [
+        (one.start, one.end, one.head, one.line, [*one.lines()])
+        for one in SourceFile("held", data).blocks()
+    ]
     there = on_disk(file, window)
     for content in (there, Held(data)):
         assert [*find_marks(content, piece, alone=0, helpers=helpers)] == expected
     source = SourceFile(str(file), there, piece)
     assert [*source.marks] == expected
-    assert [(one.start, one.end, one.head, one.line, [*one.lines()]) for one in source.blocks()] == blocks
+    assert [
+        (one.start, one.end, one.head, one.line, [*one.lines()])
+        for one in source.blocks()
+    ] == blocks
 
 
 @given(FILES, st.integers(1, 40), st.integers(0, 90), st.none() | st.integers(0, 120))
-def test_pieces_are_whole_lines(file: Path, data: bytes, size: int, start: int, end: int | None) -> None:
+def test_pieces_are_whole_lines(
+    file: Path, data: bytes, size: int, start: int, end: int | None
+) -> None:
     file.write_bytes(data)
     pieces = [*SourceFile(str(file), on_disk(file, 2 * size), size).pieces(start, end)]
     assert b"".join(pieces) == data[start:end]
@@ -87,7 +121,9 @@ class Sparing(io.FileIO):
         return super().readinto(room[:3])
 
 
-def test_a_call_of_the_system_that_gives_less_is_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_call_of_the_system_that_gives_less_is_repeated(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = tmp_path / "deck.k"
     path.write_bytes(b"0123456789")
     there = on_disk(path, window=1)
@@ -118,7 +154,9 @@ def test_what_goes_wrong_in_a_thread_is_said() -> None:
         find_marks(Failing(b"*NODE\n" * 100), 64, alone=0)
 
 
-def test_where_no_more_threads_are_allowed_one_searches_all(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_no_more_threads_are_allowed_one_searches_all(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def none_left(*_: object) -> None:
         raise RuntimeError("can't start new thread")
 
@@ -137,8 +175,12 @@ class Short(Held):
             yield fill
 
 
-def test_what_a_thread_has_no_memory_for_the_first_one_searches(capfd: pytest.CaptureFixture[str]) -> None:
-    assert [*find_marks(Short(b"*NODE\n" * 100), 64, alone=0, helpers=3)] == [*range(0, 600, 6)]
+def test_what_a_thread_has_no_memory_for_the_first_one_searches(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    assert [*find_marks(Short(b"*NODE\n" * 100), 64, alone=0, helpers=3)] == [
+        *range(0, 600, 6)
+    ]
     assert capfd.readouterr() == ("", "")
 
 

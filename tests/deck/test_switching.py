@@ -26,16 +26,35 @@ CASES: dict[str, tuple[str, Spans]] = {
     "cards in any order": (back("0.09", "1") + there("0.02", "1"), [(1, 0.02, 0.09)]),
     "from the start": (PLAIN + back("0.09", "1"), [(1, 0.0, 0.09)]),
     "to the end": (there("0.02", "1"), [(1, 0.02, None)]),
-    "two parts": (there("0.02", "1", "2") + back("0.09", "2", "1"), [(1, 0.02, 0.09), (2, 0.02, 0.09)]),
-    "parts apart": (there("1", "1", "2") + back("2", "1") + back("3", "2"), [(1, 1, 2), (2, 1, 3)]),
-    "two windows": (PLAIN + back("1", "1") + there("2", "1") + back("3", "1"), [(1, 0, 1), (1, 2, 3)]),
-    "merged again while rigid": (there("1", "1") + there("2", "1") + back("3", "1"), [(1, 1, 3)]),
+    "two parts": (
+        there("0.02", "1", "2") + back("0.09", "2", "1"),
+        [(1, 0.02, 0.09), (2, 0.02, 0.09)],
+    ),
+    "parts apart": (
+        there("1", "1", "2") + back("2", "1") + back("3", "2"),
+        [(1, 1, 2), (2, 1, 3)],
+    ),
+    "two windows": (
+        PLAIN + back("1", "1") + there("2", "1") + back("3", "1"),
+        [(1, 0, 1), (1, 2, 3)],
+    ),
+    "merged again while rigid": (
+        there("1", "1") + there("2", "1") + back("3", "1"),
+        [(1, 1, 3)],
+    ),
     "inverted": (there("2", "1") + back("1", "1"), [(1, 2, 1)]),
     "at once": (there("1", "1") + back("1", "1"), [(1, 1, 1)]),
-    "by force": (automatic(1, "0", rigid=["1"], code=2) + automatic(2, "0", deformable=["1"], code=4), []),
+    "by force": (
+        automatic(1, "0", rigid=["1"], code=2)
+        + automatic(2, "0", deformable=["1"], code=4),
+        [],
+    ),
     "restart": ("*RIGID_DEFORMABLE_R2D\n         1\n", []),
     "bare keyword": ("*DEFORMABLE_TO_RIGID\n", []),
-    "inertia": ("*DEFORMABLE_TO_RIGID_INERTIA\n         1\n       0.0\n       1.0\n", []),
+    "inertia": (
+        "*DEFORMABLE_TO_RIGID_INERTIA\n         1\n       0.0\n       1.0\n",
+        [],
+    ),
 }
 
 
@@ -45,7 +64,9 @@ def test_windows(tmp_path: Path, deck: str, expected: Spans) -> None:
 
 
 def test_what_nothing_made_rigid_is_an_orphan(tmp_path: Path) -> None:
-    (orphan,) = windows(read(tmp_path, back("1", "1") + there("2", "1") + back("3", "1"))).orphans
+    (orphan,) = windows(
+        read(tmp_path, back("1", "1") + there("2", "1") + back("3", "1"))
+    ).orphans
     assert orphan.unit.id == 1
     assert orphan.by.time == 1
 
@@ -56,19 +77,32 @@ def of_set(set_id: int) -> str:
 
 SETS: dict[str, tuple[str, list[int]]] = {
     "list": ("*SET_PART_LIST\n         9\n         1         2\n", [1, 2]),
-    "list with title": ("*SET_PART_LIST_TITLE\nall\n         9\n         1         2\n", [1, 2]),
+    "list with title": (
+        "*SET_PART_LIST_TITLE\nall\n         9\n         1         2\n",
+        [1, 2],
+    ),
     "two lines": ("*SET_PART\n         9\n         1\n         2\n", [1, 2]),
     "generate": ("*SET_PART_LIST_GENERATE\n         9\n         1       100\n", [1, 2]),
     "column": ("*SET_PART_COLUMN\n         9\n         2       0.5\n", [2]),
-    "add": ("*SET_PART\n         8\n         2\n*SET_PART_ADD\n         9\n         8\n", [2]),
+    "add": (
+        "*SET_PART\n         8\n         2\n*SET_PART_ADD\n         9\n         8\n",
+        [2],
+    ),
     "added to itself": ("*SET_PART_ADD\n         9\n         9\n", []),
-    "collect": ("*SET_PART_COLLECT\n         9\n         1\n*SET_PART_COLLECT\n         9\n         2\n", [1, 2]),
+    "collect": (
+        "*SET_PART_COLLECT\n         9\n         1\n*SET_PART_COLLECT\n         9\n         2\n",
+        [1, 2],
+    ),
 }
 
 
 @pytest.mark.parametrize(("cards", "expected"), SETS.values(), ids=SETS.keys())
-def test_part_sets_are_resolved(tmp_path: Path, cards: str, expected: list[int]) -> None:
-    assert [part for part, _, _ in spans(read(tmp_path, PARTS + cards + of_set(9)))] == expected
+def test_part_sets_are_resolved(
+    tmp_path: Path, cards: str, expected: list[int]
+) -> None:
+    assert [
+        part for part, _, _ in spans(read(tmp_path, PARTS + cards + of_set(9)))
+    ] == expected
 
 
 @pytest.mark.parametrize("cards", ["", "*SET_PART_GENERAL\n         9\nALL\n"])
@@ -95,7 +129,9 @@ PART_CARDS: dict[str, tuple[str, dict[int, str]]] = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("deck", "expected"), PART_CARDS.values(), ids=PART_CARDS.keys())
+@pytest.mark.parametrize(
+    ("deck", "expected"), PART_CARDS.values(), ids=PART_CARDS.keys()
+)
 def test_parts(tmp_path: Path, deck: str, expected: dict[int, str]) -> None:
     assert read_parts(read(tmp_path, deck)).materials == expected
 
@@ -138,5 +174,15 @@ def test_shared_nodes(tmp_path: Path, deck: str) -> None:
 
 
 def test_the_third_node_of_a_beam_is_not_shared(tmp_path: Path) -> None:
-    deck = "*ELEMENT_BEAM\n" + shell(1, 1, 8, 9, 3) + "*ELEMENT_SHELL\n" + shell(2, 2, 3, 4, 6, 7)
-    assert first_shared_nodes(element_cards(read(tmp_path, deck), searched=True), {1: 1, 2: 2}) == {}
+    deck = (
+        "*ELEMENT_BEAM\n"
+        + shell(1, 1, 8, 9, 3)
+        + "*ELEMENT_SHELL\n"
+        + shell(2, 2, 3, 4, 6, 7)
+    )
+    assert (
+        first_shared_nodes(
+            element_cards(read(tmp_path, deck), searched=True), {1: 1, 2: 2}
+        )
+        == {}
+    )

@@ -11,7 +11,11 @@ from d2rpick.rules.rule import engine_files, starter_deck
 from tests.command import MATSUM, put
 from tests.decks import wide
 
-NODES = [(x, y, z) for z in (0.0, 1.0) for x, y in ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))]
+NODES = [
+    (x, y, z)
+    for z in (0.0, 1.0)
+    for x, y in ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
+]
 CARD = """\
 *DEFORMABLE_TO_RIGID_AUTOMATIC
          1         0     0.097
@@ -31,7 +35,10 @@ def bricks(folder: Path, elform: int, law: str = "*MAT_ELASTIC", more: str = "")
     text += f"*SECTION_SOLID\n         1{elform:10d}\n*SECTION_SOLID\n         2         0\n"
     text += "*PART\nbox\n         1         1         7\n*PART\nstep\n         2         2         8\n*NODE\n"
     for first in (1, 11):
-        text += "".join(f"{first + at:8d}{x + first:16}{y:16}{z:16}\n" for at, (x, y, z) in enumerate(NODES))
+        text += "".join(
+            f"{first + at:8d}{x + first:16}{y:16}{z:16}\n"
+            for at, (x, y, z) in enumerate(NODES)
+        )
     rows = ([one, one, *range(first, first + 8)] for one, first in ((1, 1), (2, 11)))
     text += "*ELEMENT_SOLID\n" + "".join(wide(*row, width=8) for row in rows)
     return str(put(folder / "main.k", f"{text}{more}*END\n"))
@@ -44,18 +51,32 @@ def test_material_that_flows_is_kept_and_warned_of(tmp_path: Path) -> None:
     assert "its material flows through the mesh (ALE, ELFORM 11)" in first.reasons
     warnings = d2.plan(run, parts=1, deck=deck, replay=False).warnings
     (message,) = [one.message for one in warnings if one.code == "unswitchable-part"]
-    assert message == "part 1: its material flows through the mesh (ALE, ELFORM 11); leave it out"
+    assert (
+        message
+        == "part 1: its material flows through the mesh (ALE, ELFORM 11); leave it out"
+    )
 
 
 @pytest.mark.parametrize("elform", [5, 6, 7, 11, 12])
 def test_material_that_flows_is_found(tmp_path: Path, elform: int) -> None:
-    found = {one.rule: one for one in check_deck(bricks(tmp_path, elform, more=CARD)).findings}
+    found = {
+        one.rule: one
+        for one in check_deck(bricks(tmp_path, elform, more=CARD)).findings
+    }
     assert str(found["D2R118"].severity) == "error"
     assert f"ELFORM {elform})" in found["D2R118"].message
 
 
 @pytest.mark.parametrize(
-    "law", ["*MAT_BLATZ-KO_RUBBER", "*MAT_007", "*MAT_27", "*MAT_077_H", "*MAT_SIMPLIFIED_RUBBER/FOAM", "*MAT_002_ANIS"]
+    "law",
+    [
+        "*MAT_BLATZ-KO_RUBBER",
+        "*MAT_007",
+        "*MAT_27",
+        "*MAT_077_H",
+        "*MAT_SIMPLIFIED_RUBBER/FOAM",
+        "*MAT_002_ANIS",
+    ],
 )
 def test_a_law_with_a_reference_is_kept_and_found(tmp_path: Path, law: str) -> None:
     data = read_inventory(bricks(tmp_path, 0, law)).parts
@@ -66,7 +87,15 @@ def test_a_law_with_a_reference_is_kept_and_found(tmp_path: Path, law: str) -> N
 
 
 @pytest.mark.parametrize(
-    "law", ["*MAT_ELASTIC", "*MAT_024", "*MAT_070", "*MAT_102", "*MAT_PLASTIC_KINEMATIC", "*MAT_272"]
+    "law",
+    [
+        "*MAT_ELASTIC",
+        "*MAT_024",
+        "*MAT_070",
+        "*MAT_102",
+        "*MAT_PLASTIC_KINEMATIC",
+        "*MAT_272",
+    ],
 )
 def test_other_laws_and_elements_are_switched(tmp_path: Path, law: str) -> None:
     assert read_inventory(bricks(tmp_path, 0, law)).parts[1].unswitchable == ""
@@ -85,8 +114,12 @@ def test_other_laws_and_elements_are_switched(tmp_path: Path, law: str) -> None:
         ("/ALE/MAT/2\n 0.0\n/MAT/ELAST/1\nsteel\n 7850.0\n", ""),
     ],
 )
-def test_parts_of_radioss_that_must_not_be_switched(tmp_path: Path, cards: str, rule: str) -> None:
-    for name, text in engine_files(("0.02", "OFF"), ("0.09", "ON"), ("0.2", "OFF")).items():
+def test_parts_of_radioss_that_must_not_be_switched(
+    tmp_path: Path, cards: str, rule: str
+) -> None:
+    for name, text in engine_files(
+        ("0.02", "OFF"), ("0.09", "ON"), ("0.2", "OFF")
+    ).items():
         put(tmp_path / name, text)
     main = str(put(tmp_path / "box_0000.rad", starter_deck(more=cards)))
     assert [one.rule for one in check_deck(main).findings] == [rule] * bool(rule)

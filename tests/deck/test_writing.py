@@ -29,11 +29,16 @@ def windows(path: str) -> list[tuple[int, float, float | None]]:
 
 @pytest.mark.parametrize("newline", ["\n", "\r\n"])
 @pytest.mark.parametrize("end", [END, "", "  *END\nleft over\n", "*end"])
-def test_the_deck_is_the_same_but_for_one_include(tmp_path: Path, end: str, newline: str) -> None:
+def test_the_deck_is_the_same_but_for_one_include(
+    tmp_path: Path, end: str, newline: str
+) -> None:
     before, after = ((HEAD + PARTS).replace("\n", newline), end.replace("\n", newline))
     main = write(tmp_path, (before + after).encode())
     written, switches = write_deck(main, CARD, str(tmp_path / "next"))
-    assert Path(written).read_bytes() == (before + INCLUDE.replace("\n", newline) + after).encode()
+    assert (
+        Path(written).read_bytes()
+        == (before + INCLUDE.replace("\n", newline) + after).encode()
+    )
     assert Path(switches).read_text() == CARD.text
     assert windows(written) == [(1, tr, td) for tr, td in WINDOWS]
 
@@ -41,20 +46,24 @@ def test_the_deck_is_the_same_but_for_one_include(tmp_path: Path, end: str, newl
 def test_a_deck_in_long_format_gets_cards_that_are_not(tmp_path: Path) -> None:
     deck = "*KEYWORD LONG=Y\n*PART\ndoor\n" + f"{1:20d}{1:20d}{1:20d}\n" + END
     written, _ = write_deck(write(tmp_path, deck), CARD, str(tmp_path / "next"))
-    assert [(w.part, w.tr, w.td) for w in check_deck(written).windows] == [(1, tr, td) for tr, td in WINDOWS]
+    assert [(w.part, w.tr, w.td) for w in check_deck(written).windows] == [
+        (1, tr, td) for tr, td in WINDOWS
+    ]
 
 
 def test_included_files_go_with_the_deck(tmp_path: Path) -> None:
-    main = write(tmp_path, HEAD + "*INCLUDE\nparts/all.k\n" + END, {"parts/all.k": PARTS})
+    main = write(
+        tmp_path, HEAD + "*INCLUDE\nparts/all.k\n" + END, {"parts/all.k": PARTS}
+    )
     written = write_deck(main, CARD, str(tmp_path / "next"))
     assert [Path(name).name for name in written] == ["main.k", "switches.k", "all.k"]
     assert windows(written[0]) == [(1, tr, td) for tr, td in WINDOWS]
 
 
 IS_CUT = r"main\.k: the .* is it cut\? The cards behind it would hide that: .*"
-OTHER_SET = THERE.replace("         1         0  ", "       901         0  ", 1).replace(
-    "         1         0      PART", "         2         0      PART"
-)
+OTHER_SET = THERE.replace(
+    "         1         0  ", "       901         0  ", 1
+).replace("         1         0      PART", "         2         0      PART")
 
 
 @pytest.mark.parametrize(
@@ -62,8 +71,16 @@ OTHER_SET = THERE.replace("         1         0  ", "       901         0  ", 1)
     [
         (GOOD, {}, r"main.k:14: the deck switches part 1 already"),
         (HEAD + PARTS + OTHER_SET + END, {}, "switch set 901"),
-        (HEAD + INCLUDE + END, {"switches.k": PARTS}, "with the name of the cards, 'switches.k'"),
-        (HEAD + "*INCLUDE\n../parts.k\n" + END, {"../parts.k": PARTS}, "outside the folder"),
+        (
+            HEAD + INCLUDE + END,
+            {"switches.k": PARTS},
+            "with the name of the cards, 'switches.k'",
+        ),
+        (
+            HEAD + "*INCLUDE\n../parts.k\n" + END,
+            {"../parts.k": PARTS},
+            "outside the folder",
+        ),
         ((HEAD + PARTS).rstrip("\n"), {}, IS_CUT + "end its last line"),
         (f"{HEAD}{PARTS}*NODE\n       1\n", {}, IS_CUT + "add that line"),
     ],
@@ -99,7 +116,11 @@ def test_nothing_is_replaced_without_being_told(tmp_path: Path) -> None:
 
 def test_no_link_leads_out_of_the_folder(tmp_path: Path) -> None:
     (tmp_path / "deck").mkdir()
-    main = write(tmp_path / "deck", HEAD + "*INCLUDE\nparts/all.k\n" + END, {"parts/all.k": PARTS})
+    main = write(
+        tmp_path / "deck",
+        HEAD + "*INCLUDE\nparts/all.k\n" + END,
+        {"parts/all.k": PARTS},
+    )
     mine, folder = tmp_path / "mine", tmp_path / "next"
     mine.mkdir()
     folder.mkdir()
@@ -107,14 +128,22 @@ def test_no_link_leads_out_of_the_folder(tmp_path: Path) -> None:
     (folder / "parts").symlink_to(mine)
     (folder / "switches.k").symlink_to(mine / "kept.k")
     (folder / "main.k").symlink_to(mine / "new.k")
-    for name, link in (("main.k", "main.k"), ("switches.k", "switches.k"), ("all.k", "parts")):
-        with pytest.raises(DeckError, match=rf"{name}: leads out of {folder}, by a link"):
+    for name, link in (
+        ("main.k", "main.k"),
+        ("switches.k", "switches.k"),
+        ("all.k", "parts"),
+    ):
+        with pytest.raises(
+            DeckError, match=rf"{name}: leads out of {folder}, by a link"
+        ):
             write_deck(main, CARD, str(folder), overwrite=True)
         (folder / link).unlink()
         assert [one.name for one in mine.iterdir()] == ["kept.k"]
     assert (mine / "kept.k").read_text() == "mine"
     (tmp_path / "named").symlink_to(folder)  # a link that was asked for
-    assert (folder / "parts" / "all.k").samefile(write_deck(main, CARD, str(tmp_path / "named"))[2])
+    assert (folder / "parts" / "all.k").samefile(
+        write_deck(main, CARD, str(tmp_path / "named"))[2]
+    )
 
 
 # Radioss.
@@ -131,7 +160,9 @@ def radioss_run(folder: Path, engine: str = ENGINE) -> str:
 
 def test_a_run_gets_the_legs_with_its_own_keywords(tmp_path: Path) -> None:
     card = cards(WINDOWS, Printing(node=(1808,), end=0.4, name="box"), "radioss")
-    starter, *legs = write_deck(radioss_run(tmp_path / "ref"), card, str(tmp_path / "next"))
+    starter, *legs = write_deck(
+        radioss_run(tmp_path / "ref"), card, str(tmp_path / "next")
+    )
     assert Path(starter).read_text() == RUN.deck
     assert windows(starter) == [(1, tr, td) for tr, td in WINDOWS]
     texts = [Path(leg).read_text() for leg in legs]
@@ -140,7 +171,9 @@ def test_a_run_gets_the_legs_with_its_own_keywords(tmp_path: Path) -> None:
     assert all(text.count("/DTIX") == text.count("/RUN") == 1 for text in texts)
 
 
-def test_legs_are_named_after_the_files_of_the_run_by_which_the_engine_finds_its_restart(tmp_path: Path) -> None:
+def test_legs_are_named_after_the_files_of_the_run_by_which_the_engine_finds_its_restart(
+    tmp_path: Path,
+) -> None:
     """Source: runs computed with OpenRadioss, whose engine looks for NAME_0001.rst beside NAME_0002.rad."""
     main = radioss_run(tmp_path / "ref")
     for file in (tmp_path / "ref").iterdir():
@@ -154,31 +187,54 @@ def test_legs_are_named_after_the_files_of_the_run_by_which_the_engine_finds_its
     refused(main, card, "the cards are for run 'other', the run is 'box'")
 
 
-def test_a_run_of_several_legs_alike_is_cut_anew_at_the_switches(tmp_path: Path) -> None:
+def test_a_run_of_several_legs_alike_is_cut_anew_at_the_switches(
+    tmp_path: Path,
+) -> None:
     """A later leg may leave out keywords of the first, as velocities at the start, but has none of its own."""
     card = cards(WINDOWS, Printing(node=(1808,), end=0.8, name="box"), "radioss")
     ref = radioss_run(tmp_path / "ref")
-    (tmp_path / "ref" / "box_0002.rad").write_text("/RUN/box/2\n 0.8\n/VERS/2022\n/TFILE/4\n1e-5\n")
+    (tmp_path / "ref" / "box_0002.rad").write_text(
+        "/RUN/box/2\n 0.8\n/VERS/2022\n/TFILE/4\n1e-5\n"
+    )
     starter, *legs = write_deck(ref, card, str(tmp_path / "next"))
-    assert [leg.stop.value for leg in read_run(starter).legs] == [*(time for window in WINDOWS for time in window), 0.8]
+    assert [leg.stop.value for leg in read_run(starter).legs] == [
+        *(time for window in WINDOWS for time in window),
+        0.8,
+    ]
     assert all("/TFILE/4\n1e-5\n" in Path(leg).read_text() for leg in legs)
     for added in ("/RBODY/ON\n1808\n", "/DT\n0.5 0.0\n", "/TFILE/4\n1e-4\n"):
-        (tmp_path / "ref" / "box_0002.rad").write_text("/RUN/box/2\n 0.8\n/VERS/2022\n" + added)
-        with pytest.raises(DeckError, match=r"box_0002\.rad: /.* is not in the first engine file"):
+        (tmp_path / "ref" / "box_0002.rad").write_text(
+            "/RUN/box/2\n 0.8\n/VERS/2022\n" + added
+        )
+        with pytest.raises(
+            DeckError, match=r"box_0002\.rad: /.* is not in the first engine file"
+        ):
             write_deck(ref, card, str(tmp_path / "other"))
 
 
 def test_bodies_that_the_run_keeps_off_stay_off_in_every_leg(tmp_path: Path) -> None:
     """Else they would be rigid from time 0: the loose wheels of a car whose body alone is switched."""
     engine = ENGINE.replace("1808\n", "1808 1809\n1810\n") + "/END\nleft over\n"
-    for own, name in (((), "a"), ((1810, 1809), "b")):  # a card that knows them, and one that does not
-        card = cards(WINDOWS, Printing(node=(1808,), off=own, end=0.4, name="box"), "radioss")
-        starter, *legs = write_deck(radioss_run(tmp_path / "ref", engine), card, str(tmp_path / name))
+    for own, name in (
+        ((), "a"),
+        ((1810, 1809), "b"),
+    ):  # a card that knows them, and one that does not
+        card = cards(
+            WINDOWS, Printing(node=(1808,), off=own, end=0.4, name="box"), "radioss"
+        )
+        starter, *legs = write_deck(
+            radioss_run(tmp_path / "ref", engine), card, str(tmp_path / name)
+        )
         found = [dict(_states(leg)) for leg in read_run(starter).legs]
-        rigid = [{1808: False, 1809: False, 1810: False}, {1808: True, 1809: False, 1810: False}]
+        rigid = [
+            {1808: False, 1809: False, 1810: False},
+            {1808: True, 1809: False, 1810: False},
+        ]
         assert found == [rigid[0], rigid[1], rigid[0], rigid[1], rigid[0]]
         blocks = [Path(leg).read_text().count("/RBODY/OFF") for leg in legs]
-        assert blocks == [1] * len(found)  # the starter overlooks a second one that follows the first
+        assert blocks == [1] * len(
+            found
+        )  # the starter overlooks a second one that follows the first
 
 
 def _states(leg: Leg) -> Iterator[tuple[int, bool]]:
@@ -188,7 +244,9 @@ def _states(leg: Leg) -> Iterator[tuple[int, bool]]:
 
 def test_a_card_names_all_that_is_off_in_one_block() -> None:
     """The starter of OpenRadioss overlooks the second of two blocks that follow each other."""
-    card = cards(WINDOWS, Printing(node=(1808,), off=(1809,), end=0.4, name="box"), "radioss")
+    card = cards(
+        WINDOWS, Printing(node=(1808,), off=(1809,), end=0.4, name="box"), "radioss"
+    )
     texts = list(card.files.values())
     assert [text.count("/RBODY/OFF") for text in texts] == [1] * 5
     assert [text.count("/RBODY/ON") for text in texts] == [0, 1, 0, 1, 0]
@@ -201,19 +259,32 @@ def sensed(**more: object) -> PrintedCard:
 
 
 @pytest.mark.parametrize("newline", ["\n", "\r\n"])
-def test_all_windows_fit_one_engine_run_by_sensors(tmp_path: Path, newline: str) -> None:
+def test_all_windows_fit_one_engine_run_by_sensors(
+    tmp_path: Path, newline: str
+) -> None:
     main = radioss_run(tmp_path / "ref", ENGINE.replace("1808\n", "1808 1809\n"))
     Path(main).write_bytes(RUN.deck.replace("\n", newline).encode())
     starter, engine = write_deck(main, sensed(), str(tmp_path / "next"))
-    assert [(one.part, one.tr, one.td) for one in check_deck(starter).windows] == [(1, tr, td) for tr, td in WINDOWS]
+    assert [(one.part, one.tr, one.td) for one in check_deck(starter).windows] == [
+        (1, tr, td) for tr, td in WINDOWS
+    ]
     text = Path(engine).read_text()
-    assert "/RBODY/OFF\n1809\n" in text  # what the run keeps off; the one with a sensor has no leg
-    assert text.count("/DTIX\n5e-05 5e-05\n") == text.count("/DTIX") == 1  # of the shortest window
+    assert (
+        "/RBODY/OFF\n1809\n" in text
+    )  # what the run keeps off; the one with a sensor has no leg
+    assert (
+        text.count("/DTIX\n5e-05 5e-05\n") == text.count("/DTIX") == 1
+    )  # of the shortest window
     assert "/INIV" in text
     deck = Path(starter).read_bytes().decode()
     assert deck.count(newline) == deck.count("\n")
-    same = [one == other for one, other in zip(RUN.deck.splitlines(), deck.splitlines(), strict=False)]
-    changed = [line for line, kept in zip(deck.splitlines(), same, strict=False) if not kept]
+    same = [
+        one == other
+        for one, other in zip(RUN.deck.splitlines(), deck.splitlines(), strict=False)
+    ]
+    changed = [
+        line for line, kept in zip(deck.splitlines(), same, strict=False) if not kept
+    ]
     assert changed[:2] == [
         "      2023         0",
         "      1808       905         0         0                   0         7",
@@ -227,7 +298,9 @@ def test_bodies_that_a_deck_lacks_get_their_sensor(tmp_path: Path) -> None:
     main = radioss_run(tmp_path / "ref", ENGINE.replace("/RBODY/OFF\n1808\n", ""))
     Path(main).write_text(head + rest)
     body = "/RBODY/1\nbox\n      1808         0         0         0                   0         7\n"
-    starter, _ = write_deck(main, sensed(starter=body, sensor=4), str(tmp_path / "next"))
+    starter, _ = write_deck(
+        main, sensed(starter=body, sensor=4), str(tmp_path / "next")
+    )
     assert windows(starter) == [(1, tr, td) for tr, td in WINDOWS]
 
 
@@ -256,6 +329,8 @@ def test_a_run_that_does_not_suit_is_refused(
 
 
 @pytest.mark.parametrize("solver", ["radioss", "radioss-sensors"])
-def test_cards_of_radioss_do_not_go_into_a_deck_of_ls_dyna(tmp_path: Path, solver: str) -> None:
+def test_cards_of_radioss_do_not_go_into_a_deck_of_ls_dyna(
+    tmp_path: Path, solver: str
+) -> None:
     message = r"main\.k: an LS-DYNA deck, but the cards are for another solver"
     refused(write(tmp_path, HEAD + PARTS), cards(WINDOWS, LEGS, solver), message)

@@ -24,10 +24,15 @@ def braked(until: float = 1.0) -> History:
 
 
 def warned(history: History, td: float, **given: float) -> dict[str, str]:
-    return {one.code: one.message for one in cautions_of(examine(history, td, Settings(**given)))}  # type: ignore[arg-type]
+    return {
+        one.code: one.message
+        for one in cautions_of(examine(history, td, Settings(**given)))  # type: ignore[arg-type]
+    }
 
 
-def test_an_end_of_the_load_that_is_given_overrules_the_evidence_and_the_warning_names_it() -> None:
+def test_an_end_of_the_load_that_is_given_overrules_the_evidence_and_the_warning_names_it() -> (
+    None
+):
     refused = suggest(braked(), 0.8, Settings())
     assert refused.recommended is None
     answer = suggest(braked(), 0.8, Settings(after=0.3))
@@ -36,24 +41,34 @@ def test_an_end_of_the_load_that_is_given_overrules_the_evidence_and_the_warning
     assert answer.quality
     assert answer.quality.grade != "good"
     told = warned(braked(), 0.8, after=0.3)
-    assert "the momentum shows no free flight at td = 0.8" in told["flight-sources-disagree"]
+    assert (
+        "the momentum shows no free flight at td = 0.8"
+        in told["flight-sources-disagree"]
+    )
     assert "no-free-flight" not in told
 
 
-def test_an_end_of_the_load_before_that_of_the_evidence_is_used_with_a_warning() -> None:
+def test_an_end_of_the_load_before_that_of_the_evidence_is_used_with_a_warning() -> (
+    None
+):
     history = braked(until=0.4)
-    assert examine(history, 0.8, Settings()).flight.start == pytest.approx(0.4, abs=0.005)
+    assert examine(history, 0.8, Settings()).flight.start == pytest.approx(
+        0.4, abs=0.005
+    )
     for after, contradicted in ((0.2, True), (0.398, False), (0.5, False)):
         flight = examine(history, 0.8, Settings(after=after)).flight
         assert (flight.start, flight.source) == (after, "given")
         assert flight.certain is not contradicted
         assert bool(flight.doubts) is contradicted
     assert (
-        "the momentum shows that the flight begins at 0.4" in warned(history, 0.8, after=0.2)["flight-sources-disagree"]
+        "the momentum shows that the flight begins at 0.4"
+        in warned(history, 0.8, after=0.2)["flight-sources-disagree"]
     )
 
 
-def test_a_landing_behind_a_contact_that_the_evidence_shows_is_used_with_a_warning() -> None:
+def test_a_landing_behind_a_contact_that_the_evidence_shows_is_used_with_a_warning() -> (
+    None
+):
     values = np.zeros((TIME.size, 1, 3))
     values[:, 0, 0] = 500 - 40 * np.maximum(TIME - 0.6, 0)
     whole = Momenta(TIME, values, None, EXACT, (0,), masses=np.array([10.0]))
@@ -82,7 +97,12 @@ def test_a_message_advises_nothing_that_was_given() -> None:
     flown = np.full((TIME.size, 1, 3), 0.0)
     flown[:, 0, 0] = 50 * np.minimum(TIME, 0.1)
     whole = Momenta(TIME, flown, None, Precision(7), (0,))
-    history = table(TIME, 5 + 90 * TIME, whole, balance=Balance(TIME, 5 + 90 * TIME, 200 - 90 * TIME))
+    history = table(
+        TIME,
+        5 + 90 * TIME,
+        whole,
+        balance=Balance(TIME, 5 + 90 * TIME, 200 - 90 * TIME),
+    )
     told = warned(history, 0.8)
     assert (
         "the momentum is that of free flight at td = 0.8, but the internal energy keeps no level"

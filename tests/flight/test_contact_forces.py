@@ -30,7 +30,9 @@ TIME = np.linspace(0, 1, 401)
 STEP = float(TIME[1])
 
 
-def contact(*acts: tuple[float, float], time: Samples = TIME, name: str = "contact") -> ContactForce:
+def contact(
+    *acts: tuple[float, float], time: Samples = TIME, name: str = "contact"
+) -> ContactForce:
     """A contact that acts in these times."""
     forces = np.zeros((time.size, 3))
     for start, end in acts:
@@ -49,11 +51,18 @@ def without_momenta(history: History) -> History:
     return replace(history, evidence=Given((), evidence.balance, None, evidence.forces))
 
 
-@given(st.floats(0.05, 0.3), st.floats(0.45, 0.7), st.floats(0.75, 0.95), st.sampled_from([0.35, 0.4, 0.44]))
+@given(
+    st.floats(0.05, 0.3),
+    st.floats(0.45, 0.7),
+    st.floats(0.75, 0.95),
+    st.sampled_from([0.35, 0.4, 0.44]),
+)
 def test_the_ends_of_a_flight_are_known_to_one_output_interval(
     load: float, landing: float, end: float, td: float
 ) -> None:
-    flight = sure(around(td, contact((0.0, load)), contact((landing, end), name="ground")))
+    flight = sure(
+        around(td, contact((0.0, load)), contact((landing, end), name="ground"))
+    )
     assert load <= flight.start <= load + STEP * 1.001
     assert landing - STEP * 1.001 <= flight.end <= landing
     assert flight.end_seen
@@ -80,10 +89,15 @@ def test_what_always_or_never_acts_says_nothing_of_a_flight() -> None:
 
 def test_files_that_are_written_at_different_times_are_put_together() -> None:
     coarse = np.linspace(0, 0.9, 31)
-    flight = sure(around(0.5, contact((0.0, 0.2)), contact((0.7, 0.9), time=coarse, name="wall")))
+    flight = sure(
+        around(0.5, contact((0.0, 0.2)), contact((0.7, 0.9), time=coarse, name="wall"))
+    )
     assert flight.start == pytest.approx(0.2, abs=1.1 * STEP)
     assert 0.7 - 0.031 <= flight.end <= 0.7
-    assert around(0.95, contact((0.0, 0.2)), contact((0.7, 0.8), time=coarse, name="wall")) is None
+    assert (
+        around(0.95, contact((0.0, 0.2)), contact((0.7, 0.8), time=coarse, name="wall"))
+        is None
+    )
 
 
 def test_forces_find_the_flights_of_a_computed_run_that_its_momenta_find() -> None:
@@ -92,7 +106,9 @@ def test_forces_find_the_flights_of_a_computed_run_that_its_momenta_find() -> No
     assert {source for source, _ in by_momenta} == {"momentum"}
     assert {source for source, _ in by_forces} == {"contact-force"}
     for (_, one), (_, other) in zip(by_momenta, by_forces, strict=True):
-        assert one.start == pytest.approx(other.start, abs=3 * history.step)  # momenta leave the last push a moment
+        assert one.start == pytest.approx(
+            other.start, abs=3 * history.step
+        )  # momenta leave the last push a moment
         assert one.end == pytest.approx(other.end, abs=1.01 * history.step)
 
 
@@ -100,11 +116,16 @@ def test_momenta_of_parts_come_first_since_a_contact_may_be_of_others() -> None:
     history = open_run([COMPUTED]).history(Selection())
     rattle = contact((0.2, 0.21), time=history.time, name="loose things")
     evidence = history.evidence
-    of_others = Given(evidence.momenta, evidence.balance, evidence.masses, (*evidence.forces, rattle))
+    of_others = Given(
+        evidence.momenta, evidence.balance, evidence.masses, (*evidence.forces, rattle)
+    )
     seen = seen_flight(replace(history, evidence=of_others), 0.205)
     assert seen.source == "momentum"
     assert seen.doubts == ()
-    alone = seen_flight(replace(history, evidence=Given((), None, None, (*evidence.forces, rattle))), 0.205)
+    alone = seen_flight(
+        replace(history, evidence=Given((), None, None, (*evidence.forces, rattle))),
+        0.205,
+    )
     assert alone.flight is None or alone.refusal
 
 
@@ -126,13 +147,17 @@ def test_a_crash_into_a_wall_whose_force_is_not_written_is_no_flight() -> None:
     assert seen.flight is None or seen.refusal or seen.flight.start > 0.6
     calm = with_forces(1 + 0.2 * np.sin(300 * TIME), contact((0.05, 0.3)))
     assert not is_deformed(calm, found)
-    assert sure(seen_flight(calm, 0.5).flight).start == pytest.approx(0.3, abs=1.1 * STEP)
+    assert sure(seen_flight(calm, 0.5).flight).start == pytest.approx(
+        0.3, abs=1.1 * STEP
+    )
 
 
 def test_before_any_contact_has_ended_forces_alone_show_no_flight() -> None:
     """A load of another kind may act from the start on, which only the external work shows."""
     history = with_forces(0.4 + 0.2 * np.sin(300 * TIME), contact((0.8, 0.85)))
-    assert sure(seen_flight(history, 0.6).refusal).startswith("the contact force shows no free flight at td = 0.6")
+    assert sure(seen_flight(history, 0.6).refusal).startswith(
+        "the contact force shows no free flight at td = 0.6"
+    )
     work = Balance(TIME, internal=history.energy, external_work=np.zeros_like(TIME))
     known = replace(history, evidence=Given((), work, None, history.evidence.forces))
     assert sure(seen_flight(known, 0.6).flight).start == 0
@@ -140,9 +165,19 @@ def test_before_any_contact_has_ended_forces_alone_show_no_flight() -> None:
 
 def test_a_table_with_a_column_of_forces_is_judged_by_it(tmp_path: Path) -> None:
     acts = (TIME < 0.2) | ((TIME > 0.8) & (TIME < 0.9))
-    energy = 5 + np.where(TIME < 0.2, 40 * TIME, 8.0) + np.sin(400 * TIME) + 0.7 * np.sin(173 * TIME)
-    rows = "".join(f"{t:.6f},{e:.6f},{7.5 * a:.3f}\n" for t, e, a in zip(TIME, energy, acts, strict=True))
-    file = put(tmp_path / "run.csv", f"time,internal energy,contact force\n{rows}".encode())
+    energy = (
+        5
+        + np.where(TIME < 0.2, 40 * TIME, 8.0)
+        + np.sin(400 * TIME)
+        + 0.7 * np.sin(173 * TIME)
+    )
+    rows = "".join(
+        f"{t:.6f},{e:.6f},{7.5 * a:.3f}\n"
+        for t, e, a in zip(TIME, energy, acts, strict=True)
+    )
+    file = put(
+        tmp_path / "run.csv", f"time,internal energy,contact force\n{rows}".encode()
+    )
     found = answer("suggest", "--td", "0.6", str(file))
     assert found["flight"]["source"] == "contact-force"
     assert found["flight"]["start"] == pytest.approx(0.2, abs=1.1 * STEP)
@@ -150,23 +185,35 @@ def test_a_table_with_a_column_of_forces_is_judged_by_it(tmp_path: Path) -> None
     assert not found["flight"]["certain"]
     assert "flight-uncertain" in codes(found)
     listed = answer("info", str(file))["flights"][0]
-    assert (listed["source"], listed["start"]) == ("contact-force", found["flight"]["start"])
+    assert (listed["source"], listed["start"]) == (
+        "contact-force",
+        found["flight"]["start"],
+    )
     in_load = answer("suggest", "--td", "0.1", "--exit-zero", str(file))
-    assert "the contact force shows no free flight at td = 0.1" in str(in_load["warnings"])
+    assert "the contact force shows no free flight at td = 0.1" in str(
+        in_load["warnings"]
+    )
 
 
 def pushed(*forces: ContactForce, velocity: bool = False) -> Momenta:
     """Momentum of a model of 2 kg on which these forces work, and gravity."""
-    momentum = sum(np.cumsum(force.impulses, axis=0) for force in forces) + np.outer(TIME, [0.0, 0.0, -19.62])
+    momentum = sum(np.cumsum(force.impulses, axis=0) for force in forces) + np.outer(
+        TIME, [0.0, 0.0, -19.62]
+    )
     values = momentum[:, np.newaxis] / (2.0 if velocity else 1.0)
     return Momenta(TIME, values, None, Precision(7), (0,), velocity=velocity)
 
 
 @pytest.mark.parametrize("velocity", [False, True])
 @pytest.mark.parametrize("side", [1, -1])
-def test_contacts_of_a_body_with_itself_do_not_end_its_flight(velocity: bool, side: int) -> None:
+def test_contacts_of_a_body_with_itself_do_not_end_its_flight(
+    velocity: bool, side: int
+) -> None:
     """They are written with a force of one side, although none acts from outside."""
-    ground, inner = contact((0.0, 0.2), (0.8, 0.9)), contact((0.1, 0.6), name="with itself")
+    ground, inner = (
+        contact((0.0, 0.2), (0.8, 0.9)),
+        contact((0.1, 0.6), name="with itself"),
+    )
     told = ground._replace(impulses=side * ground.impulses)
     touches = sure(Touches.of((told, inner), pushed(ground, velocity=velocity)))
     flight = sure(touches.flight_around(0.5))

@@ -14,17 +14,33 @@ from d2rpick.histories.surroundings import Surroundings
 MASS, GRAVITY = 2.0, 9.81
 
 
-def bouncing(contacts: list[tuple[float, float]], end: float, interval: float, gravity: float = GRAVITY) -> Momenta:
+def bouncing(
+    contacts: list[tuple[float, float]],
+    end: float,
+    interval: float,
+    gravity: float = GRAVITY,
+) -> Momenta:
     """Momentum of a part that a constant force turns back in each contact; times of states are not those of forces."""
     time = np.arange(0.0, end + interval / 2, interval)
     impulses = [40.0 * MASS * (0.05 + 0.02 * at) for at in range(len(contacts))]
     given = zip(contacts, impulses, strict=True)
-    impulse = sum(size * (np.clip(time, *span) - span[0]) / (span[1] - span[0]) for span, size in given)
+    impulse = sum(
+        size * (np.clip(time, *span) - span[0]) / (span[1] - span[0])
+        for span, size in given
+    )
     values = np.zeros((time.size, 1, 3))
     values[:, 0, 2] = -MASS * gravity * time + impulse - 1.0
     values[:, 0, 0] = 3.0
     part = (Part(1, "ball"),)
-    return Momenta(time, values, part, EXACT, (0,), masses=np.array([MASS]), surroundings=Surroundings())
+    return Momenta(
+        time,
+        values,
+        part,
+        EXACT,
+        (0,),
+        masses=np.array([MASS]),
+        surroundings=Surroundings(),
+    )
 
 
 @settings(max_examples=15)
@@ -33,7 +49,10 @@ def bouncing(contacts: list[tuple[float, float]], end: float, interval: float, g
 def test_every_contact_is_seen_within_an_interval(shift: float, length: float) -> None:
     interval = 1e-3
     sliver = 0.01 * interval  # so short a push in an interval does not show
-    contacts = [(0.1 + shift * interval, 0.1 + (shift + length) * interval), (0.3037, 0.3115)]
+    contacts = [
+        (0.1 + shift * interval, 0.1 + (shift + length) * interval),
+        (0.3037, 0.3115),
+    ]
     found = find_contact_times(bouncing(contacts, 0.6, interval))
     assert found is not None
     assert len(found.spans) == 2

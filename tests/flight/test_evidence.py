@@ -45,7 +45,9 @@ class Rolled(NamedTuple):
         """The run in a format."""
         path = self.folder / f"run.{form}"
         if not path.exists():
-            path.write_bytes(t01(self.record) if form == "T01" else BOX_WRITERS[form](self.record))
+            path.write_bytes(
+                t01(self.record) if form == "T01" else BOX_WRITERS[form](self.record)
+            )
         return str(path)
 
 
@@ -54,28 +56,46 @@ class Rolled(NamedTuple):
     params=[
         Parameters(mesh=6, speed=7.4, stiffness=6e6, damping=1.0),
         pytest.param(
-            Parameters(mesh=5, speed=6.7, stiffness=3.5e6, yield_strain=6e-3, damping=0.0), marks=pytest.mark.slow
+            Parameters(
+                mesh=5, speed=6.7, stiffness=3.5e6, yield_strain=6e-3, damping=0.0
+            ),
+            marks=pytest.mark.slow,
         ),
     ],
     ids=["fast", "slow"],
 )
-def rolled(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Rolled:
+def rolled(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Rolled:
     """Runs that no threshold was set by."""
     record = simulate(request.param, 0.5, interval=2e-4)
-    return Rolled(record, tmp_path_factory.mktemp("rolled"), sure(record.released), sure(record.landed))
+    return Rolled(
+        record,
+        tmp_path_factory.mktemp("rolled"),
+        sure(record.released),
+        sure(record.landed),
+    )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("form", ["csv", "hdf5", "glstat", "matsum", "T01"])
-def test_every_format_of_a_run_tells_its_flight_to_a_millisecond_and_none_after_it(rolled: Rolled, form: str) -> None:
+def test_every_format_of_a_run_tells_its_flight_to_a_millisecond_and_none_after_it(
+    rolled: Rolled, form: str
+) -> None:
     part = ["--part", "box"] if form in ("matsum", "T01") else []
     asked = ["suggest", "--no-verify", *part, rolled.file(form), "--td"]
     found = answer(*asked, str(round(rolled.end - 0.01, 3)))
     flight = found["flight"]
     assert (flight["certain"], flight["source"]) == (True, "momentum")
-    assert (flight["start"], flight["end"]) == pytest.approx((rolled.start, rolled.end), abs=MILLISECOND)
+    assert (flight["start"], flight["end"]) == pytest.approx(
+        (rolled.start, rolled.end), abs=MILLISECOND
+    )
     assert found["recommended"]["tr"] >= rolled.start - 2e-4
-    assert not codes(found) & {"contact-in-window", "work-in-window", "flight-sources-disagree"}
+    assert not codes(found) & {
+        "contact-in-window",
+        "work-in-window",
+        "flight-sources-disagree",
+    }
     result = run(*asked, str(rolled.end + 0.02), "-f", "json")
     assert result.exit_code == 1
     assert "no free flight at td" in result.stderr
@@ -97,7 +117,10 @@ def test_a_table_with_velocities_tells_the_flight_as_one_with_momenta(
 ) -> None:
     table = pd.read_csv(rolled.file("csv"))
     mass = table["momentum_x"][0] / table["vx"][0]
-    velocities = {name: table[axis] / mass for name, axis in zip(names, ("momentum_x", "momentum_z"), strict=True)}
+    velocities = {
+        name: table[axis] / mass
+        for name, axis in zip(names, ("momentum_x", "momentum_z"), strict=True)
+    }
     kept = table[["time", "internal_energy"]].assign(**velocities, mass=mass)
     kept.to_csv(tmp_path / "run.csv", index=False)
     td = str(round(rolled.end - 0.01, 3))
@@ -110,35 +133,57 @@ def test_a_table_with_velocities_tells_the_flight_as_one_with_momenta(
 
 
 @pytest.mark.slow
-def test_td_after_the_contact_is_refused_by_every_command(rolled: Rolled, tmp_path: Path) -> None:
+def test_td_after_the_contact_is_refused_by_every_command(
+    rolled: Rolled, tmp_path: Path
+) -> None:
     file, td = rolled.file("glstat"), rolled.end + 0.02
     judged = answer("verify", "--tr", "0.2", "--td", str(td), file)
     assert (judged["verified"], judged["td_ok"]) == (False, False)
     rows = answer("study", "--td", str(td), file)["runs"]
     assert [row["status"] for row in rows] == ["none"]
     assert "after the end of the flight" in rows[0]["message"]
-    deck = put(tmp_path / "deck.k", run("card", "--tr", "0.2", "--td", str(td), "--part", "1").stdout)
+    deck = put(
+        tmp_path / "deck.k",
+        run("card", "--tr", "0.2", "--td", str(td), "--part", "1").stdout,
+    )
     found = answer("check", str(deck), "--history", file)
     assert "D2R204" in {finding["rule"] for finding in found["findings"]}
 
 
 @pytest.mark.slow
-def test_the_contact_energy_tells_the_flight_where_no_momentum_is_written(rolled: Rolled) -> None:
+def test_the_contact_energy_tells_the_flight_where_no_momentum_is_written(
+    rolled: Rolled,
+) -> None:
     whole = history_of(rolled.file("glstat"))
-    written = {name: getattr(whole.balance, name) for name in ("sliding", "external_work")}
+    written = {
+        name: getattr(whole.balance, name) for name in ("sliding", "external_work")
+    }
     history = table(whole.time, whole.energy, balance=Balance(whole.time, **written))
     flight = examine(history, rolled.end - 0.01, Settings()).flight
     assert flight.source == "contact-energy"
-    assert (flight.start, flight.end) == pytest.approx((rolled.start, rolled.end), abs=MILLISECOND)
+    assert (flight.start, flight.end) == pytest.approx(
+        (rolled.start, rolled.end), abs=MILLISECOND
+    )
     assert seen_flight(history, rolled.end + 0.02).refusal
 
 
-def test_the_energy_balance_tells_the_flight_where_there_is_neither(rolled: Rolled) -> None:
+def test_the_energy_balance_tells_the_flight_where_there_is_neither(
+    rolled: Rolled,
+) -> None:
     whole = history_of(rolled.file("glstat"))
     time, energy = whole.time[::2], whole.energy[::2]
-    written = {name: getattr(whole.balance, name)[::2] for name in ("internal", "kinetic", "external_work")}
-    history = table(time, energy, balance=Balance(time, **written, precision=sure(whole.balance).precision))
-    flight = examine(history, (rolled.start + rolled.end) / 2, Settings(replay=False)).flight
+    written = {
+        name: getattr(whole.balance, name)[::2]
+        for name in ("internal", "kinetic", "external_work")
+    }
+    history = table(
+        time,
+        energy,
+        balance=Balance(time, **written, precision=sure(whole.balance).precision),
+    )
+    flight = examine(
+        history, (rolled.start + rolled.end) / 2, Settings(replay=False)
+    ).flight
     assert flight.source == "energy-balance"
     # damping bends the parabola of the work of gravity: less than the flight is found then, never more
     start, end = sure(flight.start), sure(flight.end)
@@ -146,7 +191,9 @@ def test_the_energy_balance_tells_the_flight_where_there_is_neither(rolled: Roll
     assert seen_flight(history, rolled.end + 0.02).refusal
 
 
-def test_on_the_energy_alone_nothing_is_certain_and_no_tr_lies_in_the_load(rolled: Rolled) -> None:
+def test_on_the_energy_alone_nothing_is_certain_and_no_tr_lies_in_the_load(
+    rolled: Rolled,
+) -> None:
     whole = history_of(rolled.file("csv"))
     history = table(whole.time, whole.energy)
     td = rolled.end - 0.01
@@ -167,20 +214,36 @@ def history_of(source: str, *parts: str) -> History:
     [
         (BOX, ("box",), [(0.0908, 0.3819)]),
         (CAR, (), [(0.0118, 0.0281), (0.0385, 0.1504)]),
-        (DROP, (), [(0.0, 0.2858), (0.3394, 0.4196), (0.4204, 0.4800), (0.5020, 0.5966)]),
+        (
+            DROP,
+            (),
+            [(0.0, 0.2858), (0.3394, 0.4196), (0.4204, 0.4800), (0.5020, 0.5966)],
+        ),
     ],
 )
 def test_all_flights_of_runs_of_a_solver_are_found(
     source: str, parts: tuple[str, ...], flights: list[tuple[float, float]]
 ) -> None:
-    found = [(f.start, f.end) for f in flights_of(history_of(source, *parts), Settings()) if f.start is not None]
+    found = [
+        (f.start, f.end)
+        for f in flights_of(history_of(source, *parts), Settings())
+        if f.start is not None
+    ]
     for start, end in flights:
-        assert [one for one in found if abs(one[0] - start) <= 5e-4 and abs((one[1] or np.inf) - end) <= 5e-4]
+        assert [
+            one
+            for one in found
+            if abs(one[0] - start) <= 5e-4 and abs((one[1] or np.inf) - end) <= 5e-4
+        ]
 
 
 def test_the_last_weak_pushes_of_a_load_belong_to_it() -> None:
     history = history_of(CAR)
-    assert 0.0385 <= sure(examine(history, 0.146, Settings(replay=False)).flight.start) <= 0.0390
+    assert (
+        0.0385
+        <= sure(examine(history, 0.146, Settings(replay=False)).flight.start)
+        <= 0.0390
+    )
 
 
 @pytest.mark.slow
@@ -214,7 +277,9 @@ def test_the_energy_alone_takes_the_end_of_the_load_late_enough(
 
 @pytest.mark.parametrize("part", ["bottom", "walls", "lid", "springs"])
 @pytest.mark.parametrize("share", [0.3, 0.5, 0.7, 0.85, 0.95, 0.98])
-def test_the_energy_alone_of_a_tumbling_box_never_begins_before_an_impact(part: str, share: float) -> None:
+def test_the_energy_alone_of_a_tumbling_box_never_begins_before_an_impact(
+    part: str, share: float
+) -> None:
     whole = history_of(DROP, part)
     history = table(whole.time, whole.energy)
     for start, end in ((0.3394, 0.4196), (0.4204, 0.4800), (0.5020, 0.5966)):
@@ -225,32 +290,60 @@ def test_the_energy_alone_of_a_tumbling_box_never_begins_before_an_impact(part: 
 def test_a_contact_between_two_flights_on_one_level_ends_the_first() -> None:
     time = np.linspace(0, 1, 2001)
     load = 400 * np.exp(-(((time - 0.2) / 0.05) ** 2))
-    contact = 80 * np.exp(-(((time - 0.8) / 0.01) ** 2))  # brief, in the last quarter before td
+    contact = 80 * np.exp(
+        -(((time - 0.8) / 0.01) ** 2)
+    )  # brief, in the last quarter before td
     energy = 190 + 5 * np.sin(250 * time) + load + contact
     quiet = sure(quiet_time(table(time, np.where(time < 0.1, 0, energy)), 0.95))
     assert quiet.start > 0.81
 
 
-def test_what_stays_of_a_contact_energy_is_no_flight_where_a_load_of_another_kind_works() -> None:
+def test_what_stays_of_a_contact_energy_is_no_flight_where_a_load_of_another_kind_works() -> (
+    None
+):
     time = np.linspace(0, 1, 501)
     touched = np.where(time < 0.2, 5 * time, 1.0)
-    for work, flies in ((np.zeros_like(time), True), (40 * np.maximum(0, time - 0.5), False)):
-        balance = Balance(time, sliding=touched, external_work=work, kinetic=np.full_like(time, 10.0))
+    for work, flies in (
+        (np.zeros_like(time), True),
+        (40 * np.maximum(0, time - 0.5), False),
+    ):
+        balance = Balance(
+            time, sliding=touched, external_work=work, kinetic=np.full_like(time, 10.0)
+        )
         history = table(time, 1 + 0.3 * np.sin(200 * time), balance=balance)
         assert examine(history, 0.9, Settings(replay=False)).in_flight is flies
 
 
-def test_where_the_momentum_of_parts_is_exact_contacts_of_others_and_among_them_do_not_count() -> None:
+def test_where_the_momentum_of_parts_is_exact_contacts_of_others_and_among_them_do_not_count() -> (
+    None
+):
     found = history_of(BOX, "box")
     assert found.balance
     longer = np.minimum(found.time, 0.15) + np.maximum(found.time - 0.3819, 0.0)
-    balance = Balance(found.time, sliding=longer, external_work=found.balance.external_work)
+    balance = Balance(
+        found.time, sliding=longer, external_work=found.balance.external_work
+    )
     (of_parts, _) = found.momenta
     flown = of_parts.of((0, 1))[:, np.newaxis]
-    whole = Momenta(of_parts.time, flown, None, of_parts.precision, (0,), masses=np.array([of_parts.mass((0, 1))]))
+    whole = Momenta(
+        of_parts.time,
+        flown,
+        None,
+        of_parts.precision,
+        (0,),
+        masses=np.array([of_parts.mass((0, 1))]),
+    )
     for momenta, start in ((of_parts, 0.0908), (whole, 0.15)):
         evidence = Given((momenta,), balance)
-        history = History(found.time, found.energy, ("run",), "made", "E", parts=found.parts, evidence=evidence)
+        history = History(
+            found.time,
+            found.energy,
+            ("run",),
+            "made",
+            "E",
+            parts=found.parts,
+            evidence=evidence,
+        )
         flight = examine(history, 0.37, Settings(replay=False)).flight
         assert flight.start == pytest.approx(start, abs=MILLISECOND)
         assert bool(flight.doubts) is (momenta is whole)
@@ -268,20 +361,32 @@ def test_the_energy_alone_is_said_to_be_uncertain_and_strict_refuses_it() -> Non
     assert (found["flight"]["source"], found["flight"]["certain"]) == ("energy", False)
     pair = ("verify", "--tr", str(found["recommended"]["tr"]), *ALONE)
     assert "verified by the energy level alone" in run(*pair).stdout
-    assert [run(*asked, "--strict").exit_code for asked in (("suggest", *ALONE), pair)] == [1, 1]
-    (message,) = (w["message"] for w in found["warnings"] if w["code"] == "flight-from-energy")
+    assert [
+        run(*asked, "--strict").exit_code for asked in (("suggest", *ALONE), pair)
+    ] == [1, 1]
+    (message,) = (
+        w["message"] for w in found["warnings"] if w["code"] == "flight-from-energy"
+    )
     assert "left unused for safety" in message
 
 
-def test_windows_of_acceptable_tr_hold_the_recommended_one_and_verify_throughout() -> None:
+def test_windows_of_acceptable_tr_hold_the_recommended_one_and_verify_throughout() -> (
+    None
+):
     found = checked("suggest", *ALONE)
     windows = found["acceptable_windows"]
     (own,) = (window for window in windows if window["recommended"])
     assert own["start"] <= found["recommended"]["tr"] <= own["end"]
-    assert all(found["flight"]["start"] <= w["start"] < w["end"] <= 0.37 for w in windows)
+    assert all(
+        found["flight"]["start"] <= w["start"] < w["end"] <= 0.37 for w in windows
+    )
     assert sum(w["share"] for w in windows) <= 1
     for window in windows[:3]:
-        for tr in (window["start"], (window["start"] + window["end"]) / 2, window["end"]):
+        for tr in (
+            window["start"],
+            (window["start"] + window["end"]) / 2,
+            window["end"],
+        ):
             assert answer("verify", "--tr", repr(tr), *ALONE)["verified"]
     assert f"{own['start']:.6g} to {own['end']:.6g}" in run("suggest", *ALONE).stdout
     assert answer("suggest", "--td", "0.064", ENERGY)["acceptable_windows"] is None
@@ -293,7 +398,9 @@ def test_a_flight_is_the_same_from_any_td_in_it_and_what_was_seen_before_changes
     rolled: Rolled, form: str
 ) -> None:
     def fresh() -> History:
-        return open_run([rolled.file(form)]).history(Selection(parts=("box",) if form == "matsum" else ()))
+        return open_run([rolled.file(form)]).history(
+            Selection(parts=("box",) if form == "matsum" else ())
+        )
 
     history, length = fresh(), rolled.end - rolled.start
     times = [rolled.start + share * length for share in (0.9, 0.02, 0.5, 0.98, 0.3)]

@@ -29,10 +29,24 @@ def moved(force: Callable[[float], float], end: float, *, alpha: float) -> Histo
 
     def equations_of_motion(t: float, u: np.ndarray) -> list[float]:
         z, y, vz, vy = u
-        return [vz, vy, (660e3 * (y - z) + force(t)) / 15.7 - alpha * vz, -660e3 * (y - z) / 31.4 - alpha * vy]
+        return [
+            vz,
+            vy,
+            (660e3 * (y - z) + force(t)) / 15.7 - alpha * vz,
+            -660e3 * (y - z) / 31.4 - alpha * vy,
+        ]
 
     time = np.linspace(0, end, round(end / 1e-4) + 1)
-    found = solve_ivp(equations_of_motion, (0, end), [0.0] * 4, "DOP853", time, rtol=1e-10, atol=1e-13, max_step=5e-4)
+    found = solve_ivp(
+        equations_of_motion,
+        (0, end),
+        [0.0] * 4,
+        "DOP853",
+        time,
+        rtol=1e-10,
+        atol=1e-13,
+        max_step=5e-4,
+    )
     return table(time, 330e3 * (found.y[1] - found.y[0]) ** 2)
 
 
@@ -48,7 +62,9 @@ def pushed(alpha: float, contact: float) -> History:
     return moved(force, 0.15, alpha=alpha)
 
 
-def loaded(*, alpha: float = 50.0, noise: float = 0.0, seed: int = 0, contact: float = np.inf) -> History:
+def loaded(
+    *, alpha: float = 50.0, noise: float = 0.0, seed: int = 0, contact: float = np.inf
+) -> History:
     """The same, with white noise."""
     history = pushed(alpha, contact)
     return table(history.time, noisy(history.energy, noise, seed))
@@ -60,12 +76,18 @@ def from_the_load(flight: Flight) -> bool:
     A load that ends while the spring passes zero moves it unseen; no tr may lie in it.
     """
     start = flight.start or 0.0
-    return flight.source == "oscillator" and start >= 0.02 and abs(start - 0.02 - PERIOD / 4) < PERIOD / 10
+    return (
+        flight.source == "oscillator"
+        and start >= 0.02
+        and abs(start - 0.02 - PERIOD / 4) < PERIOD / 10
+    )
 
 
 @pytest.mark.parametrize("alpha", [5.0, 50.0])
 @pytest.mark.parametrize("td", [0.03, 0.064, 0.1])
-def test_a_flight_begins_a_quarter_of_a_period_after_a_half_sine_load(alpha: float, td: float) -> None:
+def test_a_flight_begins_a_quarter_of_a_period_after_a_half_sine_load(
+    alpha: float, td: float
+) -> None:
     flight = examine(loaded(alpha=alpha), td, Settings()).flight
     assert from_the_load(flight)
     assert flight.end is None
@@ -73,7 +95,9 @@ def test_a_flight_begins_a_quarter_of_a_period_after_a_half_sine_load(alpha: flo
 
 @pytest.mark.parametrize("seed", range(2))
 def test_the_end_of_the_load_is_found_under_noise(seed: int) -> None:
-    assert from_the_load(examine(loaded(noise=0.01, seed=seed), 0.064, Settings()).flight)
+    assert from_the_load(
+        examine(loaded(noise=0.01, seed=seed), 0.064, Settings()).flight
+    )
 
 
 @pytest.mark.parametrize("td", [0.05, 0.075, 0.085])
@@ -83,18 +107,26 @@ def test_the_next_contact_ends_the_flight(td: float) -> None:
     assert flight.end == pytest.approx(0.09, abs=PERIOD / 10)
 
 
-def test_a_record_that_flies_throughout_flies_from_its_first_state_to_an_unknown_end() -> None:
+def test_a_record_that_flies_throughout_flies_from_its_first_state_to_an_unknown_end() -> (
+    None
+):
     span, fit = described_span(paper.history(), paper.TD, Span(0.0, 0.15))
     assert span == Span(0.0, 0.15)
-    assert examine(paper.history(), paper.TD, Settings()).flight == Flight(0.0, None, "oscillator", described=True)
+    assert examine(paper.history(), paper.TD, Settings()).flight == Flight(
+        0.0, None, "oscillator", described=True
+    )
     assert fit.mode is not None
     assert fit.mode.omega == pytest.approx(paper.OMEGA_2, rel=1e-10)
 
 
-@pytest.mark.parametrize(("name", "end_of_load"), [("load_L1_ref", 0.0200), ("load_L3_ref", 0.0235)])
+@pytest.mark.parametrize(
+    ("name", "end_of_load"), [("load_L1_ref", 0.0200), ("load_L3_ref", 0.0235)]
+)
 @pytest.mark.parametrize("td", [0.064, 0.08])
 def test_loads_computed_by_a_solver(name: str, end_of_load: float, td: float) -> None:
-    flight = examine(table(*columns(stored(f"{name}.csv.gz"), "IE_J")), td, Settings()).flight
+    flight = examine(
+        table(*columns(stored(f"{name}.csv.gz"), "IE_J")), td, Settings()
+    ).flight
     assert flight.source == "oscillator"
     assert flight.start == pytest.approx(end_of_load + PERIOD / 4, abs=PERIOD / 10)
 
@@ -115,13 +147,20 @@ def test_a_given_start_does_not_stretch_what_the_oscillator_describes() -> None:
     situation = examine(loaded(), 0.064, Settings(after=0.005))
     assert situation.flight.start == 0.005
     assert sure(situation.evidence.span).start == pytest.approx(0.020, abs=PERIOD / 10)
-    assert situation.vibration.whole.energy(0.01) == pytest.approx(loaded().energy_at(0.01))
+    assert situation.vibration.whole.energy(0.01) == pytest.approx(
+        loaded().energy_at(0.01)
+    )
 
 
 @pytest.mark.parametrize(
     ("made", "td", "asked", "why"),
     [
-        ({"alpha": 5.0, "contact": 0.09}, 0.12, Settings(fit_window=(0.03, 0.085)), "does not describe the record"),
+        (
+            {"alpha": 5.0, "contact": 0.09},
+            0.12,
+            Settings(fit_window=(0.03, 0.085)),
+            "does not describe the record",
+        ),
         ({}, 0.064, Settings(replay=False), "was switched off"),
         ({"noise": 0.01}, 0.1, Settings(), "below the noise of the record"),
     ],
@@ -137,7 +176,10 @@ def test_where_no_oscillator_tells_the_sign_it_is_said_why(
 
 def test_a_fit_window_is_where_the_oscillator_comes_from() -> None:
     situation = examine(loaded(), 0.064, Settings(fit_window=(0.03, 0.12)))
-    assert (sure(situation.evidence.fit).start, sure(situation.evidence.fit).end) == pytest.approx((0.03, 0.12))
+    assert (
+        sure(situation.evidence.fit).start,
+        sure(situation.evidence.fit).end,
+    ) == pytest.approx((0.03, 0.12))
     assert situation.flight.start == pytest.approx(0.020 + PERIOD / 4, abs=PERIOD / 10)
 
 
@@ -167,7 +209,9 @@ def test_the_whole_flight_is_found_wherever_td_lies_in_it(td: float) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("td", [0.153, 0.157, 0.162, 0.17, 0.178])
 @pytest.mark.parametrize("after", [None, 0.03])
-def test_td_in_the_next_contact_is_after_the_end_of_the_flight(td: float, after: float | None) -> None:
+def test_td_in_the_next_contact_is_after_the_end_of_the_flight(
+    td: float, after: float | None
+) -> None:
     answer = suggest(struck(), td, Settings(after=after))
     assert answer.recommended is None
     assert answer.situation.flight.end == pytest.approx(0.150, abs=PERIOD / 10)
@@ -186,7 +230,9 @@ def test_a_contact_does_not_creep_into_the_fit(td: float) -> None:
 def test_a_rising_energy_shows_no_end_of_a_load() -> None:
     time = np.linspace(0, 1, 1001)
     energy = (
-        np.exp(-((time - 0.1) ** 2) / 0.001) + 0.1 * np.sin(300 * time) ** 2 + np.where(time > 0.9, time - 0.9, 0) * 9
+        np.exp(-((time - 0.1) ** 2) / 0.001)
+        + 0.1 * np.sin(300 * time) ** 2
+        + np.where(time > 0.9, time - 0.9, 0) * 9
     )
     fed = table(time, energy)
     assert end_of_load(fed, 0.96) is None
@@ -196,7 +242,10 @@ def test_a_rising_energy_shows_no_end_of_a_load() -> None:
 @pytest.mark.slow
 def test_a_small_second_mode_makes_no_short_flights() -> None:
     mode, time = to_mode(paper.OSCILLATOR, 6.0), paper.history().time
-    energy = mode.energy(time) + 0.02 * 140 * np.exp(-30 * time) * np.sin(571 * time + 0.3) ** 2
+    energy = (
+        mode.energy(time)
+        + 0.02 * 140 * np.exp(-30 * time) * np.sin(571 * time + 0.3) ** 2
+    )
     for td in np.linspace(0.03, 0.12, 10).tolist():
         span = examine(table(time, energy), td, Settings()).evidence.span
         assert span is None or span.end - span.start > 1.25 * PERIOD
@@ -207,17 +256,32 @@ def test_a_small_second_mode_makes_no_short_flights() -> None:
 
 def test_a_given_oscillator_is_held_against_its_flight_only() -> None:
     time = struck().time
-    free = 330e3 * (np.diff(np.stack(paper.OSCILLATOR.free(paper.START, time))[:2], axis=0)[0]) ** 2
+    free = (
+        330e3
+        * (np.diff(np.stack(paper.OSCILLATOR.free(paper.START, time))[:2], axis=0)[0])
+        ** 2
+    )
     energy = np.where(time < 0.15, free, struck().energy)
-    situation = examine(table(time, energy), 0.064, Settings(oscillator=to_mode(paper.OSCILLATOR, 6.0)))
+    situation = examine(
+        table(time, energy), 0.064, Settings(oscillator=to_mode(paper.OSCILLATOR, 6.0))
+    )
     assert situation.basis == "oscillator"
     assert situation.flight.start == 0.0
     assert situation.flight.end == pytest.approx(0.150, abs=PERIOD / 10)
 
 
-def test_a_level_that_has_sunk_into_noise_recommends_nothing_but_a_td_where_it_has_not() -> None:
+def test_a_level_that_has_sunk_into_noise_recommends_nothing_but_a_td_where_it_has_not() -> (
+    None
+):
     record = paper.history()
     answer = suggest(table(record.time, noisy(record.energy, 0.01, 3)), 0.1, Settings())
     assert answer.recommended is None
-    assert float(min(abs(sure(answer.better_pair).td - peak / 1e3) for peak, _ in paper.PEAKS)) < 1e-4
+    assert (
+        float(
+            min(
+                abs(sure(answer.better_pair).td - peak / 1e3) for peak, _ in paper.PEAKS
+            )
+        )
+        < 1e-4
+    )
     assert sure(answer.better_pair).residual == pytest.approx(0.0, abs=1e-6)

@@ -14,7 +14,14 @@ from d2rpick.choice.warnings import cautions_of
 from d2rpick.flight.flight import Flight
 from d2rpick.flight.internal_energy import moves_as_a_whole, settled_from
 from d2rpick.flight.momentum import bodies_apart, flight_around
-from d2rpick.histories.history import EXACT, Balance, History, Momenta, Precision, Samples
+from d2rpick.histories.history import (
+    EXACT,
+    Balance,
+    History,
+    Momenta,
+    Precision,
+    Samples,
+)
 from d2rpick.histories.names import Part
 from d2rpick.histories.samples import integral
 from tests.benchmarks import falls, flights as campaign
@@ -28,12 +35,21 @@ ZERO = np.zeros(TIME.size)
 PARTS = (Part(1, "body"), Part(2, "other"))
 
 
-def momenta(*columns: Samples, masses: tuple[float, ...] = (10.0, 4.0), axis: int = 2) -> Momenta:
+def momenta(
+    *columns: Samples, masses: tuple[float, ...] = (10.0, 4.0), axis: int = 2
+) -> Momenta:
     """Momenta of parts along one axis."""
     values = np.zeros((TIME.size, len(columns), 3))
     values[:, :, axis] = np.stack(columns, axis=1)
     chosen = tuple(range(len(columns)))
-    return Momenta(TIME, values, PARTS[: len(columns)], EXACT, chosen, masses=np.array(masses[: len(columns)]))
+    return Momenta(
+        TIME,
+        values,
+        PARTS[: len(columns)],
+        EXACT,
+        chosen,
+        masses=np.array(masses[: len(columns)]),
+    )
 
 
 def totals(internal: Samples, kinetic: Samples, **terms: Samples) -> History:
@@ -43,19 +59,34 @@ def totals(internal: Samples, kinetic: Samples, **terms: Samples) -> History:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("load", campaign.CLASSES)
-def test_under_random_loads_no_flight_is_claimed_in_which_the_momentum_still_changes(load: str) -> None:
+def test_under_random_loads_no_flight_is_claimed_in_which_the_momentum_still_changes(
+    load: str,
+) -> None:
     random = np.random.default_rng(5)
-    runs = campaign.computed(random, 4, campaign.CLASSES[load](random, 4), falling=load != "friction")
-    counts = [(form, campaign.counted(one, form)) for one in runs for form in campaign.FORMS]
+    runs = campaign.computed(
+        random, 4, campaign.CLASSES[load](random, 4), falling=load != "friction"
+    )
+    counts = [
+        (form, campaign.counted(one, form)) for one in runs for form in campaign.FORMS
+    ]
     assert not [form for form, count in counts if count["wrong"]]
-    assert load in ("friction", "fading") or sum(count["claimed"] for _, count in counts) > 10
+    assert (
+        load in ("friction", "fading")
+        or sum(count["claimed"] for _, count in counts) > 10
+    )
 
 
 @pytest.mark.parametrize("gravity", [0.0, 9.81, 9.81e-3, 386.4])
-@pytest.mark.parametrize("fade", [lambda t: np.exp(-t / 0.04), lambda t: (1 + t / 0.05) ** -5.0])
-def test_the_flight_behind_a_load_that_fades_is_found(gravity: float, fade: np.ufunc) -> None:
+@pytest.mark.parametrize(
+    "fade", [lambda t: np.exp(-t / 0.04), lambda t: (1 + t / 0.05) ** -5.0]
+)
+def test_the_flight_behind_a_load_that_fades_is_found(
+    gravity: float, fade: np.ufunc
+) -> None:
     force = 1e4 * (gravity or 1.0) * fade(TIME)
-    impulse = np.concatenate([[0.0], np.cumsum((force[1:] + force[:-1]) / 2) * np.diff(TIME)])
+    impulse = np.concatenate(
+        [[0.0], np.cumsum((force[1:] + force[:-1]) / 2) * np.diff(TIME)]
+    )
     found = sure(flight_around(momenta(impulse - 10.0 * gravity * TIME), 0.9))
     start = int(np.searchsorted(TIME, found.start))
     assert impulse[-1] - impulse[start] < 0.01 * np.abs(impulse).max()
@@ -80,7 +111,9 @@ def test_what_only_slows_down_flies_where_its_acceleration_is_that_of_gravity_al
     one = Momenta(TIME, values, PARTS[:1], Precision(7), (0,), masses=np.array([10.0]))
     found = flight_around(one, 0.5)
     assert (found is not None) is flies
-    falling = replace(one, values=one.values - values[-1] * 1.5)  # it stands, and goes back
+    falling = replace(
+        one, values=one.values - values[-1] * 1.5
+    )  # it stands, and goes back
     assert flight_around(falling, 0.5) is not None
 
 
@@ -98,9 +131,13 @@ def aslant(along_x: Samples, along_z: Samples) -> Momenta:
 
 
 @pytest.mark.parametrize("gravity", [0.0, 9.81])
-def test_behind_a_power_law_little_may_still_change_and_gravity_shows_across_it(gravity: float) -> None:
+def test_behind_a_power_law_little_may_still_change_and_gravity_shows_across_it(
+    gravity: float,
+) -> None:
     impulse = impulse_of(5e3 * (1 + TIME / 0.1) ** -3.1)
-    found = sure(flight_around(aslant(0.8 * impulse, 0.6 * impulse - 10 * gravity * TIME), 0.95))
+    found = sure(
+        flight_around(aslant(0.8 * impulse, 0.6 * impulse - 10 * gravity * TIME), 0.95)
+    )
     assert found.gravity == pytest.approx(gravity, rel=1e-3)
     left = impulse[-1] - impulse[int(np.searchsorted(TIME, found.start))]
     assert 0.001 * impulse[-1] < left < 0.01 * impulse[-1]
@@ -116,23 +153,43 @@ def test_a_push_that_balances_the_weight_for_a_moment_is_no_flight() -> None:
 
 @pytest.mark.parametrize("left", [0.005, 0.0])
 def test_what_hardly_moves_flies_if_it_goes_on_as_it_does(left: float) -> None:
-    thrown = momenta(np.where(TIME < 0.3, 500 * (left + (1 - left) * np.cos(np.pi * TIME / 0.6)), 500 * left))
+    thrown = momenta(
+        np.where(
+            TIME < 0.3,
+            500 * (left + (1 - left) * np.cos(np.pi * TIME / 0.6)),
+            500 * left,
+        )
+    )
     assert bool(flight_around(thrown, 0.7)) is (left > 0)
 
 
 @pytest.mark.parametrize("mass", [1.0, 10.0])
 @pytest.mark.parametrize("acceleration", [5.0, 20.0, 0.3])
-def test_a_constant_force_is_gravity_only_if_it_is_as_large(acceleration: float, mass: float) -> None:
-    push = np.where(TIME < 0.2, 40 * mass * np.sin(np.pi * TIME / 0.2), 0.0).cumsum() / 1000
-    assert flight_around(momenta(push - mass * acceleration * TIME, masses=(mass,)), 0.6) is None
+def test_a_constant_force_is_gravity_only_if_it_is_as_large(
+    acceleration: float, mass: float
+) -> None:
+    push = (
+        np.where(TIME < 0.2, 40 * mass * np.sin(np.pi * TIME / 0.2), 0.0).cumsum()
+        / 1000
+    )
+    assert (
+        flight_around(momenta(push - mass * acceleration * TIME, masses=(mass,)), 0.6)
+        is None
+    )
     assert flight_around(momenta(push - mass * 9.81 * TIME, masses=(mass,)), 0.6)
 
 
-@pytest.mark.parametrize("acceleration", [0.1, 0.4, 1.0, 1.62, 3.71, 5.0, 8.87, 15.0, 20.0])
+@pytest.mark.parametrize(
+    "acceleration", [0.1, 0.4, 1.0, 1.62, 3.71, 5.0, 8.87, 15.0, 20.0]
+)
 @pytest.mark.parametrize("falling", [False, True])
-def test_a_velocity_of_the_model_shows_no_gravity_but_that_of_earth(acceleration: float, falling: bool) -> None:
+def test_a_velocity_of_the_model_shows_no_gravity_but_that_of_earth(
+    acceleration: float, falling: bool
+) -> None:
     """Friction and other planets: kinetic energy follows any constant force, so the acceleration itself decides."""
-    assert not flights_of(accelerated(acceleration if falling else -acceleration), PLAIN)
+    assert not flights_of(
+        accelerated(acceleration if falling else -acceleration), PLAIN
+    )
     assert flights_of(accelerated(9.81), PLAIN)
 
 
@@ -143,8 +200,18 @@ def accelerated(acceleration: float) -> History:
     velocity = printed(velocity.ravel()).reshape(velocity.shape)
     ringing = 10 * np.sin(90 * TIME) ** 2
     kinetic = printed(5 * (30 + acceleration * TIME) ** 2 + 10 - ringing)
-    energies = Balance(TIME, ringing, kinetic, velocity=velocity[:, 0], precision=Precision(6))
-    whole = Momenta(TIME, velocity, None, Precision(6), (0,), masses=np.array([np.nan]), velocity=True)
+    energies = Balance(
+        TIME, ringing, kinetic, velocity=velocity[:, 0], precision=Precision(6)
+    )
+    whole = Momenta(
+        TIME,
+        velocity,
+        None,
+        Precision(6),
+        (0,),
+        masses=np.array([np.nan]),
+        velocity=True,
+    )
     return table(TIME, ringing, whole, balance=energies)
 
 
@@ -152,7 +219,9 @@ def test_a_constant_force_on_an_unknown_mass_makes_a_pair_poor() -> None:
     """Without the mass and without energies nothing shows whether the force is gravity."""
     falling = momenta(200 - 50 * TIME - 100 * np.exp(-TIME / 0.02), masses=(np.nan,))
     whole = Momenta(TIME, falling.values, None, EXACT, (0,), masses=np.array([np.nan]))
-    answer = suggest(table(TIME, 5 + 5 * np.sin(60 * TIME) ** 2, whole), 0.8, Settings())
+    answer = suggest(
+        table(TIME, 5 + 5 * np.sin(60 * TIME) ** 2, whole), 0.8, Settings()
+    )
     assert sure(answer.quality).grade == "poor"
     assert "gravity-assumed" in {caution.code for caution in answer.cautions}
 
@@ -184,11 +253,15 @@ def test_bodies_that_hit_each_other_fly_each_for_itself() -> None:
 
 
 def test_a_motion_that_has_ended_is_no_flight() -> None:
-    stopped = np.where(TIME < 0.4, 50 * np.cos(np.pi * TIME / 0.8), 0.0)  # a motion that is prescribed, then none
+    stopped = np.where(
+        TIME < 0.4, 50 * np.cos(np.pi * TIME / 0.8), 0.0
+    )  # a motion that is prescribed, then none
     assert flight_around(momenta(stopped), 0.8) is None
 
 
-def test_a_wall_that_does_no_work_is_no_flight_however_constant_the_energies_are() -> None:
+def test_a_wall_that_does_no_work_is_no_flight_however_constant_the_energies_are() -> (
+    None
+):
     """Springs back from 0.2 to 0.8: kinetic energy comes from the internal one, and both together stay."""
     pushed = 500 * np.clip((TIME - 0.2) / 0.6, 0, 1) ** 2
     ringing = 3 * np.sin(300 * TIME) ** 2
@@ -210,33 +283,60 @@ def test_a_spring_to_ground_does_not_fly(kept: float) -> None:
     assert bool(flights_of(history, PLAIN)) is (kept > 0)
 
 
-def test_a_level_is_kept_by_a_vibration_and_by_one_that_damping_takes_but_not_by_a_drift() -> None:
+def test_a_level_is_kept_by_a_vibration_and_by_one_that_damping_takes_but_not_by_a_drift() -> (
+    None
+):
     ringing = np.sin(200 * TIME) ** 2
     assert settled_from(TIME, 5 + ringing, 50 + 0 * TIME[np.newaxis], 0.0, 1.0) == 0.0
     lost = np.exp(-4 * TIME)
-    assert settled_from(TIME, 2 * lost * ringing, 50 + 2 * lost[np.newaxis], 0.0, 1.0) == 0.0
+    assert (
+        settled_from(TIME, 2 * lost * ringing, 50 + 2 * lost[np.newaxis], 0.0, 1.0)
+        == 0.0
+    )
     assert settled_from(TIME, 5 + 3 * TIME, 50 + 0 * TIME[np.newaxis], 0.0, 1.0) is None
     assert settled_from(TIME, 5 - 3 * TIME, 50 + 0 * TIME[np.newaxis], 0.0, 1.0) is None
     late = settled_from(
-        TIME, np.where(TIME < 0.4, 2.5 * TIME, 1.0) + 0.01 * ringing, 50 + 0 * TIME[np.newaxis], 0.0, 1.0
+        TIME,
+        np.where(TIME < 0.4, 2.5 * TIME, 1.0) + 0.01 * ringing,
+        50 + 0 * TIME[np.newaxis],
+        0.0,
+        1.0,
     )
     assert late == pytest.approx(0.4, abs=0.02)
 
 
-def test_a_vibration_that_swings_only_a_few_times_keeps_its_level_and_a_crash_does_not() -> None:
+def test_a_vibration_that_swings_only_a_few_times_keeps_its_level_and_a_crash_does_not() -> (
+    None
+):
     whole = 50 + 0 * TIME[np.newaxis]
     assert settled_from(TIME, 5 + np.sin(9 * TIME) ** 2, whole, 0.0, 1.0) == 0.0
-    assert settled_from(TIME, 5 + 0 * TIME + np.sin(np.pi * TIME) ** 2, whole, 0.0, 1.0) is None
+    assert (
+        settled_from(TIME, 5 + 0 * TIME + np.sin(np.pi * TIME) ** 2, whole, 0.0, 1.0)
+        is None
+    )
 
 
-def test_a_flight_in_which_energies_ring_about_their_law_is_found_and_uncertain() -> None:
+def test_a_flight_in_which_energies_ring_about_their_law_is_found_and_uncertain() -> (
+    None
+):
     """What dampers within the body take comes in steps: no parabola describes it."""
     rung = 100 * np.sin(60 * TIME) ** 2
     pushed = np.minimum(TIME / 0.2, 1) ** 2
     lost = 0.5 * (TIME - np.sin(240 * TIME) / 240) * (TIME > 0.2)
-    found = flights_of(totals(pushed * (150 + rung), pushed * (900 - rung) - lost - 0.4 * np.sin(171 * TIME)), PLAIN)
-    assert any(flight.start == pytest.approx(0.2, abs=0.05) and flight.end is None for flight in found)
-    assert not [flight for flight in found if flight.certain or (flight.start or 0.0) < 0.15]
+    found = flights_of(
+        totals(
+            pushed * (150 + rung),
+            pushed * (900 - rung) - lost - 0.4 * np.sin(171 * TIME),
+        ),
+        PLAIN,
+    )
+    assert any(
+        flight.start == pytest.approx(0.2, abs=0.05) and flight.end is None
+        for flight in found
+    )
+    assert not [
+        flight for flight in found if flight.certain or (flight.start or 0.0) < 0.15
+    ]
 
 
 @pytest.mark.parametrize(
@@ -248,7 +348,9 @@ def test_a_flight_in_which_energies_ring_about_their_law_is_found_and_uncertain(
         (1e-6 * np.sin(300 * TIME) ** 2, 50 - 10 * TIME + 2 * TIME**2),
     ],
 )
-def test_a_load_that_energies_cannot_tell_from_gravity_makes_a_pair_poor(internal: Samples, kinetic: Samples) -> None:
+def test_a_load_that_energies_cannot_tell_from_gravity_makes_a_pair_poor(
+    internal: Samples, kinetic: Samples
+) -> None:
     found = suggest(totals(internal, kinetic), 0.8, PLAIN)
     assert sure(found.quality).grade == "poor"
     assert "by gravity or by another load" in sure(found.quality).told
@@ -266,28 +368,41 @@ def test_a_momentum_that_stays_while_a_load_works_is_prescribed() -> None:
     stored = np.exp(-(((TIME - 0.2) / 0.05) ** 2))  # by a contact for a while
     fallen = replace(energies, kinetic=8e3 * (1.5 - wound - 0.2 * stored))
     (flight,) = flights_of(table(TIME, 8e3 * wound, whole, balance=fallen), PLAIN)
-    assert sure(flight.start) == pytest.approx(0.4, abs=0.02)  # two bodies have hit each other
+    assert sure(flight.start) == pytest.approx(
+        0.4, abs=0.02
+    )  # two bodies have hit each other
 
 
 def test_what_damping_takes_of_a_body_and_its_vibration_is_no_load() -> None:
     """Damping that is proportional to mass takes more of the motion than the vibration has."""
     alpha = 0.3
-    kinetic = 60 * np.exp(-2 * alpha * TIME) + 20 * np.exp(-alpha * TIME) * np.cos(60 * TIME) ** 2
+    kinetic = (
+        60 * np.exp(-2 * alpha * TIME)
+        + 20 * np.exp(-alpha * TIME) * np.cos(60 * TIME) ** 2
+    )
     whole = 80 - 2 * alpha * integral(TIME, kinetic)
     record = totals(whole - kinetic, kinetic)
     assert suggest(record, 0.8, PLAIN).situation.flight.unknown_load
-    flight = suggest(record, 0.8, Settings()).situation.flight  # the oscillator is damped at the same rate
+    flight = suggest(
+        record, 0.8, Settings()
+    ).situation.flight  # the oscillator is damped at the same rate
     assert flight.certain
     assert flight.described
 
 
 @pytest.mark.parametrize("lost", [0.0, 0.02, 0.3])
-def test_an_oscillator_makes_no_flight_certain_in_which_the_body_loses_energy(lost: float) -> None:
+def test_an_oscillator_makes_no_flight_certain_in_which_the_body_loses_energy(
+    lost: float,
+) -> None:
     """Drag slows the body down while the spring in it swings on as one oscillator."""
-    decay = np.exp(-0.2 * TIME)  # damping within the body, which the energies show as well
+    decay = np.exp(
+        -0.2 * TIME
+    )  # damping within the body, which the energies show as well
     ringing, moving = 20 * decay * np.cos(60 * TIME) ** 2, 60 * (1 - lost * TIME)
     internal = 20 * decay - ringing
-    flight = suggest(totals(internal, moving + ringing), 0.8, Settings()).situation.flight
+    flight = suggest(
+        totals(internal, moving + ringing), 0.8, Settings()
+    ).situation.flight
     assert flight.described
     assert flight.certain is (lost == 0)
     assert flight.unknown_load is (lost > 0)
@@ -295,11 +410,18 @@ def test_an_oscillator_makes_no_flight_certain_in_which_the_body_loses_energy(lo
 
 def test_no_flight_is_certain_in_which_energies_show_a_load() -> None:
     """A stiff body that is pulled may have an energy that one oscillator describes."""
-    assert not Flight(0.1, 0.9, "energy-balance", gravity=np.inf, described=True).certain
+    assert not Flight(
+        0.1, 0.9, "energy-balance", gravity=np.inf, described=True
+    ).certain
     assert Flight(0.1, 0.9, "energy-balance", described=True).certain
-    found = suggest(totals(1e-9 * (1.5 + np.sin(300 * TIME)), 50 + 20 * TIME), 0.8, PLAIN)
+    found = suggest(
+        totals(1e-9 * (1.5 + np.sin(300 * TIME)), 50 + 20 * TIME), 0.8, PLAIN
+    )
     assert found.situation.flight.unknown_load
-    assert not any("any tr there is right" in caution.message for caution in cautions_of(found.situation))
+    assert not any(
+        "any tr there is right" in caution.message
+        for caution in cautions_of(found.situation)
+    )
 
 
 def test_the_landing_is_found_where_the_end_of_the_load_is_given() -> None:
@@ -311,9 +433,13 @@ def test_the_landing_is_found_where_the_end_of_the_load_is_given() -> None:
     assert suggest(history, 0.8, Settings(after=0.1, replay=False)).recommended is None
 
 
-def test_an_end_of_the_load_behind_the_flight_gives_no_flight_that_ends_before_it_begins() -> None:
+def test_an_end_of_the_load_behind_the_flight_gives_no_flight_that_ends_before_it_begins() -> (
+    None
+):
     hit = np.clip((TIME - 0.5) / 0.02, 0, 5)
-    both = momenta(np.where(TIME < 0.1, 10 * np.sin(60 * TIME), 10 * np.sin(6)) - hit**1.5)
+    both = momenta(
+        np.where(TIME < 0.1, 10 * np.sin(60 * TIME), 10 * np.sin(6)) - hit**1.5
+    )
     history = table(TIME, 1 + np.sin(300 * TIME) ** 2, both)
     flight = examine(history, 0.3, Settings(after=0.7, replay=False)).flight
     assert flight.start is None
@@ -327,20 +453,33 @@ def falling_and_damped(*left_out: str, internal: Samples = ZERO) -> History:
     """
     since = np.maximum(TIME - 0.1, 0.0)
     left, swing = 40 * np.exp(-9 * since), np.cos(250 * since) ** 2
-    internal, pushed = internal + 5 + left * swing, 20 * 60 * np.minimum(TIME, 0.1) ** 2 / 0.02
+    internal, pushed = (
+        internal + 5 + left * swing,
+        20 * 60 * np.minimum(TIME, 0.1) ** 2 / 0.02,
+    )
     values = np.zeros((TIME.size, 1, 3))
     values[:, 0, 0], values[:, 0, 2] = np.sqrt(2 * 20 * pushed), -20 * 9.81 * since
     kinetic = (values[:, 0] ** 2).sum(axis=1) / 40 + left * (1 - swing)
-    momentum = Momenta(TIME, printed(values.ravel(), 7).reshape(values.shape), None, Precision(7), (0,))
+    momentum = Momenta(
+        TIME, printed(values.ravel(), 7).reshape(values.shape), None, Precision(7), (0,)
+    )
     written = {"internal": internal, "kinetic": kinetic, "damping": 40 - left}
-    columns = {name: printed(one, 7) for name, one in written.items() if name not in left_out}
+    columns = {
+        name: printed(one, 7) for name, one in written.items() if name not in left_out
+    }
     mass = np.array([np.nan if "kinetic" in left_out else 20.0])
     energies = replace(Balance(TIME, precision=Precision(7)), **columns)  # type: ignore[arg-type]
-    return table(TIME, columns["internal"], replace(momentum, masses=mass), balance=energies)
+    return table(
+        TIME, columns["internal"], replace(momentum, masses=mass), balance=energies
+    )
 
 
-@pytest.mark.parametrize("left_out", [(), ("damping",), ("kinetic",), ("kinetic", "damping")])
-def test_no_energy_that_is_written_hides_a_fall_whose_vibration_is_damped(left_out: tuple[str, ...]) -> None:
+@pytest.mark.parametrize(
+    "left_out", [(), ("damping",), ("kinetic",), ("kinetic", "damping")]
+)
+def test_no_energy_that_is_written_hides_a_fall_whose_vibration_is_damped(
+    left_out: tuple[str, ...],
+) -> None:
     flight = examine(falling_and_damped(*left_out), 0.5, PLAIN).flight
     assert flight.source == "momentum"
     assert flight.start == pytest.approx(0.1, abs=2 * TIME[1])
@@ -348,13 +487,21 @@ def test_no_energy_that_is_written_hides_a_fall_whose_vibration_is_damped(left_o
 
 
 @pytest.mark.slow
-def test_falls_in_all_formats_begin_within_two_states_with_and_without_kinetic_energy(tmp_path: Path) -> None:
+def test_falls_in_all_formats_begin_within_two_states_with_and_without_kinetic_energy(
+    tmp_path: Path,
+) -> None:
     for number, fall in enumerate(falls.fallen(np.random.default_rng(3), 6, 300)):
         td, room = (fall.start + fall.end) / 2, (falls.WITHIN + 0.01) * fall.run.time[1]
         for form, write in FALL_WRITERS.items():
             for kinetic in (True, False):
-                start = falls.found_start(write(fall.run, tmp_path, kinetic=kinetic), td)
-                assert start == pytest.approx(fall.start, abs=room), (number, form, kinetic)
+                start = falls.found_start(
+                    write(fall.run, tmp_path, kinetic=kinetic), td
+                )
+                assert start == pytest.approx(fall.start, abs=room), (
+                    number,
+                    form,
+                    kinetic,
+                )
 
 
 def test_an_internal_energy_that_grows_while_its_body_falls_keeps_no_level() -> None:

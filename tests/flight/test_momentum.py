@@ -47,23 +47,37 @@ class Piece(NamedTuple):
     force: tuple[float, float, float]
 
 
-def total(time: Samples, pieces: Sequence[Piece], alpha: float, gravity: float) -> Samples:
+def total(
+    time: Samples, pieces: Sequence[Piece], alpha: float, gravity: float
+) -> Samples:
     """Momentum of both bodies, (n, 3), by p' = f + m g - alpha p with f constant in each piece, exactly."""
     mass = MASSES.sum()
     p = np.zeros((time.size, 3))
     now = np.array([mass * SPEED, 0.0, 0.0])
     ends = [piece.begin for piece in pieces[1:]] + [np.inf]
     for piece, end in zip(pieces, ends, strict=True):
-        rate = np.array(piece.force) - np.array([0.0, 0.0, mass * gravity]) - alpha * now
+        rate = (
+            np.array(piece.force) - np.array([0.0, 0.0, mass * gravity]) - alpha * now
+        )
         inside = (time >= piece.begin) & (time < end)
         p[inside] = now + _lasted(time[inside] - piece.begin, alpha) * rate
-        now = now + (_lasted(np.array([end - piece.begin]), alpha)[0] if np.isfinite(end) else 0.0) * rate
+        now = (
+            now
+            + (
+                _lasted(np.array([end - piece.begin]), alpha)[0]
+                if np.isfinite(end)
+                else 0.0
+            )
+            * rate
+        )
     return p
 
 
 def _lasted(span: Samples, alpha: float) -> Samples:
     """Integral of exp(-alpha t) over ``span``, shape (n, 1)."""
-    return np.asarray(span if alpha == 0 else -np.expm1(-alpha * span) / alpha)[:, np.newaxis]
+    return np.asarray(span if alpha == 0 else -np.expm1(-alpha * span) / alpha)[
+        :, np.newaxis
+    ]
 
 
 def flown(
@@ -75,9 +89,18 @@ def flown(
     ``share``: amplitude of the momentum they exchange, relative to that of both.
     """
     time = np.linspace(0, END, states)
-    p = total(time, pieces, alpha, gravity)[:, np.newaxis] * (MASSES / MASSES.sum())[:, np.newaxis]
+    p = (
+        total(time, pieces, alpha, gravity)[:, np.newaxis]
+        * (MASSES / MASSES.sum())[:, np.newaxis]
+    )
     phases = 2 * np.pi * frequency * time[:, np.newaxis] + np.array([0.3, 1.9, 4.0])
-    exchanged = share * MASSES.sum() * SPEED * np.exp(-alpha / 2 * time)[:, np.newaxis] * np.cos(phases)
+    exchanged = (
+        share
+        * MASSES.sum()
+        * SPEED
+        * np.exp(-alpha / 2 * time)[:, np.newaxis]
+        * np.cos(phases)
+    )
     p[:, 0] += exchanged
     p[:, 1] -= exchanged
     if sled:
@@ -87,7 +110,9 @@ def flown(
     if digits < EXACT.digits:
         p = printed(p.ravel(), digits).reshape(p.shape)
     masses = np.array([*MASSES, 50.0])[: p.shape[1]]
-    return Momenta(time, p, PARTS[: p.shape[1]], Precision(digits), chosen=(0,), masses=masses)
+    return Momenta(
+        time, p, PARTS[: p.shape[1]], Precision(digits), chosen=(0,), masses=masses
+    )
 
 
 def trip(start: float = 0.08, end: float = 0.33) -> list[Piece]:
@@ -105,13 +130,21 @@ def pulse(begin: float, end: float, force: float) -> list[Piece]:
     """A force in x and z that changes four times and then ceases: a constant one is nothing but another gravity."""
     levels = np.array([1.0, 2.0, 1.5, 0.7])
     times = np.linspace(begin, end, 5)
-    return [Piece(t, (f, 0.0, f)) for t, f in zip(times.tolist(), [*(force * levels).tolist(), 0.0], strict=True)]
+    return [
+        Piece(t, (f, 0.0, f))
+        for t, f in zip(times.tolist(), [*(force * levels).tolist(), 0.0], strict=True)
+    ]
 
 
 def alone(momenta: Momenta) -> Momenta:
     """The same run of which only the box is written."""
     assert momenta.parts
-    return replace(momenta, values=momenta.values[:, :1], parts=momenta.parts[:1], masses=MASSES[:1])
+    return replace(
+        momenta,
+        values=momenta.values[:, :1],
+        parts=momenta.parts[:1],
+        masses=MASSES[:1],
+    )
 
 
 def smooth(seed: int, waves: int, digits: int) -> Momenta:
@@ -150,7 +183,15 @@ def smooth(seed: int, waves: int, digits: int) -> Momenta:
     digits=9,
 )  # the first state of the contact leaves just what the tolerance allows
 def test_the_flight_of_two_bodies_is_found_to_a_few_states_whatever_they_exchange(
-    *, start: float, end: float, td: float, alpha: float, frequency: float, share: float, states: int, digits: int
+    *,
+    start: float,
+    end: float,
+    td: float,
+    alpha: float,
+    frequency: float,
+    share: float,
+    states: int,
+    digits: int,
 ) -> None:
     momenta = flown(
         trip(start, end), alpha=alpha, frequency=frequency, share=share, states=states, digits=digits
@@ -180,7 +221,9 @@ def test_a_part_alone_does_not_fly_while_another_is_attached(
 
 
 @pytest.mark.slow
-def test_a_load_that_never_ends_has_hardly_ever_a_moment_that_passes_for_flight() -> None:
+def test_a_load_that_never_ends_has_hardly_ever_a_moment_that_passes_for_flight() -> (
+    None
+):
     tried = [
         flight_around(smooth(seed, waves, digits), td)
         for waves in (1, 2, 3, 5, 10)
@@ -192,7 +235,9 @@ def test_a_load_that_never_ends_has_hardly_ever_a_moment_that_passes_for_flight(
 
 
 @pytest.mark.parametrize("sled", [1e3, 1e5])
-def test_a_driven_sled_that_stops_is_not_counted_with_the_parts_that_fly(sled: float) -> None:
+def test_a_driven_sled_that_stops_is_not_counted_with_the_parts_that_fly(
+    sled: float,
+) -> None:
     momenta = flown(trip(), sled=sled)
     assert flight_around(momenta, TD) == flight_around(flown(trip()), TD)
 
@@ -202,38 +247,56 @@ def test_the_set_that_flies_together_can_be_named() -> None:
     found = sure(flight_around(named, TD))
     assert found.parts == PARTS[:2]
     assert flight_around(replace(named, flying=(0,)), TD) is None
-    assert flight_around(replace(named, flying=(0, 1, 2)), TD) is None  # what stands does not fall with the others
+    assert (
+        flight_around(replace(named, flying=(0, 1, 2)), TD) is None
+    )  # what stands does not fall with the others
 
 
 def test_attached_parts_are_found_among_many() -> None:
     pair = flown(trip(), share=0.2)
     others = np.zeros((pair.time.size, 30, 3))
-    others[:, :, 1] = np.cumsum(np.random.default_rng(3).normal(size=(pair.time.size, 30)), axis=0)
+    others[:, :, 1] = np.cumsum(
+        np.random.default_rng(3).normal(size=(pair.time.size, 30)), axis=0
+    )
     values = np.concatenate([others[:, :15], pair.values, others[:, 15:]], axis=1)
     parts = tuple(Part(number, f"part {number}") for number in range(1, 33))
     masses = np.array([*np.ones(15), *MASSES, *np.ones(15)])
-    found = sure(flight_around(Momenta(pair.time, values, parts, EXACT, chosen=(15,), masses=masses), TD))
+    found = sure(
+        flight_around(
+            Momenta(pair.time, values, parts, EXACT, chosen=(15,), masses=masses), TD
+        )
+    )
     assert found.parts == (parts[15], parts[16])
 
 
 def test_a_part_of_next_to_no_mass_is_not_put_in_and_out_for_ever() -> None:
     """Whether a sum becomes less by it is a matter of rounding."""
     for seed in range(100):
-        rests = np.random.default_rng(seed).normal(size=(3, 150)) * [[1.0], [1e-20], [0.0]]
+        rests = np.random.default_rng(seed).normal(size=(3, 150)) * [
+            [1.0],
+            [1e-20],
+            [0.0],
+        ]
         rests[2] = -rests[1]
         assert 0 not in _polished(rests, {0}, [0], [0, 1, 2])
 
 
 def test_all_flights_of_a_run_are_listed_and_the_one_around_td_is_taken() -> None:
-    momenta = flown([*pulse(0.0, 0.06, -4e3), *pulse(0.18, 0.20, 9e4), *pulse(0.30, 0.33, 4e4)])
+    momenta = flown(
+        [*pulse(0.0, 0.06, -4e3), *pulse(0.18, 0.20, 9e4), *pulse(0.30, 0.33, 4e4)]
+    )
     flights = all_flights(momenta)
     expected = [(0.06, 0.18), (0.20, 0.30), (0.33, END)]
-    np.testing.assert_allclose([(f.start, f.end) for f in flights], expected, atol=1.5e-3)
+    np.testing.assert_allclose(
+        [(f.start, f.end) for f in flights], expected, atol=1.5e-3
+    )
     assert [f.end_seen for f in flights] == [True, True, False]
     assert all(one.end <= next_one.start for one, next_one in pairwise(flights))
     for flight in flights:
         around = sure(flight_around(momenta, (flight.start + flight.end) / 2))
-        assert (around.start, around.end) == pytest.approx((flight.start, flight.end), abs=1e-3)
+        assert (around.start, around.end) == pytest.approx(
+            (flight.start, flight.end), abs=1e-3
+        )
 
 
 RESTING = replace(flown(trip()), values=0 * flown(trip()).values)
@@ -243,12 +306,16 @@ BEFORE_AND_AFTER = flown([*pulse(0.0, 0.06, -2e4), *pulse(0.33, 0.37, 5e4)])
 @pytest.mark.parametrize(
     ("momenta", "td"),
     [
-        *((BEFORE_AND_AFTER, td) for td in (0.03, 0.35)),  # in the load, and in the contact
+        *(
+            (BEFORE_AND_AFTER, td) for td in (0.03, 0.35)
+        ),  # in the load, and in the contact
         *((flown(trip()), td) for td in (-0.1, END + 0.1)),  # outside the record
         (RESTING, TD),
     ],
 )
-def test_there_is_no_flight_around_a_td_under_force_outside_the_record_or_at_rest(momenta: Momenta, td: float) -> None:
+def test_there_is_no_flight_around_a_td_under_force_outside_the_record_or_at_rest(
+    momenta: Momenta, td: float
+) -> None:
     assert flight_around(momenta, td) is None
 
 
@@ -262,8 +329,16 @@ def test_a_body_that_was_braked_to_rest_does_not_fly() -> None:
     """Its momentum is constant, but nothing."""
     light = flown(trip())
     braked = np.zeros((light.time.size, 1, 3))
-    braked[:, 0, 0] = np.where(light.time < 0.1, 50 + 50 * np.cos(np.pi * light.time / 0.1), 0.0)
-    momenta = Momenta(light.time, printed(braked.ravel(), 5).reshape(braked.shape), PARTS[:1], Precision(5), (0,))
+    braked[:, 0, 0] = np.where(
+        light.time < 0.1, 50 + 50 * np.cos(np.pi * light.time / 0.1), 0.0
+    )
+    momenta = Momenta(
+        light.time,
+        printed(braked.ravel(), 5).reshape(braked.shape),
+        PARTS[:1],
+        Precision(5),
+        (0,),
+    )
     assert flight_around(momenta, TD) is None
     assert flight_around(replace(momenta, values=momenta.values + 5.0), TD)
 
@@ -271,13 +346,20 @@ def test_a_body_that_was_braked_to_rest_does_not_fly() -> None:
 def test_a_load_may_hide_behind_the_coarse_digits_of_a_heavy_part() -> None:
     light = flown(trip(), digits=5)
     train = np.broadcast_to([1.2345e9, 0.0, 0.0], (light.time.size, 1, 3))
-    values, masses = np.concatenate([light.values, train], axis=1), np.array([*MASSES, 1e8])
+    values, masses = (
+        np.concatenate([light.values, train], axis=1),
+        np.array([*MASSES, 1e8]),
+    )
     heavy = replace(light, values=values, parts=PARTS, flying=(0, 1, 2), masses=masses)
     assert flight_around(heavy, TD) is None
 
 
 def test_digits_that_do_not_resolve_a_thousandth_of_the_change_tell_nothing() -> None:
-    pieces = [Piece(0.0, (-2e3, 0, 0)), Piece(0.08, (0, 0, 0)), Piece(0.33, (2e3, 0, 0))]
+    pieces = [
+        Piece(0.0, (-2e3, 0, 0)),
+        Piece(0.08, (0, 0, 0)),
+        Piece(0.33, (2e3, 0, 0)),
+    ]
     assert flight_around(flown(pieces, gravity=0.0, digits=17), TD)
     assert flight_around(flown(pieces, gravity=0.0, digits=4), TD) is None
 
@@ -288,33 +370,58 @@ def test_digits_that_do_not_resolve_a_thousandth_of_the_change_tell_nothing() ->
 def test_on_the_rollover_the_box_alone_does_not_fly() -> None:
     run = read([BOX]).run
     (momenta,) = (one for one in run.momenta(run.parts[:1], None) if one.parts)
-    assert [flight_of(momenta, (0,), td) for td in np.linspace(0.1, 0.38, 15)] == [None] * 15
+    assert [flight_of(momenta, (0,), td) for td in np.linspace(0.1, 0.38, 15)] == [
+        None
+    ] * 15
 
 
 def test_masses_that_are_no_parts_fly_by_the_momentum_of_the_whole_model() -> None:
-    found = answer("suggest", "--td", "0.238", "--part", "1-2", stored("chain_referenceT01.gz"))
-    assert found["flight"] == {"start": 0.0, "end": None, "source": "momentum", "certain": True, "parts": None}
+    found = answer(
+        "suggest", "--td", "0.238", "--part", "1-2", stored("chain_referenceT01.gz")
+    )
+    assert found["flight"] == {
+        "start": 0.0,
+        "end": None,
+        "source": "momentum",
+        "certain": True,
+        "parts": None,
+    }
 
 
 @pytest.mark.parametrize(("run", "start"), [("L1", 0.0200), ("L3", 0.0235)])
-def test_a_flight_after_a_computed_load_begins_when_the_load_is_over(run: str, start: float) -> None:
+def test_a_flight_after_a_computed_load_begins_when_the_load_is_over(
+    run: str, start: float
+) -> None:
     table = np.genfromtxt(stored(f"load_{run}_ref.csv.gz"), delimiter=",", names=True)
     values = np.zeros((table.size, 1, 3))
     values[:, 0, 0] = table["momentum_x_solver"]
-    found = sure(flight_around(Momenta(table["time_s"], values, None, Precision(7), chosen=(0,)), 0.1))
+    found = sure(
+        flight_around(
+            Momenta(table["time_s"], values, None, Precision(7), chosen=(0,)), 0.1
+        )
+    )
     assert found.start == pytest.approx(start, abs=1e-4)
     assert not found.end_seen
 
 
 def titles(found: Run, *, flying: bool) -> set[str]:
-    return {part.title for part in (flying_parts(found) if flying else deformable_parts(found))}
+    return {
+        part.title
+        for part in (flying_parts(found) if flying else deformable_parts(found))
+    }
 
 
 def test_the_box_and_the_step_on_it_fly_and_the_sled_does_not() -> None:
     assert titles(read([BOX]).run, flying=True) == {"box", "step"}
     found = answer("suggest", "--part", "flying", "--td", "0.37", BOX)
-    assert found["history"]["parts"] == answer("suggest", "--part", "1,2", "--td", "0.37", BOX)["history"]["parts"]
-    assert found["recommended"] == answer("suggest", "--part", "1,2", "--td", "0.37", BOX)["recommended"]
+    assert (
+        found["history"]["parts"]
+        == answer("suggest", "--part", "1,2", "--td", "0.37", BOX)["history"]["parts"]
+    )
+    assert (
+        found["recommended"]
+        == answer("suggest", "--part", "1,2", "--td", "0.37", BOX)["recommended"]
+    )
 
 
 def test_all_parts_of_the_car_fly_but_the_ground() -> None:
@@ -326,7 +433,9 @@ def test_all_parts_of_the_car_fly_but_the_ground() -> None:
 
 
 def test_words_may_stand_beside_numbers_and_are_read_once() -> None:
-    selection = with_parts_by_number(read([BOX]).run, Selection(parts=("box", "FLYING")))
+    selection = with_parts_by_number(
+        read([BOX]).run, Selection(parts=("box", "FLYING"))
+    )
     assert selection.parts == ("box", "1", "2")
 
 
@@ -346,14 +455,25 @@ def test_a_table_has_no_parts_that_could_fly() -> None:
 def test_every_command_takes_the_words() -> None:
     for command in (("info",), ("plan",), ("verify", "--tr", "0.1", "--td", "0.37")):
         assert run(*command, "-q", "--part", "flying", BOX).exit_code in (0, 1)
-    assert "part_2" in run("extract", "-q", "--part", "all", BOX, "--write-as", "csv", "-o", "-").stdout
+    assert (
+        "part_2"
+        in run(
+            "extract", "-q", "--part", "all", BOX, "--write-as", "csv", "-o", "-"
+        ).stdout
+    )
 
 
-def test_the_body_that_matters_is_named_where_loose_wheels_fly_longer(tmp_path: Path) -> None:
+def test_the_body_that_matters_is_named_where_loose_wheels_fly_longer(
+    tmp_path: Path,
+) -> None:
     """A body of 280 flies for a fifth of the record; two wheels of 15 for twice as long before, and slide on then."""
     time = np.linspace(0.0, 1.0, 501)
     masses = np.array([100.0, 60.0, 40.0, 80.0, 15.0, 15.0])
-    lifted = np.where(time < 0.55, 12 + 8 * np.sin(70 * time) * np.minimum(1, (0.55 - time) / 0.02), 0.0)
+    lifted = np.where(
+        time < 0.55,
+        12 + 8 * np.sin(70 * time) * np.minimum(1, (0.55 - time) / 0.02),
+        0.0,
+    )
     struck = np.where(time > 0.75, 107 * np.sin(np.pi * (time - 0.75) / 0.3), 0.0)
     momentum = np.zeros((time.size, 6, 2))
     impulse = np.concatenate([[0.0], np.cumsum((lifted + struck)[1:] - 9.81) * time[1]])
@@ -363,7 +483,20 @@ def test_the_body_that_matters_is_named_where_loose_wheels_fly_longer(tmp_path: 
     momentum[:, :4, 0] = 8 * masses[:4]
     for wheel, (before, after) in ((4, (60.0, 333.0)), (5, (46.0, 267.0))):
         pushed = before * np.minimum(time, 0.1) + after * np.maximum(time - 0.5, 0.0)
-        momentum[:, wheel] = masses[wheel] * np.stack([0 * time + 9, pushed - 9.81 * time], axis=1)
+        momentum[:, wheel] = masses[wheel] * np.stack(
+            [0 * time + 9, pushed - 9.81 * time], axis=1
+        )
     energy = (momentum**2).sum(axis=2) / (2 * masses)
-    made = Written(time, momentum, energy, 1 + ringing[:, np.newaxis] ** 2 * np.ones(6), 0 * time, masses, 0 * time)
-    assert [part.id for part in flying_parts(open_run([as_t01(made, tmp_path)], Selection()))] == [1, 2, 3, 4]
+    made = Written(
+        time,
+        momentum,
+        energy,
+        1 + ringing[:, np.newaxis] ** 2 * np.ones(6),
+        0 * time,
+        masses,
+        0 * time,
+    )
+    assert [
+        part.id
+        for part in flying_parts(open_run([as_t01(made, tmp_path)], Selection()))
+    ] == [1, 2, 3, 4]

@@ -28,7 +28,15 @@ from tests.reading import solved
 TIME = np.linspace(0.0, 0.1, 401)
 FLIGHT = (0.0, 0.1)
 # Four corners of a frame and an engine in it; places in metres about any point.
-PLACES = np.array([[1.5, 0.7, 0.1], [1.4, -0.7, 0.0], [-1.5, 0.6, 0.2], [-1.3, -0.7, 0.6], [0.9, 0.1, 0.3]])
+PLACES = np.array(
+    [
+        [1.5, 0.7, 0.1],
+        [1.4, -0.7, 0.0],
+        [-1.5, 0.6, 0.2],
+        [-1.3, -0.7, 0.6],
+        [0.9, 0.1, 0.3],
+    ]
+)
 MASSES = np.array([150.0, 160.0, 140.0, 130.0, 200.0])
 ENGINE = 4
 numbers = st.floats(-1.0, 1.0).map(lambda value: round(value, 3))
@@ -41,17 +49,25 @@ def turned(rate: Samples, angle: Samples) -> Samples:
     x, y, z = rate / size if size > 0 else rate
     across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     full = (size * angle)[:, np.newaxis, np.newaxis]
-    return np.asarray(np.eye(3) + np.sin(full) * across + (1 - np.cos(full)) * across @ across)
+    return np.asarray(
+        np.eye(3) + np.sin(full) * across + (1 - np.cos(full)) * across @ across
+    )
 
 
 def momenta(rate: Samples, slides: Samples, masses: Samples = MASSES) -> Momenta:
     """Momenta of parts that slide, (n, parts, 3) in the body's frame, while this turns at ``rate`` and flies."""
     inside = PLACES + slides
     centre = np.einsum("p,npi->ni", masses / masses.sum(), inside)
-    places = np.einsum("nij,npj->npi", turned(rate, TIME), inside - centre[:, np.newaxis])
-    velocity = np.gradient(places, TIME, axis=0, edge_order=2) + np.array([4.0, -2.5, -1.0])
+    places = np.einsum(
+        "nij,npj->npi", turned(rate, TIME), inside - centre[:, np.newaxis]
+    )
+    velocity = np.gradient(places, TIME, axis=0, edge_order=2) + np.array(
+        [4.0, -2.5, -1.0]
+    )
     parts = tuple(Part(i + 1, f"part {i + 1}") for i in range(masses.size))
-    return Momenta(TIME, velocity * masses[:, np.newaxis], parts, EXACT, tuple(range(masses.size)))
+    return Momenta(
+        TIME, velocity * masses[:, np.newaxis], parts, EXACT, tuple(range(masses.size))
+    )
 
 
 def sliding(way: Samples, part: int = ENGINE) -> Samples:
@@ -73,10 +89,15 @@ def test_a_body_that_turns_is_off_by_the_mass_share_of_what_slides_in_it(
     """Within a tenth of how far the slide pushes it: what of a slide looks like a circle may be the arm of the part."""
     slides = sliding(0.02 * way)
     found = drift(momenta(6.0 * turn, slides))
-    first, last = (np.array([np.interp(t, TIME, axis) for axis in slides[:, ENGINE].T]) for t in (start, 0.095))
+    first, last = (
+        np.array([np.interp(t, TIME, axis) for axis in slides[:, ENGINE].T])
+        for t in (start, 0.095)
+    )
     expected = MASSES[ENGINE] / MASSES.sum() * np.linalg.norm(first - last)
     most = MASSES[ENGINE] / MASSES.sum() * 0.04 * float(np.linalg.norm(way))
-    assert found.errors(np.array([start]), 0.095)[0] == pytest.approx(expected, abs=0.1 * most + 1e-5)
+    assert found.errors(np.array([start]), 0.095)[0] == pytest.approx(
+        expected, abs=0.1 * most + 1e-5
+    )
     if np.linalg.norm(way) > 0.1:
         assert found.part.id == ENGINE + 1
 
@@ -86,26 +107,47 @@ def test_without_rotation_a_slow_slide_is_not_taken_for_an_arc() -> None:
     slides[:, ENGINE, 0] = 0.5 * TIME
     found = drift(momenta(np.zeros(3), slides))
     ways = np.array([0.035, 0.015])
-    np.testing.assert_allclose(found.errors(np.array([0.02, 0.06]), 0.09), ways * MASSES[4] / MASSES.sum())
+    np.testing.assert_allclose(
+        found.errors(np.array([0.02, 0.06]), 0.09), ways * MASSES[4] / MASSES.sum()
+    )
 
 
 def test_two_engines_that_slide_together_add_up() -> None:
-    slides = sliding(np.array([0.02, 0.0, 0.0])) + sliding(np.array([0.02, 0.0, 0.0]), part=0)
+    slides = sliding(np.array([0.02, 0.0, 0.0])) + sliding(
+        np.array([0.02, 0.0, 0.0]), part=0
+    )
     found = drift(momenta(np.array([5.0, 0.5, 0.5]), slides))
     tr = TIME[np.argmax(slides[:, ENGINE, 0])]
     td = TIME[np.argmin(slides[:, ENGINE, 0])]
-    assert found.errors(np.array([tr]), float(td))[0] == pytest.approx(0.04 * 350 / 780, rel=0.1)
+    assert found.errors(np.array([tr]), float(td))[0] == pytest.approx(
+        0.04 * 350 / 780, rel=0.1
+    )
     assert found.part.id == ENGINE + 1  # the heavier one
 
 
 def test_a_rigid_body_is_where_it_should_be() -> None:
-    found = drift(momenta(np.array([5.0, 1.0, -2.0]), np.zeros((TIME.size, *PLACES.shape))))
+    found = drift(
+        momenta(np.array([5.0, 1.0, -2.0]), np.zeros((TIME.size, *PLACES.shape)))
+    )
     assert found.errors(TIME[10:-10:10], 0.095).max() < 1e-5
 
 
 def test_beyond_the_flight_nothing_is_known() -> None:
-    found = sure(drift_of(Flying(momenta(np.zeros(3), sliding(np.ones(3) / 100)), MASSES, range(5), 0.02, 0.08)))
-    assert np.isnan(found.errors(np.array([0.01, 0.05]), 0.07)).tolist() == [True, False]
+    found = sure(
+        drift_of(
+            Flying(
+                momenta(np.zeros(3), sliding(np.ones(3) / 100)),
+                MASSES,
+                range(5),
+                0.02,
+                0.08,
+            )
+        )
+    )
+    assert np.isnan(found.errors(np.array([0.01, 0.05]), 0.07)).tolist() == [
+        True,
+        False,
+    ]
     assert np.isnan(found.errors(np.array([0.05]), 0.09)).all()
 
 
@@ -114,7 +156,10 @@ def test_beyond_the_flight_nothing_is_known() -> None:
     [
         (MASSES, (0, 4)),  # a rotation cannot be told from two parts
         (np.where(np.arange(5) == 1, np.nan, MASSES), range(5)),  # a mass is unknown
-        (np.array([0.01, 0.01, 0.01, 500.0, 300.0]), range(5)),  # all but two have hardly any
+        (
+            np.array([0.01, 0.01, 0.01, 500.0, 300.0]),
+            range(5),
+        ),  # all but two have hardly any
     ],
 )
 def test_unknown_is_none(masses: Samples, members: tuple[int, ...]) -> None:
@@ -124,18 +169,29 @@ def test_unknown_is_none(masses: Samples, members: tuple[int, ...]) -> None:
 
 
 def test_parts_that_are_no_body_at_all_tell_nothing() -> None:
-    slides = np.random.default_rng(1).normal(0.0, 0.05, PLACES.shape) * np.sin(300 * TIME[:, None, None] + PLACES)
-    assert drift_of(Flying(momenta(np.zeros(3), slides), MASSES, range(5), *FLIGHT)) is None
+    slides = np.random.default_rng(1).normal(0.0, 0.05, PLACES.shape) * np.sin(
+        300 * TIME[:, None, None] + PLACES
+    )
+    assert (
+        drift_of(Flying(momenta(np.zeros(3), slides), MASSES, range(5), *FLIGHT))
+        is None
+    )
 
 
 @pytest.mark.slow
-@given(st.floats(0.25, 4.0).filter(lambda periods: abs(periods - 1) > 0.2), vectors, st.floats(0.0, 6.0))
+@given(
+    st.floats(0.25, 4.0).filter(lambda periods: abs(periods - 1) > 0.2),
+    vectors,
+    st.floats(0.0, 6.0),
+)
 def test_a_swing_of_less_than_a_period_makes_the_error_a_lower_bound(
     periods: float, turn: Samples, phase: float
 ) -> None:
     """Most of it passes for the rotation: the error comes out too small, down to a tenth."""
     slides = np.zeros((TIME.size, *PLACES.shape))
-    slides[:, ENGINE] = np.outer(np.sin(2 * np.pi * periods * TIME / TIME[-1] + phase), (0.004, 0.012, 0.016))
+    slides[:, ENGINE] = np.outer(
+        np.sin(2 * np.pi * periods * TIME / TIME[-1] + phase), (0.004, 0.012, 0.016)
+    )
     found = drift(momenta(4.0 * turn + np.array([2.0, 0.0, 0.0]), slides))
     assert found.slow is (periods < 1)
     assert found.at_least is found.slow
@@ -151,10 +207,21 @@ def test_without_rotation_a_slow_swing_passes_for_nothing() -> None:
 def computed_drift(name: str, parts: str, flight: tuple[float, float]) -> Drift:
     """By the momenta of a run that a solver computed."""
     history = solved(name, parts).history
-    return sure(drift_of(Flying(history.momenta[0], sure(history.masses), history.momenta[0].chosen, *flight)))
+    return sure(
+        drift_of(
+            Flying(
+                history.momenta[0],
+                sure(history.masses),
+                history.momenta[0].chosen,
+                *flight,
+            )
+        )
+    )
 
 
-def errors(name: str, parts: str, flight: tuple[float, float], tr: list[float], td: float) -> Samples:
+def errors(
+    name: str, parts: str, flight: tuple[float, float], tr: list[float], td: float
+) -> Samples:
     """Position errors [mm]."""
     found = computed_drift(name, parts, flight)
     assert found.part.title == ("engine" if name.startswith("car") else "block")
@@ -166,10 +233,16 @@ def test_the_car_is_as_far_off_as_computed() -> None:
     """All switched runs in flight: centre of twelve nodes of the body, within 30 % or 1 mm, seen over 1 to 7.5 mm."""
     with results("car_runs.csv").open() as table:
         rows = [
-            one for one in csv.DictReader(table) if one["run"].startswith(("car_a", "car_b_all", "car_td", "car_f"))
+            one
+            for one in csv.DictReader(table)
+            if one["run"].startswith(("car_a", "car_b_all", "car_td", "car_f"))
         ]
-    every = ([float(row[name]) for name in ("td_s", "tr_s", "dcentre_td_mm")] for row in rows)
-    runs = [(td, tr, computed) for td, tr, computed in every if tr > 0.0386 and td < 0.1503]
+    every = (
+        [float(row[name]) for name in ("td_s", "tr_s", "dcentre_td_mm")] for row in rows
+    )
+    runs = [
+        (td, tr, computed) for td, tr, computed in every if tr > 0.0386 and td < 0.1503
+    ]
     assert len(runs) == 16
     for td, tr, computed in runs:
         predicted = errors("carT01.gz", "1-17", (0.0386, 0.1503), [tr], td)[0]
@@ -184,16 +257,25 @@ def test_the_car_is_as_far_off_as_computed() -> None:
         (0.5046, 0.5944, (0.5022, 0.5962), 3.77),
     ],
 )
-def test_the_box_is_as_far_off_as_computed(tr: float, td: float, flight: tuple[float, float], computed: float) -> None:
+def test_the_box_is_as_far_off_as_computed(
+    tr: float, td: float, flight: tuple[float, float], computed: float
+) -> None:
     """drop2_runs.csv: the box 0.2 ms before td of the windows w2, w123_m8 and w3."""
-    assert errors("drop2T01.gz", "1-5", flight, [tr], td)[0] == pytest.approx(computed, rel=0.3)
+    assert errors("drop2T01.gz", "1-5", flight, [tr], td)[0] == pytest.approx(
+        computed, rel=0.3
+    )
 
 
 @pytest.mark.parametrize(
     ("name", "parts", "flight", "bound"),
     [
         ("carT01.gz", "1-14", (0.0386, 0.1503), False),
-        ("carT01.gz", "1,4,5,7,11", (0.0386, 0.1503), True),  # 0.5 mm where the solver found 0.9
+        (
+            "carT01.gz",
+            "1,4,5,7,11",
+            (0.0386, 0.1503),
+            True,
+        ),  # 0.5 mm where the solver found 0.9
         ("drop2T01.gz", "1-5", (0.3396, 0.4194), False),
         ("drop2T01.gz", "1-5", (0.5022, 0.5962), False),
     ],
@@ -205,18 +287,29 @@ def test_of_computed_runs_those_that_come_out_too_small_are_lower_bounds(
 
 
 def test_a_set_that_leaves_the_first_landing_part_out_is_off_as_far() -> None:
-    assert errors("carT01.gz", "1-2,4-17", (0.0386, 0.1503), [0.0496], 0.1464)[0] == pytest.approx(2.17, rel=0.3)
+    assert errors("carT01.gz", "1-2,4-17", (0.0386, 0.1503), [0.0496], 0.1464)[
+        0
+    ] == pytest.approx(2.17, rel=0.3)
 
 
-def test_the_parts_to_be_switched_count_and_only_in_a_flight_that_momenta_show() -> None:
+def test_the_parts_to_be_switched_count_and_only_in_a_flight_that_momenta_show() -> (
+    None
+):
     history = solved("carT01.gz", "1-17").history
     flight = find_flight(history, 0.14, seen_flight(history, 0.14), None)
     found = sure(drift_in_flight(history, flight))
     assert found.part.title == "engine"
-    assert found.errors(np.array([0.0496]), 0.1464)[0] == pytest.approx(2.2e-3, abs=1e-3)
+    assert found.errors(np.array([0.0496]), 0.1464)[0] == pytest.approx(
+        2.2e-3, abs=1e-3
+    )
     assert drift_in_flight(history, flight, [found.part]) is None
     assert drift_in_flight(history, flight._replace(parts=None)) is None
-    assert drift_in_flight(history, find_flight(history, 0.2, seen_flight(history, 0.2), None)) is None
+    assert (
+        drift_in_flight(
+            history, find_flight(history, 0.2, seen_flight(history, 0.2), None)
+        )
+        is None
+    )
 
 
 SPAN = np.linspace(0.0, 1.0, 11)
@@ -233,8 +326,13 @@ def told(*bodies: tuple[int, ...]) -> tuple[RigidBody, ...]:
 
 
 @given(st.lists(st.floats(0.0, 3.0), min_size=1, max_size=5), st.floats(0.0, 0.9))
-def test_the_largest_error_counts_with_its_part_and_its_body(rates: list[float], tr: float) -> None:
-    found = Bodies([moving(i, rate) for i, rate in enumerate(rates)], told(*((i, i + 10) for i in range(len(rates)))))
+def test_the_largest_error_counts_with_its_part_and_its_body(
+    rates: list[float], tr: float
+) -> None:
+    found = Bodies(
+        [moving(i, rate) for i, rate in enumerate(rates)],
+        told(*((i, i + 10) for i in range(len(rates)))),
+    )
     errors = [rate * (0.95 - tr) for rate in rates]
     assert found.errors(np.array([tr]), 0.95)[0] == pytest.approx(max(errors))
     worst = sure(found.worst(tr, 0.95))
@@ -243,7 +341,11 @@ def test_the_largest_error_counts_with_its_part_and_its_body(rates: list[float],
     if worst.error:
         assert rates[worst.drift.part.id] == max(rates)
         assert worst.part == f"mass {worst.drift.part.id}"
-        expected = RigidBody((worst.drift.part.id, worst.drift.part.id + 10)) if len(rates) > 1 else None
+        expected = (
+            RigidBody((worst.drift.part.id, worst.drift.part.id + 10))
+            if len(rates) > 1
+            else None
+        )
         assert worst.body == expected
     assert found.worst(0.5, 1.5) is None
     assert np.isnan(found.errors(np.array([0.5]), 1.5)).all()
@@ -264,7 +366,12 @@ def test_without_a_deck_one_body_is_assumed() -> None:
 
 def test_the_limit_is_that_of_the_bodies_whose_parts_move() -> None:
     still = Drift(SPAN[[0, -1]], np.zeros((2, 3)), np.zeros(2), Part(3, ""), 0.0)
-    assert Bodies([moving(1, 1.0, 50.0), moving(2, 0.1), still], told((1, 4), (2, 5), (3,))).limit == 50 * MOST_OF_PATH
+    assert (
+        Bodies(
+            [moving(1, 1.0, 50.0), moving(2, 0.1), still], told((1, 4), (2, 5), (3,))
+        ).limit
+        == 50 * MOST_OF_PATH
+    )
     assert Bodies([still], told((3,))).limit == np.inf
 
 
@@ -284,7 +391,9 @@ def test_heavy_parts_each_for_itself_stay_where_they_should_as_computed() -> Non
     tr, td = np.array([float(run["tr_s"])]), float(run["td_s"])
     alone = bodies_in_flight(*car("12-14"), told((12,), (13,), (14,)))
     together = bodies_in_flight(*car("12-14"), None)
-    assert alone.errors(tr, td)[0] == pytest.approx(1e-3 * float(run["dcentre_td_mm"]), abs=1e-3)
+    assert alone.errors(tr, td)[0] == pytest.approx(
+        1e-3 * float(run["dcentre_td_mm"]), abs=1e-3
+    )
     assert alone.errors(tr, td)[0] == 0.0
     assert together.errors(tr, td)[0] > 1.5e-3
 
@@ -311,6 +420,8 @@ def test_what_is_not_known_of_a_body_is_not_zero(body: tuple[int, ...]) -> None:
 def test_a_part_in_pieces_and_one_that_does_not_fly_are_not_known() -> None:
     history, flight = car("12-14")
     assert bodies_in_flight(history, flight, [RigidBody((14,), whole=False)]).unknown
-    assert bodies_in_flight(history, flight._replace(refusal="no flight"), told((14,))).unknown
+    assert bodies_in_flight(
+        history, flight._replace(refusal="no flight"), told((14,))
+    ).unknown
     others = tuple(part for part in flight.parts or () if part.id != 14)
     assert bodies_in_flight(history, flight._replace(parts=others), told((14,))).unknown

@@ -40,13 +40,19 @@ def about_centre(slide: Samples) -> Samples:
     return np.asarray(places - MASSES @ places / MASSES.sum())
 
 
-def turned(momentum: Samples, slides: Callable[[float], Samples], time: Samples, start: Samples) -> Samples:
+def turned(
+    momentum: Samples, slides: Callable[[float], Samples], time: Samples, start: Samples
+) -> Samples:
     """Orientations (n, 3, 3) of a body with this angular momentum, by Runge and Kutta."""
 
     def rate(t: float, frame: Samples) -> Samples:
         small = 1e-6
-        before, places, after = (about_centre(slides(t + d)) for d in (-small, 0.0, small))
-        spin = np.einsum("p,pi->i", MASSES, np.cross(places, (after - before) / (2 * small)))
+        before, places, after = (
+            about_centre(slides(t + d)) for d in (-small, 0.0, small)
+        )
+        spin = np.einsum(
+            "p,pi->i", MASSES, np.cross(places, (after - before) / (2 * small))
+        )
         x, y, z = np.linalg.solve(inertia(places), frame.T @ momentum - spin)
         return np.asarray(frame @ np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]))
 
@@ -72,17 +78,23 @@ def placement(places: Samples = PLACES) -> Placement:
     )
 
 
-def drift(where: Samples, deck: Placement | None, members: Collection[int] = range(5)) -> Drift | None:
+def drift(
+    where: Samples, deck: Placement | None, members: Collection[int] = range(5)
+) -> Drift | None:
     velocity = np.gradient(where, TIME, axis=0, edge_order=2)
     parts = tuple(Part(i + 1, f"part {i + 1}") for i in range(MASSES.size))
-    momenta = Momenta(TIME, velocity * MASSES[:, np.newaxis], parts, EXACT, tuple(range(MASSES.size)))
+    momenta = Momenta(
+        TIME, velocity * MASSES[:, np.newaxis], parts, EXACT, tuple(range(MASSES.size))
+    )
     return drift_of(Flying(momenta, MASSES, list(members), 0.01, 0.1, range(5)), deck)
 
 
 @pytest.mark.slow
 @settings(max_examples=5, deadline=None)
 @given(vectors, vectors, st.floats(0.012, 0.08))
-def test_angle_and_place_are_those_of_the_two_motions(momentum: Samples, way: Samples, tr: float) -> None:
+def test_angle_and_place_are_those_of_the_two_motions(
+    momentum: Samples, way: Samples, tr: float
+) -> None:
     """Within 2 % of the largest over the flight, where the engine slides by 2 cm and the body turns by up to 30 deg."""
     full, td = 900.0 * momentum, 0.095
     start = int(np.searchsorted(TIME, tr))
@@ -92,7 +104,10 @@ def test_angle_and_place_are_those_of_the_two_motions(momentum: Samples, way: Sa
 
     frames = turned(full, slides, TIME, np.eye(3))
     inside = np.stack([about_centre(slides(t)) for t in TIME.tolist()])
-    where = np.einsum("nij,npj->npi", frames, inside) + np.outer(TIME, [4.0, -2.5, -1.0])[:, np.newaxis]
+    where = (
+        np.einsum("nij,npj->npi", frames, inside)
+        + np.outer(TIME, [4.0, -2.5, -1.0])[:, np.newaxis]
+    )
     frozen = turned(full, lambda _t: slides(TIME[start]), TIME[start:], frames[start])
     found = drift(where, placement())
     if float(np.linalg.norm(way)) < 0.1:  # nothing moves
@@ -103,21 +118,32 @@ def test_angle_and_place_are_those_of_the_two_motions(momentum: Samples, way: Sa
     angle = np.degrees(np.arccos(np.clip((np.trace(between) - 1) / 2, -1.0, 1.0)))
     asked = TIME[start : start + 1]
     scale = float(found.angles(TIME[41:376:8], TIME[end]).max())
-    assert found.angles(asked, TIME[end])[0] == pytest.approx(angle, abs=0.02 * scale + 1e-3)
+    assert found.angles(asked, TIME[end])[0] == pytest.approx(
+        angle, abs=0.02 * scale + 1e-3
+    )
     point = LOOKED_AT - MASSES @ PLACES / MASSES.sum()
-    moved = [at - about_centre(np.zeros(3))[0] for at in (inside[start, 0], inside[end, 0])]
+    moved = [
+        at - about_centre(np.zeros(3))[0] for at in (inside[start, 0], inside[end, 0])
+    ]
     off = frozen[end - start] @ (point + moved[0]) - frames[end] @ (point + moved[1])
     scale = float(found.errors(TIME[41:376:8], TIME[end]).max())
-    assert found.errors(asked, TIME[end])[0] == pytest.approx(np.linalg.norm(off), abs=0.02 * scale + 1e-5)
+    assert found.errors(asked, TIME[end])[0] == pytest.approx(
+        np.linalg.norm(off), abs=0.02 * scale + 1e-5
+    )
 
 
 @cache
 def still() -> Samples:
     """A body whose engine slides while it turns about its length."""
     way = np.array([0.0, 0.0, 0.02])
-    frames = turned(np.array([900.0, 0.0, 0.0]), lambda t: way * np.sin(94.0 * t), TIME, np.eye(3))
+    frames = turned(
+        np.array([900.0, 0.0, 0.0]), lambda t: way * np.sin(94.0 * t), TIME, np.eye(3)
+    )
     inside = np.stack([about_centre(way * np.sin(94.0 * t)) for t in TIME.tolist()])
-    return np.asarray(np.einsum("nij,npj->npi", frames, inside) + np.outer(TIME, [4.0, -2.5, -1.0])[:, np.newaxis])
+    return np.asarray(
+        np.einsum("nij,npj->npi", frames, inside)
+        + np.outer(TIME, [4.0, -2.5, -1.0])[:, np.newaxis]
+    )
 
 
 def test_without_a_deck_the_angle_is_not_known() -> None:
@@ -127,14 +153,20 @@ def test_without_a_deck_the_angle_is_not_known() -> None:
 
 def test_beyond_the_flight_no_angle_is_known() -> None:
     found = sure(drift(still(), placement()))
-    assert np.isnan(found.angles(np.array([0.005, 0.05]), 0.09)).tolist() == [True, False]
+    assert np.isnan(found.angles(np.array([0.005, 0.05]), 0.09)).tolist() == [
+        True,
+        False,
+    ]
     assert np.isnan(found.angles(np.array([0.05]), 0.11)).all()
 
 
 def test_a_deck_with_the_parts_in_other_places_or_without_one_tells_no_angle() -> None:
     other, without = placement(places=PLACES[[1, 2, 3, 0, 4]]), placement()
     without.parts.pop(2)  # type: ignore[attr-defined]
-    assert [sure(drift(still(), deck)).turning for deck in (other, without)] == [None, None]
+    assert [sure(drift(still(), deck)).turning for deck in (other, without)] == [
+        None,
+        None,
+    ]
 
 
 def test_what_flies_with_a_body_holds_it() -> None:
@@ -142,32 +174,49 @@ def test_what_flies_with_a_body_holds_it() -> None:
     slides = np.zeros((TIME.size, *PLACES.shape))
     slides[:, ENGINE, 0] = 0.5 * TIME
     inside = PLACES + slides
-    where = inside - np.einsum("p,npi->ni", MASSES / MASSES.sum(), inside)[:, np.newaxis]
+    where = (
+        inside - np.einsum("p,npi->ni", MASSES / MASSES.sum(), inside)[:, np.newaxis]
+    )
     where += np.outer(TIME, [4.0, -2.5, -1.0])[:, np.newaxis]
     without = sure(drift(where, None, members=(0, 1, 2, 4)))
     expected = MASSES[ENGINE] / MASSES.sum() * 0.5 * 0.03
-    assert without.errors(np.array([0.05]), 0.08)[0] == pytest.approx(expected, rel=1e-3)
+    assert without.errors(np.array([0.05]), 0.08)[0] == pytest.approx(
+        expected, rel=1e-3
+    )
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("bends", "bound"), [(0.0, False), (0.0005, False), (0.02, True)])
+@pytest.mark.parametrize(
+    ("bends", "bound"), [(0.0, False), (0.0005, False), (0.02, True)]
+)
 def test_a_body_that_bends_more_than_it_is_said_to_turn_makes_the_angle_a_lower_bound(
     bends: float, bound: bool
 ) -> None:
     where = still().copy()
-    where[:, :ENGINE, 2] += bends * np.outer(np.sin(40.0 * TIME), [1.0, -1.0, 1.0, -1.0])  # it is twisted
+    where[:, :ENGINE, 2] += bends * np.outer(
+        np.sin(40.0 * TIME), [1.0, -1.0, 1.0, -1.0]
+    )  # it is twisted
     found = sure(drift(where, placement()))
     assert found.at_least is bound
 
 
 @pytest.mark.slow
-def test_every_switched_run_of_the_car_is_as_far_off_and_turned_as_computed(tmp_path: Path) -> None:
+def test_every_switched_run_of_the_car_is_as_far_off_and_turned_as_computed(
+    tmp_path: Path,
+) -> None:
     """Centre and orientation of twelve nodes of the body: within 30 % or 1 mm, and 30 % or 0.1 degrees."""
     deck = put(tmp_path / "CAR_0000.rad", starter("CAR"))
     where = Placement(read_inventory(str(deck)))
     with results("car_runs.csv").open() as table:
-        rows = [row for row in csv.DictReader(table) if row["run"].startswith(("car_a", "car_b", "car_f", "car_td"))]
-    sets = {"car_b_notfirst": ("1-2", "4-14"), "car_b_stopped": ("1", "4", "5", "7", "11")}
+        rows = [
+            row
+            for row in csv.DictReader(table)
+            if row["run"].startswith(("car_a", "car_b", "car_f", "car_td"))
+        ]
+    sets = {
+        "car_b_notfirst": ("1-2", "4-14"),
+        "car_b_stopped": ("1", "4", "5", "7", "11"),
+    }
     judged = 0
     for row in rows:
         tr, td = np.array([float(row["tr_s"])]), float(row["td_s"])
@@ -176,7 +225,9 @@ def test_every_switched_run_of_the_car_is_as_far_off_and_turned_as_computed(tmp_
             off, angle = float(row["dcentre_td_mm"]), float(row["dangle_td_deg"])
             assert 1e3 * found.errors(tr, td)[0] == pytest.approx(off, rel=0.3, abs=1.0)
             assert found.angles(tr, td)[0] == pytest.approx(angle, rel=0.3, abs=0.1)
-            assert found.at_least is (row["run"] == "car_b_stopped")  # 0.05 degrees where the solver found 0.15
+            assert found.at_least is (
+                row["run"] == "car_b_stopped"
+            )  # 0.05 degrees where the solver found 0.15
             judged += 1
     assert judged == 17
 

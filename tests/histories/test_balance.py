@@ -17,7 +17,9 @@ from tests.reading import read
 
 TIME = np.linspace(0.0, 1.0, 50)
 PARTS = tuple(Part(i + 1, f"part {i + 1}") for i in range(4))
-ENERGIES = np.stack([np.sin(TIME) ** 2, 2 * np.cos(3 * TIME) ** 2, TIME, 1 - np.exp(-TIME)], axis=1)
+ENERGIES = np.stack(
+    [np.sin(TIME) ** 2, 2 * np.cos(3 * TIME) ** 2, TIME, 1 - np.exp(-TIME)], axis=1
+)
 
 
 @dataclass
@@ -47,10 +49,16 @@ def test_the_parts_that_add_up_to_the_energy_of_the_springs_are_springs() -> Non
 
 def test_where_nothing_adds_up_no_part_is_taken_for_a_spring() -> None:
     assert found(Made(0.5 * ENERGIES[:, 0])) == ()
-    assert found(Made(ENERGIES[:, 0] + 0.1)) == ()  # a spring that has no history of its own
+    assert (
+        found(Made(ENERGIES[:, 0] + 0.1)) == ()
+    )  # a spring that has no history of its own
     assert found(Made(np.full(TIME.size, 1e-20))) == ()  # where LS-DYNA begins to count
-    assert found(Made(ENERGIES[:, 3], whole=0.5 * ENERGIES[:, 3])) == ()  # more than all there is
-    assert found(Made(ENERGIES[:, 0], format="csv")) == ()  # a table may mean something else by the name
+    assert (
+        found(Made(ENERGIES[:, 3], whole=0.5 * ENERGIES[:, 3])) == ()
+    )  # more than all there is
+    assert (
+        found(Made(ENERGIES[:, 0], format="csv")) == ()
+    )  # a table may mean something else by the name
     twins = ENERGIES[:, [0, 0, 2, 3]]
     assert found(Made(twins[:, 0], whole=twins.sum(axis=1)), twins) in ((), (1,), (2,))
 
@@ -65,14 +73,22 @@ CAR = stored("carT01.gz")
 def test_the_springs_of_the_car_are_known_and_left_out_of_the_level() -> None:
     run = open_run([CAR], Selection())
     assert [part.title for part in run.springs] == ["mounts", "suspension", "latches"]
-    whole, parts, body = (read([CAR], Selection(parts=p)).history for p in ((), ("1-17",), ("1-14",)))
+    whole, parts, body = (
+        read([CAR], Selection(parts=p)).history for p in ((), ("1-17",), ("1-14",))
+    )
     assert whole.channel == "internal_energy - spring_energy"
     np.testing.assert_allclose(parts.energy, body.energy)
     np.testing.assert_allclose(whole.energy, body.energy, rtol=1e-5, atol=1e-3)
     assert len(sure(parts.parts)) == 17  # they are switched all the same
-    assert [note for note in parts.notes if "mounts, suspension, latches was left out" in note]
+    assert [
+        note
+        for note in parts.notes
+        if "mounts, suspension, latches was left out" in note
+    ]
     answer = suggest(parts, 0.1464, Settings())
-    assert sure(answer.recommended).tr == pytest.approx(0.0386, abs=5e-4)  # with them, 0.0496 or, at another td, 0.0824
+    assert sure(answer.recommended).tr == pytest.approx(
+        0.0386, abs=5e-4
+    )  # with them, 0.0496 or, at another td, 0.0824
 
 
 def test_what_is_asked_for_by_name_is_taken_as_it_is() -> None:

@@ -37,7 +37,9 @@ def only(run: Run) -> ContactForce:
     return force
 
 
-def rcforc(sides: Sequence[str] = ("slave", "master"), times: Samples = TIMES, contact: int = 7) -> bytes:
+def rcforc(
+    sides: Sequence[str] = ("slave", "master"), times: Samples = TIMES, contact: int = 7
+) -> bytes:
     head = " made for tests\n    ls-dyna smp.123456 d    date 01/01/2026\n\n{BEGIN LEGEND}\n Entity #        Title\n"
     head += "        7     body on floor\n{END LEGEND}\n\n"
     lines = [
@@ -50,7 +52,8 @@ def rcforc(sides: Sequence[str] = ("slave", "master"), times: Samples = TIMES, c
 
 def rwforc() -> bytes:
     head = (
-        " made for tests\n\n r i g i d  w a l l  f o r c e s\n\n  time  wall# normal-force  x-force  y-force  z-force\n"
+        " made for tests\n\n r i g i d  w a l l  f o r c e s\n\n  time  wall# "
+        "normal-force  x-force  y-force  z-force\n"
     )
     lines = [
         f" {time:12.5E} {wall:8d} {force * (wall == 2):13.6E} {0:13.6E} {0:13.6E} {0:13.6E}\n"
@@ -66,8 +69,12 @@ def put(folder: Path, **files: bytes) -> list[str]:
     return [str(folder / name) for name in files]
 
 
-@pytest.mark.parametrize("sides", [("slave", "master"), ("master", "slave"), ("SURFA", "SURFB"), ("slave",)])
-def test_an_rcforc_tells_when_a_contact_acts_whichever_side_is_asked(sides: tuple[str, ...], tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "sides", [("slave", "master"), ("master", "slave"), ("SURFA", "SURFB"), ("slave",)]
+)
+def test_an_rcforc_tells_when_a_contact_acts_whichever_side_is_asked(
+    sides: tuple[str, ...], tmp_path: Path
+) -> None:
     force = only(open_run(put(tmp_path, glstat=ENERGY, rcforc=rcforc(sides))))
     assert force.name == "contact 7 'body on floor'"
     assert force.times == SEEN
@@ -84,25 +91,36 @@ def test_an_rwforc_tells_it_of_each_wall(tmp_path: Path) -> None:
 def test_a_folder_is_read_with_its_forces(tmp_path: Path) -> None:
     put(tmp_path, glstat=ENERGY, rcforc=rcforc(), rwforc=rwforc())
     run = open_run([str(tmp_path)])
-    assert [force.name for force in run.contact_forces] == ["contact 7 'body on floor'", "rigid wall 1", "rigid wall 2"]
+    assert [force.name for force in run.contact_forces] == [
+        "contact 7 'body on floor'",
+        "rigid wall 1",
+        "rigid wall 2",
+    ]
     assert {Path(name).name for name in run.sources} == {"glstat", "rcforc", "rwforc"}
     assert len(run.files) == 3
 
 
 def test_forces_alone_are_no_history(tmp_path: Path) -> None:
     with pytest.raises(
-        FormatError, match=r"rcforc: an rcforc or rwforc of LS-DYNA, which holds forces .* name the gls"
+        FormatError,
+        match=r"rcforc: an rcforc or rwforc of LS-DYNA, which holds forces .* name the gls",
     ):
         open_run(put(tmp_path, rcforc=rcforc()))
 
 
 def test_an_rcforc_cut_at_every_byte_gives_what_stands_in_it(tmp_path: Path) -> None:
-    content, whole = rcforc(times=TIMES[:12]), only(open_run(put(tmp_path, glstat=ENERGY, rcforc=rcforc())))
+    content, whole = (
+        rcforc(times=TIMES[:12]),
+        only(open_run(put(tmp_path, glstat=ENERGY, rcforc=rcforc()))),
+    )
     for end in range(content.index(b" master") + 1, len(content), 7):
         run = open_run(put(tmp_path, glstat=ENERGY, rcforc=content[:end]))
         for force in run.contact_forces:
             assert force.time.tolist() == whole.time[: force.time.size].tolist()
-            np.testing.assert_array_equal(np.abs(force.impulses[:-1]), np.abs(whole.impulses[: force.time.size - 1]))
+            np.testing.assert_array_equal(
+                np.abs(force.impulses[:-1]),
+                np.abs(whole.impulses[: force.time.size - 1]),
+            )
         assert run.contact_forces
 
 
@@ -110,7 +128,10 @@ def test_a_later_leg_of_an_rcforc_goes_on(tmp_path: Path) -> None:
     first, second = tmp_path / "leg1", tmp_path / "leg2"
     for folder in (first, second):
         folder.mkdir()
-    names = [*put(first, rcforc=rcforc(times=TIMES[:20])), *put(second, rcforc=rcforc(times=TIMES[15:]))]
+    names = [
+        *put(first, rcforc=rcforc(times=TIMES[:20])),
+        *put(second, rcforc=rcforc(times=TIMES[15:])),
+    ]
     force = only(open_run([*put(tmp_path, glstat=ENERGY), *names]))
     assert force.time.tolist() == TIMES.tolist()
     assert force.times == SEEN
@@ -123,18 +144,27 @@ def binout(acts: np.ndarray = FORCE) -> bytes:
     made.put("ids", [9, 7, 7, 9], "i4")
     made.put("side", [0, 1, 0, 1], "i4")
     made.put("legend_ids", [7, 9], "i4")
-    made.put("legend", b"".join(name.ljust(70) for name in (b"body on floor", b"others")), "i1")
+    made.put(
+        "legend",
+        b"".join(name.ljust(70) for name in (b"body on floor", b"others")),
+        "i1",
+    )
     made.cd("/rwforc/forces/metadata")
     made.put("ids", [1], "i4")
     for number, (time, force) in enumerate(zip(TIMES, acts, strict=True), start=1):
         made.cd(f"/glstat/d{number:06d}")
         for name in GLSTAT:
             made.put(name, [time if name == "time" else 1.0], "f4")
-        for branch, count, values in (("rcforc", 4, [0, -force, force, 0]), ("rwforc/forces", 1, [2 * force])):
+        for branch, count, values in (
+            ("rcforc", 4, [0, -force, force, 0]),
+            ("rwforc/forces", 1, [2 * force]),
+        ):
             made.cd(f"/{branch}/d{number:06d}")
             made.put("time", [time], "f4")
             for axis in "xyz":
-                made.put(f"{axis}_force", values if axis == "z" else [0.0] * count, "f4")
+                made.put(
+                    f"{axis}_force", values if axis == "z" else [0.0] * count, "f4"
+                )
         made.cd(f"/rwforc/transducer/d{number:06d}")
         made.put("time", [time], "f4")
     return bytes(made.data)
@@ -156,7 +186,10 @@ def test_a_binout_of_forces_alone_counts_beside_others(tmp_path: Path) -> None:
     assert len(run.contact_forces) == 3
     assert run.databases[0].format == "glstat"
     assert run.history(Selection()).time.size == TIMES.size
-    with pytest.raises(FormatError, match="no glstat in it, but nodout, rcforc, rwforc; name the binout"):
+    with pytest.raises(
+        FormatError,
+        match="no glstat in it, but nodout, rcforc, rwforc; name the binout",
+    ):
         open_run(names[:1])
 
 
@@ -165,7 +198,12 @@ def t01(groups: Sequence[MadeGroup], values: Samples) -> bytes:
     parts = (MadePart(3, "box", (1,)),)
     made: T01Writer = headed(parts, globals_=12, groups=groups)
     for time, of_groups in zip(TIMES.tolist(), values.tolist(), strict=True):
-        made.state(time, [1 + time] * 12, [1 + time], groups=[np.ravel(members).tolist() for members in of_groups])
+        made.state(
+            time,
+            [1 + time] * 12,
+            [1 + time],
+            groups=[np.ravel(members).tolist() for members in of_groups],
+        )
     return bytes(made.data)
 
 
@@ -174,7 +212,10 @@ def test_a_t01_has_impulses_which_stay_where_no_force_acts(tmp_path: Path) -> No
     between = np.diff(TIMES, prepend=0.0) * FORCE
     values[:, 0, 1, 2] = np.cumsum(between)  # normal, of the second interface
     values[:, 1, 0, 4] = 5 + np.cumsum(between)  # tangential, of the first wall
-    groups = [MadeGroup(101, {1: "floor", 2: ""}), MadeGroup(102, {4: "pole", 5: "ground"})]
+    groups = [
+        MadeGroup(101, {1: "floor", 2: ""}),
+        MadeGroup(102, {4: "pole", 5: "ground"}),
+    ]
     run = open_run(put(tmp_path, runT01=t01(groups, values)))
     assert [(force.name, force.times) for force in run.contact_forces] == [
         ("interface 1 'floor'", ()),
@@ -182,11 +223,16 @@ def test_a_t01_has_impulses_which_stay_where_no_force_acts(tmp_path: Path) -> No
         ("rigid wall 4 'pole'", ((0.875, 2.0),)),
         ("rigid wall 5 'ground'", ()),
     ]
-    assert run.contact_forces[1].impulses[:, 2].sum() == pytest.approx(between.sum(), rel=1e-6)
+    assert run.contact_forces[1].impulses[:, 2].sum() == pytest.approx(
+        between.sum(), rel=1e-6
+    )
 
 
 def test_a_group_of_other_things_has_no_forces(tmp_path: Path) -> None:
-    groups = [MadeGroup(104, {1: "section"}), MadeGroup(101, {1: "floor"}, variables=(7, 8))]
+    groups = [
+        MadeGroup(104, {1: "section"}),
+        MadeGroup(101, {1: "floor"}, variables=(7, 8)),
+    ]
     values = np.zeros((TIMES.size, 1, 6))
     made = headed((MadePart(3, "box", (1,)),), globals_=12, groups=groups)
     for time in TIMES.tolist():
@@ -198,16 +244,35 @@ def test_a_group_of_other_things_has_no_forces(tmp_path: Path) -> None:
 
 def test_rigid_walls_of_a_d3plot_have_theirs(tmp_path: Path) -> None:
     states = [
-        State(t, [1.0], [1.0], [[1.0, 0, 0]], [2.0], [0.0], [0, 0, 0], [0.0, f, *[0.0] * 6])
+        State(
+            t,
+            [1.0],
+            [1.0],
+            [[1.0, 0, 0]],
+            [2.0],
+            [0.0],
+            [0, 0, 0],
+            [0.0, f, *[0.0] * 6],
+        )
         for t, f in zip(TIMES.tolist(), FORCE.tolist(), strict=True)
     ]
     files = D3plotWriter(ids=(1,), titles=(), walls=2).written(states, 20)
     run = open_run(put(tmp_path, **files)[:1])
-    assert [(force.name, force.times) for force in run.contact_forces] == [("rigid wall 1", ()), ("rigid wall 2", SEEN)]
+    assert [(force.name, force.times) for force in run.contact_forces] == [
+        ("rigid wall 1", ()),
+        ("rigid wall 2", SEEN),
+    ]
 
 
 @pytest.mark.parametrize(
-    "name", ["Contact force Z (N)", "resultant_contact_force", "rcforc 7 z", "floor contact1 FNZ", "Wall Force"]
+    "name",
+    [
+        "Contact force Z (N)",
+        "resultant_contact_force",
+        "rcforc 7 z",
+        "floor contact1 FNZ",
+        "Wall Force",
+    ],
 )
 def test_a_column_of_forces_is_known_by_its_name(name: str, tmp_path: Path) -> None:
     rows = "".join(f"{t},{1 + t},{f},{t}\n" for t, f in zip(TIMES, FORCE, strict=True))
@@ -218,10 +283,14 @@ def test_a_column_of_forces_is_known_by_its_name(name: str, tmp_path: Path) -> N
     assert force.times[-1][1] == 2.125
 
 
-@pytest.mark.parametrize("name", ["spring force", "section force", "contact energy", "force", "x momentum"])
+@pytest.mark.parametrize(
+    "name", ["spring force", "section force", "contact energy", "force", "x momentum"]
+)
 def test_other_columns_are_none(name: str, tmp_path: Path) -> None:
     rows = "".join(f"{t},{1 + t},{f}\n" for t, f in zip(TIMES, FORCE, strict=True))
-    run = open_run(put(tmp_path, **{"run.csv": f"time,internal energy,{name}\n{rows}".encode()}))
+    run = open_run(
+        put(tmp_path, **{"run.csv": f"time,internal energy,{name}\n{rows}".encode()})
+    )
     assert run.contact_forces == ()
 
 

@@ -35,10 +35,15 @@ pytestmark = pytest.mark.usefixtures("new_files")
 
 STATES = np.arange(400)
 ONE, OTHER = (glstat_text(STATES / 8, energy + STATES) for energy in (1000.0, 2000.0))
-TABLES = [csv_table.write({"time": STATES / 8, "IE": np.float64(energy) + STATES}) for energy in (1000.0, 2000.0)]
+TABLES = [
+    csv_table.write({"time": STATES / 8, "IE": np.float64(energy) + STATES})
+    for energy in (1000.0, 2000.0)
+]
 
 
-OPENERS = pytest.mark.parametrize("opened", [run_of_file, run_on_disk], ids=["in memory", "on disk"])
+OPENERS = pytest.mark.parametrize(
+    "opened", [run_of_file, run_on_disk], ids=["in memory", "on disk"]
+)
 
 
 @given(
@@ -49,33 +54,56 @@ OPENERS = pytest.mark.parametrize("opened", [run_of_file, run_on_disk], ids=["in
     st.integers(0, 3005),
 )
 def test_bytes_on_a_disk_are_those_in_memory(
-    tmp_path_factory: pytest.TempPathFactory, data: bytes, places: list[int], width: int, begin: int, size: int
+    tmp_path_factory: pytest.TempPathFactory,
+    data: bytes,
+    places: list[int],
+    width: int,
+    begin: int,
+    size: int,
 ) -> None:
     file = put(tmp_path_factory.getbasetemp() / "bytes", data)
     held, there = Content(data), on_disk(file)
-    addresses = np.array([place % (len(data) - width + 1) for place in places], dtype=np.int64)
-    assert there.fields(addresses, width).tolist() == held.fields(addresses, width).tolist()
-    assert (len(there), bytes(there), there[begin:size]) == (len(held), data, held[begin:size])
+    addresses = np.array(
+        [place % (len(data) - width + 1) for place in places], dtype=np.int64
+    )
+    assert (
+        there.fields(addresses, width).tolist()
+        == held.fields(addresses, width).tolist()
+    )
+    assert (len(there), bytes(there), there[begin:size]) == (
+        len(held),
+        data,
+        held[begin:size],
+    )
     assert there.view(0, len(data)).tobytes() == data
     assert there.find(data[-5:], len(data) // 3) == data.find(data[-5:], len(data) // 3)
     assert there.find(b"not there") == -1
     for begin in (0, size // 3):
         assert (
-            there.rfind(data[:1], begin, size) == held.rfind(data[:1], begin, size) == data.rfind(data[:1], begin, size)
+            there.rfind(data[:1], begin, size)
+            == held.rfind(data[:1], begin, size)
+            == data.rfind(data[:1], begin, size)
         )
     assert there.rfind(data[:1], 0, 0) == -1
     assert there.sha256() == hashlib.sha256(data).hexdigest()
 
 
-def test_threads_that_read_one_file_together_get_each_what_it_asks_for(tmp_path: Path) -> None:
+def test_threads_that_read_one_file_together_get_each_what_it_asks_for(
+    tmp_path: Path,
+) -> None:
     data = np.random.default_rng(5).bytes(2000)
     there = on_disk(put(tmp_path / "bytes", data))
     places = np.arange(0, 1960, 40)
 
     def wrong(step: int) -> int:
         """How many readings of another length by each thread differ from the data."""
-        found = [there[at : at + 7 * step] == data[at : at + 7 * step] for at in range(0, 1900, 9)]
-        fields = there.fields(places, step).tobytes() == b"".join(data[at : at + step] for at in places.tolist())
+        found = [
+            there[at : at + 7 * step] == data[at : at + 7 * step]
+            for at in range(0, 1900, 9)
+        ]
+        fields = there.fields(places, step).tobytes() == b"".join(
+            data[at : at + step] for at in places.tolist()
+        )
         return found.count(False) + (not fields)
 
     before = sys.getswitchinterval()
@@ -89,7 +117,9 @@ def test_threads_that_read_one_file_together_get_each_what_it_asks_for(tmp_path:
 
 
 @pytest.mark.parametrize("kind", CONTENTS)
-def test_every_format_is_read_alike_from_a_disk_and_from_memory(kind: str, tmp_path: Path) -> None:
+def test_every_format_is_read_alike_from_a_disk_and_from_memory(
+    kind: str, tmp_path: Path
+) -> None:
     file = put(tmp_path / "run", CONTENTS[kind])
     held, there = run_of_file(file), run_on_disk(file)
     assert (held.notes, held.parts) == (there.notes, there.parts)
@@ -99,7 +129,10 @@ def test_every_format_is_read_alike_from_a_disk_and_from_memory(kind: str, tmp_p
             assert found.channel(name).tolist() == expected.channel(name).tolist()
         ids = [part.id for part in expected.parts]
         for wanted in (ids, ids[::-1]) if ids else ():
-            columns = [one.part_channel("internal_energy", wanted).tolist() for one in (found, expected)]
+            columns = [
+                one.part_channel("internal_energy", wanted).tolist()
+                for one in (found, expected)
+            ]
             assert columns[0] == columns[1]
     assert there.files[0].sha256() == hashlib.sha256(CONTENTS[kind]).hexdigest()
 
@@ -126,8 +159,14 @@ def test_a_file_that_is_appended_to_all_the_time_is_read_as_it_was_at_one_moment
         return fstat(number)
 
     monkeypatch.setattr(os, "fstat", growing)
-    assert run_on_disk(file).history(Selection()).energy.tolist() == (1000.0 + STATES).tolist()
-    assert run_of_file(file).history(Selection()).energy.tolist() == (1000.0 + STATES).tolist()
+    assert (
+        run_on_disk(file).history(Selection()).energy.tolist()
+        == (1000.0 + STATES).tolist()
+    )
+    assert (
+        run_of_file(file).history(Selection()).energy.tolist()
+        == (1000.0 + STATES).tolist()
+    )
 
 
 def test_a_file_replaced_by_another_is_read_as_it_was(tmp_path: Path) -> None:
@@ -142,9 +181,16 @@ def test_a_file_replaced_by_another_is_read_as_it_was(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("rest", "reason"), [(b"", "became shorter|written anew"), (OTHER, "rewritten"), (2 * OTHER, "rewritten")]
+    ("rest", "reason"),
+    [
+        (b"", "became shorter|written anew"),
+        (OTHER, "rewritten"),
+        (2 * OTHER, "rewritten"),
+    ],
 )
-def test_a_file_written_anew_is_an_error_and_never_half_of_each(tmp_path: Path, rest: bytes, reason: str) -> None:
+def test_a_file_written_anew_is_an_error_and_never_half_of_each(
+    tmp_path: Path, rest: bytes, reason: str
+) -> None:
     file = put(tmp_path / "glstat", ONE)
     run = run_on_disk(file)
     file.write_bytes(rest)
@@ -154,7 +200,9 @@ def test_a_file_written_anew_is_an_error_and_never_half_of_each(tmp_path: Path, 
         run.files[0].sha256()
 
 
-def test_a_write_under_way_is_no_file_written_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_write_under_way_is_no_file_written_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The system shows the time of a write before its size."""
     file = put(tmp_path / "glstat", ONE)
     there = on_disk(file)
@@ -169,9 +217,14 @@ def test_a_write_under_way_is_no_file_written_anew(tmp_path: Path, monkeypatch: 
 @pytest.mark.usefixtures("new_files")  # of one that looks old no half can be told
 @OPENERS
 def test_a_file_that_is_written_anew_all_the_time_gives_one_of_its_contents_or_an_error(
-    opened: Callable[[Path], Run], contents: Sequence[bytes], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    opened: Callable[[Path], Run],
+    contents: Sequence[bytes],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(time, "sleep", sleep)  # shorter pauses end before a write does that a busy machine holds up
+    monkeypatch.setattr(
+        time, "sleep", sleep
+    )  # shorter pauses end before a write does that a busy machine holds up
     file, done = tmp_path / "run", Event()
     one, other = contents
     file.write_bytes(one)
@@ -192,7 +245,10 @@ def test_a_file_that_is_written_anew_all_the_time_gives_one_of_its_contents_or_a
             except D2RPickError as error:
                 assert "\n" not in str(error)  # noqa: PT017
             else:
-                assert energy.tolist() in [(offset + STATES[: energy.size]).tolist() for offset in (1000.0, 2000.0)]
+                assert energy.tolist() in [
+                    (offset + STATES[: energy.size]).tolist()
+                    for offset in (1000.0, 2000.0)
+                ]
     finally:
         done.set()
         writer.join()
@@ -201,7 +257,10 @@ def test_a_file_that_is_written_anew_all_the_time_gives_one_of_its_contents_or_a
 @OPENERS
 @pytest.mark.parametrize("share", [0.001, 0.5, 0.999])
 def test_a_file_that_is_half_written_anew_when_it_is_opened_is_not_read_as_it_stands(
-    opened: Callable[[Path], Run], share: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    opened: Callable[[Path], Run],
+    share: float,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     file, written = tmp_path / "glstat", int(share * len(ONE))
     file.write_bytes(OTHER[:written] + ONE[written:])
@@ -214,7 +273,9 @@ def test_a_file_that_is_half_written_anew_when_it_is_opened_is_not_read_as_it_st
         sleep(seconds)
 
     monkeypatch.setattr(time, "sleep", write_the_rest)
-    assert opened(file).history(Selection()).energy.tolist() == (2000.0 + STATES).tolist()
+    assert (
+        opened(file).history(Selection()).energy.tolist() == (2000.0 + STATES).tolist()
+    )
 
 
 ANEW = {
@@ -247,7 +308,9 @@ def test_a_file_of_any_format_that_is_written_anew_between_two_readings_gives_wh
 
 
 @pytest.mark.parametrize("kind", ["binout", "radioss-th", "matsum"])
-def test_what_is_not_there_since_a_file_was_written_anew_is_not_passed_over(kind: str, tmp_path: Path) -> None:
+def test_what_is_not_there_since_a_file_was_written_anew_is_not_passed_over(
+    kind: str, tmp_path: Path
+) -> None:
     file = put(tmp_path / "run", CONTENTS[kind])
     run = run_on_disk(file)
     assert run.databases[0].span
@@ -256,15 +319,22 @@ def test_what_is_not_there_since_a_file_was_written_anew_is_not_passed_over(kind
         survey(run, Selection())
 
 
-def fixed_times(monkeypatch: pytest.MonkeyPatch, modified: int, changed: int) -> list[float]:
+def fixed_times(
+    monkeypatch: pytest.MonkeyPatch, modified: int, changed: int
+) -> list[float]:
     """Let files have these times for ever [ns before now]; the pauses that are made."""
     pauses: list[float] = []
     now, fstat = time.time_ns(), os.fstat
 
     def found(number: int) -> SimpleNamespace:
         really = fstat(number)
-        kept = {name: getattr(really, name) for name in ("st_dev", "st_ino", "st_size", "st_mode")}
-        return SimpleNamespace(**kept, st_mtime_ns=now - modified, st_ctime_ns=now - changed)
+        kept = {
+            name: getattr(really, name)
+            for name in ("st_dev", "st_ino", "st_size", "st_mode")
+        }
+        return SimpleNamespace(
+            **kept, st_mtime_ns=now - modified, st_ctime_ns=now - changed
+        )
 
     monkeypatch.setattr(os, "fstat", found)
     monkeypatch.setattr(time, "sleep", pauses.append)
@@ -275,10 +345,18 @@ def fixed_times(monkeypatch: pytest.MonkeyPatch, modified: int, changed: int) ->
 HOUR = 3_600_000_000_001
 
 
-@pytest.mark.parametrize(("modified", "changed"), [(HOUR, HOUR), (-HOUR, HOUR)], ids=["old", "time set ahead"])
+@pytest.mark.parametrize(
+    ("modified", "changed"),
+    [(HOUR, HOUR), (-HOUR, HOUR)],
+    ids=["old", "time set ahead"],
+)
 @OPENERS
 def test_a_file_that_did_not_change_lately_is_read_without_a_pause(
-    opened: Callable[[Path], Run], modified: int, changed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    opened: Callable[[Path], Run],
+    modified: int,
+    changed: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     file = put(tmp_path / "run", ONE)
     pauses = fixed_times(monkeypatch, modified, changed)
@@ -287,7 +365,9 @@ def test_a_file_that_did_not_change_lately_is_read_without_a_pause(
     assert not pauses
 
 
-def test_a_small_file_that_changes_later_is_signed_as_it_was_read(tmp_path: Path) -> None:
+def test_a_small_file_that_changes_later_is_signed_as_it_was_read(
+    tmp_path: Path,
+) -> None:
     file = put(tmp_path / "glstat", ONE)
     history = read_history([str(file)])
     file.write_bytes(OTHER)

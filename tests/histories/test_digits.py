@@ -2,7 +2,14 @@
 
 from hypothesis import example, given, strategies as st
 
-from d2rpick.histories.digits import above, as_read, not_after, not_before, told_apart, window_as_read
+from d2rpick.histories.digits import (
+    above,
+    as_read,
+    not_after,
+    not_before,
+    told_apart,
+    window_as_read,
+)
 
 TIMES = st.floats(-1e9, 1e9).filter(lambda time: not 0 < abs(time) < 1e-290)
 
@@ -12,7 +19,9 @@ TIMES = st.floats(-1e9, 1e9).filter(lambda time: not 0 < abs(time) < 1e-290)
 @example(0.999999999)
 @example(-0.999999999)
 @example(99999.95)
-def test_a_time_that_is_rounded_is_the_nearest_of_six_digits_on_its_side(time: float) -> None:
+def test_a_time_that_is_rounded_is_the_nearest_of_six_digits_on_its_side(
+    time: float,
+) -> None:
     below, above = not_after(time), not_before(time)
     assert below <= time <= above
     assert as_read(below) == below

@@ -14,7 +14,9 @@ from d2rpick.histories.history import History, Precision, Samples
 def history(energy: ArrayLike, time: ArrayLike | None = None) -> History:
     energy = np.asarray(energy, dtype=np.float64)
     time = np.arange(float(energy.size)) if time is None else np.asarray(time)
-    return History(time, energy, source=("run",), format="csv", channel="internal energy")
+    return History(
+        time, energy, source=("run",), format="csv", channel="internal energy"
+    )
 
 
 def read_only(values: Samples) -> Samples:
@@ -39,14 +41,23 @@ def test_what_cannot_change_is_not_copied_unless_it_holds_more_than_itself() -> 
     assert not np.shares_memory(history(table[:, 3]).energy, table)
 
 
-@given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=30), st.lists(st.floats(0, 1), min_size=1, max_size=20))
-def test_many_energies_are_those_of_single_times(energy: list[float], shares: list[float]) -> None:
+@given(
+    st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=30),
+    st.lists(st.floats(0, 1), min_size=1, max_size=20),
+)
+def test_many_energies_are_those_of_single_times(
+    energy: list[float], shares: list[float]
+) -> None:
     found = history(energy, np.arange(len(energy)) * 0.5)
     times = np.array([*shares, 0.0, 1.0]) * found.time[-1]
-    assert found.energies_at(times).tolist() == pytest.approx([found.energy_at(t) for t in times.tolist()])
+    assert found.energies_at(times).tolist() == pytest.approx(
+        [found.energy_at(t) for t in times.tolist()]
+    )
 
 
-@pytest.mark.parametrize("precision", [Precision(6), Precision(decimals=4), Precision()])
+@pytest.mark.parametrize(
+    "precision", [Precision(6), Precision(decimals=4), Precision()]
+)
 def test_quanta_are_the_quantum_of_each(precision: Precision) -> None:
     values = np.array([0.0, 1.0, -1.0, 0.0640123, 999999.0, 1e-30, -7.5e12])
     assert precision.quanta(values).tolist() == pytest.approx(
@@ -55,7 +66,9 @@ def test_quanta_are_the_quantum_of_each(precision: Precision) -> None:
 
 
 @pytest.mark.parametrize("states", [1, 2, 3, 50])
-def test_energy_between_the_states_is_that_of_numpy_over_the_whole_record(states: int) -> None:
+def test_energy_between_the_states_is_that_of_numpy_over_the_whole_record(
+    states: int,
+) -> None:
     rng = np.random.default_rng(3)
     time, energy = np.cumsum(rng.uniform(0.1, 1, states)), rng.normal(size=states)
     found = history(energy, time)
@@ -66,7 +79,9 @@ def test_energy_between_the_states_is_that_of_numpy_over_the_whole_record(states
             found.energy_at(float(outside))
 
 
-def test_what_was_found_in_a_record_is_made_once_and_stays_behind_when_it_goes_to_another_process() -> None:
+def test_what_was_found_in_a_record_is_made_once_and_stays_behind_when_it_goes_to_another_process() -> (
+    None
+):
     record, made = history(np.ones(3)), iter((1, 2))
     assert [record.known.once("one", lambda: next(made)) for _ in range(2)] == [1, 1]
     record.known.once("not for other processes", lambda: lambda: None)

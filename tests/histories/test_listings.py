@@ -5,7 +5,12 @@ from pathlib import Path
 import pytest
 
 from d2rpick.base.errors import FormatError
-from d2rpick.histories.listings import printed_steps, read_timing, read_zone_times, wrong_energies
+from d2rpick.histories.listings import (
+    printed_steps,
+    read_timing,
+    read_zone_times,
+    wrong_energies,
+)
 from d2rpick.histories.opening import open_run
 from tests.command import GLSTAT, put
 from tests.text_files import glstat_text
@@ -28,7 +33,9 @@ TAIL = """
 
 
 def listing(owner: str = "2026 Siemens", tag: str = "", ran: str = "2026/11/22") -> str:
-    return HEAD.format(bar=BAR, tag=tag and f"CommitID: {tag}", owner=owner) + TAIL.format(ran=ran)
+    return HEAD.format(
+        bar=BAR, tag=tag and f"CommitID: {tag}", owner=owner
+    ) + TAIL.format(ran=ran)
 
 
 def told(folder: Path, text: str, leg: int = 2, history: str = "") -> list[str]:
@@ -36,14 +43,24 @@ def told(folder: Path, text: str, leg: int = 2, history: str = "") -> list[str]:
     return list(wrong_energies([str(folder / (history or f"CART{leg:02d}"))]))
 
 
-BEFORE, FIX, AFTER = "6068aa23d", "2b7ab50b747de97049f2a80bc36558eec5c0c764", "780156a9a0b8906458ebd7a6eee35dbb5ef54f1a"
+BEFORE, FIX, AFTER = (
+    "6068aa23d",
+    "2b7ab50b747de97049f2a80bc36558eec5c0c764",
+    "780156a9a0b8906458ebd7a6eee35dbb5ef54f1a",
+)
 
 
 @pytest.mark.parametrize(
     ("text", "why"),
     [
         (listing("1986-2025 Altair Engineering, Inc."), "built in 2025"),
-        (listing("1986-2022 Altair Engineering, Inc.", "440deeba848d606665f88afb8302e85b1ecf72bf"), "built in 2022"),
+        (
+            listing(
+                "1986-2022 Altair Engineering, Inc.",
+                "440deeba848d606665f88afb8302e85b1ecf72bf",
+            ),
+            "built in 2022",
+        ),
         (listing("1986-2026 Altair Engineering, Inc.", BEFORE), "commit 6068aa23d"),
         (listing(tag=FIX), "commit 2b7ab50b7"),  # with the regression of the fix
         (listing(ran="2026/01/12"), "run on 2026-01-12"),
@@ -51,13 +68,27 @@ BEFORE, FIX, AFTER = "6068aa23d", "2b7ab50b747de97049f2a80bc36558eec5c0c764", "7
         (listing(tag=AFTER), ""),
         (listing(tag="bd4557ba7"), ""),
         (listing(), ""),  # a build of 2026 that names no commit
-        (listing("1986-2025 Altair Engineering, Inc.").replace("OpenRadioss", "Radioss"), ""),  # not known of others
-        (listing("1986-2025 Altair Engineering, Inc.").replace("SET ON", "LOCAL SKEW"), ""),
+        (
+            listing("1986-2025 Altair Engineering, Inc.").replace(
+                "OpenRadioss", "Radioss"
+            ),
+            "",
+        ),  # not known of others
+        (
+            listing("1986-2025 Altair Engineering, Inc.").replace(
+                "SET ON", "LOCAL SKEW"
+            ),
+            "",
+        ),
         ("", ""),
     ],
 )
-def test_an_engine_from_before_the_fix_is_told(tmp_path: Path, text: str, why: str) -> None:
-    assert told(tmp_path, text) == ([f"{tmp_path / 'CAR_0002.out'}: {why}"] if why else [])
+def test_an_engine_from_before_the_fix_is_told(
+    tmp_path: Path, text: str, why: str
+) -> None:
+    assert told(tmp_path, text) == (
+        [f"{tmp_path / 'CAR_0002.out'}: {why}"] if why else []
+    )
 
 
 def test_the_first_leg_is_no_restart(tmp_path: Path) -> None:
@@ -69,9 +100,14 @@ def test_the_listing_lies_beside_the_history(tmp_path: Path, name: str) -> None:
     assert told(tmp_path, listing("1986-2025 Altair Engineering, Inc."), history=name)
 
 
-@pytest.mark.parametrize("name", ["glstat", "energy.csv", "CART2", "other/CART02", "T02", "\0T02"])
+@pytest.mark.parametrize(
+    "name", ["glstat", "energy.csv", "CART2", "other/CART02", "T02", "\0T02"]
+)
 def test_a_history_without_a_listing_tells_nothing(tmp_path: Path, name: str) -> None:
-    assert told(tmp_path, listing("1986-2025 Altair Engineering, Inc."), history=name) == []
+    assert (
+        told(tmp_path, listing("1986-2025 Altair Engineering, Inc."), history=name)
+        == []
+    )
 
 
 def test_the_middle_of_a_long_listing_is_not_read(tmp_path: Path) -> None:
@@ -103,7 +139,8 @@ D3HSP = """
 
 
 @pytest.mark.parametrize(
-    ("elements", "total", "found"), [("0.0000E+00", "1.0000E+00", (0.49, 0.3)), ("4.0000E+00", "6.0000E+00", (5, 4))]
+    ("elements", "total", "found"),
+    [("0.0000E+00", "1.0000E+00", (0.49, 0.3)), ("4.0000E+00", "6.0000E+00", (5, 4))],
 )
 def test_a_d3hsp_is_read_by_the_clock_where_processor_times_are_rounded_to_nothing(
     tmp_path: Path, elements: str, total: str, found: tuple[float, float]
@@ -121,12 +158,18 @@ def test_smallest_steps_of_a_d3hsp_are_found_beside_the_deck(tmp_path: Path) -> 
 
 
 def test_the_part_that_controls_the_step_is_found_in_a_glstat(tmp_path: Path) -> None:
-    (tmp_path / "glstat").write_bytes(glstat_text([0.0, 0.5], [1.0, 2.0]).replace(b"0.00000E+00", b"2.50000E-06"))
-    assert printed_steps(open_run([str(tmp_path / "glstat")])) == {10: (2.5e-6, "glstat")}
+    (tmp_path / "glstat").write_bytes(
+        glstat_text([0.0, 0.5], [1.0, 2.0]).replace(b"0.00000E+00", b"2.50000E-06")
+    )
+    assert printed_steps(open_run([str(tmp_path / "glstat")])) == {
+        10: (2.5e-6, "glstat")
+    }
 
 
 def test_times_per_zone_cycle_of_a_glstat(tmp_path: Path) -> None:
-    text = glstat_text([0.0, 0.5], [1.0, 2.0]).replace(b"(nanosec)..             0", b"(nanosec)..          5134")
+    text = glstat_text([0.0, 0.5], [1.0, 2.0]).replace(
+        b"(nanosec)..             0", b"(nanosec)..          5134"
+    )
     found = read_zone_times(str(put(tmp_path / "glstat", text)))
     assert found.time.tolist() == [0.0, 0.5]
     assert found.per_zone == pytest.approx(5134e-9)

@@ -9,7 +9,12 @@ import pytest
 from d2rpick.choice.overview import survey
 from d2rpick.histories.formats import csv_table, hdf5_file
 from d2rpick.histories.history import Samples
-from d2rpick.histories.meaning import find_internal_energies, find_meaning, find_quantities, is_time
+from d2rpick.histories.meaning import (
+    find_internal_energies,
+    find_meaning,
+    find_quantities,
+    is_time,
+)
 from d2rpick.histories.names import Selection
 from tests.hdf5_files import written
 from tests.reading import run_of
@@ -77,7 +82,9 @@ SPELLINGS = [
 
 
 @pytest.mark.parametrize(("internal", "kinetic"), SPELLINGS)
-def test_internal_and_kinetic_energy_are_found_in_any_spelling(internal: str, kinetic: str) -> None:
+def test_internal_and_kinetic_energy_are_found_in_any_spelling(
+    internal: str, kinetic: str
+) -> None:
     names = ["z", kinetic, internal, "door 7"]
     assert find_internal_energies(names) == [2]
     assert find_quantities(names) == {"kinetic_energy": [kinetic]}
@@ -108,8 +115,21 @@ def test_other_quantities_are_found_too(name: str, quantity: str) -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        *("boxKE_J", "Kinetic energy of the door", "KE_3", "eroded kinetic energy", "kinetic + internal energy"),
-        *("elastic_contact_energy", "percentage_added_mass", "Kinetic energy: door", "unmoved", "part_id", "vx"),
+        *(
+            "boxKE_J",
+            "Kinetic energy of the door",
+            "KE_3",
+            "eroded kinetic energy",
+            "kinetic + internal energy",
+        ),
+        *(
+            "elastic_contact_energy",
+            "percentage_added_mass",
+            "Kinetic energy: door",
+            "unmoved",
+            "part_id",
+            "vx",
+        ),
     ],
 )
 def test_what_is_of_something_else_is_no_quantity_of_the_model(name: str) -> None:
@@ -117,28 +137,45 @@ def test_what_is_of_something_else_is_no_quantity_of_the_model(name: str) -> Non
 
 
 def test_a_name_without_addition_is_preferred() -> None:
-    assert find_internal_energies(["total internal energy", "internal energy", "door internal energy"]) == [1]
-    assert find_internal_energies(["box IE", "IE_total", "dissipated internal energy"]) == [0, 1]  # to be chosen
-    assert find_quantities(["kinetic_energy", "total_kinetic_energy"]) == {"kinetic_energy": ["kinetic_energy"]}
+    assert find_internal_energies(
+        ["total internal energy", "internal energy", "door internal energy"]
+    ) == [1]
+    assert find_internal_energies(
+        ["box IE", "IE_total", "dissipated internal energy"]
+    ) == [0, 1]  # to be chosen
+    assert find_quantities(["kinetic_energy", "total_kinetic_energy"]) == {
+        "kinetic_energy": ["kinetic_energy"]
+    }
 
 
 def test_total_alone_is_the_total_energy_beside_a_kinetic_energy_only() -> None:
-    assert find_quantities(["internal", "kinetic", "total"])["total_energy"] == ["total"]
+    assert find_quantities(["internal", "kinetic", "total"])["total_energy"] == [
+        "total"
+    ]
     assert find_quantities(["box", "door", "total"]) == {}
 
 
-@pytest.mark.parametrize("name", ["Time (ms)", "t in ms", "Zeit [s]", "Total time", "time_whole", "Время", "t/s"])
+@pytest.mark.parametrize(
+    "name",
+    ["Time (ms)", "t in ms", "Zeit [s]", "Total time", "time_whole", "Время", "t/s"],
+)
 def test_times_are_found(name: str) -> None:
     assert is_time(name)
 
 
-@pytest.mark.parametrize("name", ["Time step", "wall time", "CPU time", "T box", "temperature", "X"])
+@pytest.mark.parametrize(
+    "name", ["Time step", "wall time", "CPU time", "T box", "temperature", "X"]
+)
 def test_other_times_are_none_of_the_states(name: str) -> None:
     assert not is_time(name)
 
 
 TIME = np.linspace(0.0, 1.0, 21)
-COLUMNS = {"Internal energy": TIME, "Kinetic energy": 2 - TIME, "Total energy": 2 + 0 * TIME}
+COLUMNS = {
+    "Internal energy": TIME,
+    "Kinetic energy": 2 - TIME,
+    "Total energy": 2 + 0 * TIME,
+}
 
 
 def table(*names: str) -> str:
@@ -157,10 +194,16 @@ def notes_of(text: str, *energy: str) -> str:
 
 def test_what_looks_like_an_energy_and_is_not_used_is_named() -> None:
     assert notes_of(table("IE", "KE", "z")) == ""
-    assert "'KE of the door' (kinetic_energy?) looks like an energy" in notes_of(table("IE", "KE of the door"))
-    assert "'ALLPD', 'ALLSE' look like energies" in notes_of(table("ALLIE", "ALLPD", "ALLSE"))
+    assert "'KE of the door' (kinetic_energy?) looks like an energy" in notes_of(
+        table("IE", "KE of the door")
+    )
+    assert "'ALLPD', 'ALLSE' look like energies" in notes_of(
+        table("ALLIE", "ALLPD", "ALLSE")
+    )
     both = notes_of(table("IE", "KE", "Kinetic energy"))
-    assert "'KE' (kinetic_energy?), 'Kinetic energy' (kinetic_energy?) look like" in both
+    assert (
+        "'KE' (kinetic_energy?), 'Kinetic energy' (kinetic_energy?) look like" in both
+    )
 
 
 def test_internal_energies_that_were_passed_over_by_name_are_not_named() -> None:
@@ -170,7 +213,11 @@ def test_internal_energies_that_were_passed_over_by_name_are_not_named() -> None
 def h5md(file: h5py.File) -> None:
     for name, values in COLUMNS.items():
         group = file.create_group(f"observables/{name.lower().replace(' ', '_')}")
-        group["step"], group["time"], group["value"] = np.arange(TIME.size), TIME, values
+        group["step"], group["time"], group["value"] = (
+            np.arange(TIME.size),
+            TIME,
+            values,
+        )
 
 
 def exodus(file: h5py.File) -> None:
@@ -189,17 +236,29 @@ def group_of_energies(file: h5py.File) -> None:
 def erf(file: h5py.File) -> None:
     kinds = file.create_group("post/multistate/TIMESERIES1/multientityresults")
     for name, values in COLUMNS.items():
-        add_block(kinds, f"MODEL/{name.upper().replace(' ', '_')}", values[:, np.newaxis], [0])
-    add_block(kinds, "PART/INTERNAL_ENERGY", np.stack([TIME / 2, TIME / 3], axis=1), [7, 9])
+        add_block(
+            kinds, f"MODEL/{name.upper().replace(' ', '_')}", values[:, np.newaxis], [0]
+        )
+    add_block(
+        kinds, "PART/INTERNAL_ENERGY", np.stack([TIME / 2, TIME / 3], axis=1), [7, 9]
+    )
 
 
-def add_block(kinds: h5py.Group, name: str, values: Samples, entities: list[int]) -> None:
+def add_block(
+    kinds: h5py.Group, name: str, values: Samples, entities: list[int]
+) -> None:
     block = kinds.create_group(f"{name}/ZONE1_set1/erfblock")
-    block["indexval"], block["entid"], block["res"] = TIME[:, np.newaxis], entities, values[:, :, np.newaxis]
+    block["indexval"], block["entid"], block["res"] = (
+        TIME[:, np.newaxis],
+        entities,
+        values[:, :, np.newaxis],
+    )
 
 
 @pytest.mark.parametrize("layout", [h5md, exodus, group_of_energies, erf])
-def test_hdf5_files_are_read_by_their_own_names(layout: Callable[[h5py.File], None]) -> None:
+def test_hdf5_files_are_read_by_their_own_names(
+    layout: Callable[[h5py.File], None],
+) -> None:
     run = run_of(hdf5_file, written(layout).getvalue())
     history = run.history(Selection())
     np.testing.assert_array_equal((history.time, history.energy), (TIME, TIME))
@@ -219,7 +278,9 @@ def test_a_quantity_at_other_times_than_the_energy_is_not_taken() -> None:
 
 def test_the_parts_of_an_erf_file_are_chosen_by_number() -> None:
     path = "post/multistate/TIMESERIES1/multientityresults/PART/INTERNAL_ENERGY/9/value"
-    history = run_of(hdf5_file, written(erf).getvalue()).history(Selection(energy=(path,)))
+    history = run_of(hdf5_file, written(erf).getvalue()).history(
+        Selection(energy=(path,))
+    )
     np.testing.assert_array_equal(history.energy, TIME / 3)
 
 
@@ -227,11 +288,22 @@ def abaqus(artificial: float | None) -> str:
     """ALLIE of a body that vibrates in flight, ALLKE and ALLWK; 5 % of ALLIE may be artificial."""
     times = np.linspace(0.0, 1.0, 201)
     internal = 50 + 20 * np.cos(40 * times)
-    columns = {"X": times, "ALLIE": internal, "ALLKE": 1000 - internal, "ALLWK": 0 * times}
+    columns = {
+        "X": times,
+        "ALLIE": internal,
+        "ALLKE": 1000 - internal,
+        "ALLWK": 0 * times,
+    }
     if artificial is not None:
         columns["ALLAE"] = artificial * internal
     rows = zip(*columns.values(), strict=True)
-    return "\n".join([",".join(columns), *(",".join(f"{value:.9g}" for value in row) for row in rows), ""])
+    return "\n".join(
+        [
+            ",".join(columns),
+            *(",".join(f"{value:.9g}" for value in row) for row in rows),
+            "",
+        ]
+    )
 
 
 def test_the_artificial_energy_of_abaqus_is_a_part_of_its_internal_energy() -> None:

@@ -5,7 +5,14 @@ import pytest
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.names import Part, select_parts
 
-PARTS = [Part(12, "Roof"), Part(3, "seat, left"), Part(7, ""), Part(19, "door"), Part(20, "door"), Part(4, "12")]
+PARTS = [
+    Part(12, "Roof"),
+    Part(3, "seat, left"),
+    Part(7, ""),
+    Part(19, "door"),
+    Part(20, "door"),
+    Part(4, "12"),
+]
 
 
 @pytest.mark.parametrize(
@@ -24,7 +31,9 @@ PARTS = [Part(12, "Roof"), Part(3, "seat, left"), Part(7, ""), Part(19, "door"),
         (["20"], [20]),
     ],
 )
-def test_parts_come_in_the_order_of_the_file_and_once(wanted: list[str], ids: list[int]) -> None:
+def test_parts_come_in_the_order_of_the_file_and_once(
+    wanted: list[str], ids: list[int]
+) -> None:
     assert [part.id for part in select_parts(wanted, PARTS, "run")] == ids
 
 
@@ -35,13 +44,18 @@ def test_parts_come_in_the_order_of_the_file_and_once(wanted: list[str], ids: li
         (["13-18"], "no part 13-18"),
         (["19-10"], "no part 19-10"),
         (["rof"], r"no part 'rof' \(did you mean 'Roof'\?\)"),
-        (["door"], "'door' is the title of several parts, choose by number: 19 'door', 20 'door'"),
+        (
+            ["door"],
+            "'door' is the title of several parts, choose by number: 19 'door', 20 'door'",
+        ),
         (["12"], "'12' is the title of part 4, as a number it means 12 'Roof'"),
         (["3,"], "no part ''"),
         (["-3"], "no part '-3'"),
         ([""], "no part ''"),
     ],
 )
-def test_what_names_no_part_or_several_is_refused(wanted: list[str], reason: str) -> None:
+def test_what_names_no_part_or_several_is_refused(
+    wanted: list[str], reason: str
+) -> None:
     with pytest.raises(FormatError, match=reason):
         select_parts(wanted, PARTS, "run")

@@ -40,7 +40,16 @@ def file(tmp_path: Path) -> Write:
 
 
 def test_the_order_is_a_signature_first_and_what_is_written_seldom_last() -> None:
-    assert list(READERS) == ["binout", "radioss-th", "glstat", "matsum", "hdf5", "csv", "d3thdt", "d3plot"]
+    assert list(READERS) == [
+        "binout",
+        "radioss-th",
+        "glstat",
+        "matsum",
+        "hdf5",
+        "csv",
+        "d3thdt",
+        "d3plot",
+    ]
 
 
 @pytest.mark.parametrize(("data", "name"), [(CSV, "glstat"), (GLSTAT, "energy.csv")])
@@ -61,17 +70,25 @@ def test_content_decides_and_not_the_name(file: Write, data: bytes, name: str) -
     ],
 )
 def test_a_deck_is_told_behind_comments(file: Write, head: bytes) -> None:
-    with pytest.raises(FormatError, match="this is a deck, an energy history was expected"):
+    with pytest.raises(
+        FormatError, match="this is a deck, an energy history was expected"
+    ):
         read_history([file(head + b"1,2\n")])
 
 
-@pytest.mark.parametrize("head", [b"# RADIOSS\n", b"#\n", b"$ only a comment\n", b"// BEGIN\n"])
+@pytest.mark.parametrize(
+    "head", [b"# RADIOSS\n", b"#\n", b"$ only a comment\n", b"// BEGIN\n"]
+)
 def test_comments_of_a_table_make_no_deck_of_it(file: Write, head: bytes) -> None:
     assert read_history([file(head + CSV)]).energy.tolist() == [1.0, 2.0, 1.5]
 
 
-def test_what_is_no_number_in_a_column_beside_it_does_not_keep_the_energy_from_being_read(file: Write) -> None:
-    table = b"time,internal_energy,kinetic_energy\n0.0,1.0,n/a\n0.1,2.0,x\n0.2,1.5,3.0\n"
+def test_what_is_no_number_in_a_column_beside_it_does_not_keep_the_energy_from_being_read(
+    file: Write,
+) -> None:
+    table = (
+        b"time,internal_energy,kinetic_energy\n0.0,1.0,n/a\n0.1,2.0,x\n0.2,1.5,3.0\n"
+    )
     history = read_history([file(table)])
     assert history.energy.tolist() == [1.0, 2.0, 1.5]
     assert history.balance is None or history.balance.kinetic is None
@@ -96,7 +113,9 @@ def zipped(*names: str) -> bytes:
 
 def test_what_ls_dyna_draws_is_no_history(tmp_path: Path) -> None:
     (tmp_path / "d3dump01").write_bytes(bytes(range(256)))
-    with pytest.raises(FormatError, match=r"d3 family, .*; name the glstat, matsum, d3plot or binout"):
+    with pytest.raises(
+        FormatError, match=r"d3 family, .*; name the glstat, matsum, d3plot or binout"
+    ):
         read_history([str(tmp_path / "d3dump01")])
 
 
@@ -108,18 +127,26 @@ def test_what_ls_dyna_draws_is_no_history(tmp_path: Path) -> None:
         (bytes(range(256)), "binary data of no known format"),
         (b"\x89HDF\r\n\x1a\n\x00\x00", "HDF5 cannot be read"),
         (b"Once upon a time\nthere was a beam\n", "no rows of at least two numbers"),
-        (b"metric,value,unit\nmass,12.5,kg\nenergy,88.1,J\n", "no rows of at least two numbers"),
+        (
+            b"metric,value,unit\nmass,12.5,kg\nenergy,88.1,J\n",
+            "no rows of at least two numbers",
+        ),
         (b"Curveplot\ntitle\nTime\nEnergy\nComponent\n", "no curve was found"),
         (gzip.compress(CSV, mtime=0)[:10] + b"\xff" * 20, "gzip"),
         (gzip.compress(b"", mtime=0), "empty"),
-        (zipped("[Content_Types].xml", "xl/workbook.xml"), "an Excel workbook, .*; save the sheet as csv"),
+        (
+            zipped("[Content_Types].xml", "xl/workbook.xml"),
+            "an Excel workbook, .*; save the sheet as csv",
+        ),
         (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(99), "an Excel workbook"),
         (zipped("glstat"), "a zip archive, .*; unpack it"),
         (lzma.compress(CSV), "a packed file, .*; unpack it"),
         (b"PAR1" + bytes(99), "a parquet file, .*to_csv"),
     ],
 )
-def test_what_is_no_history_is_refused_in_one_line(file: Write, data: bytes, reason: str) -> None:
+def test_what_is_no_history_is_refused_in_one_line(
+    file: Write, data: bytes, reason: str
+) -> None:
     with pytest.raises(FormatError, match=reason) as caught:
         read_history([file(data)])
     assert "\n" not in str(caught.value)
@@ -127,7 +154,9 @@ def test_what_is_no_history_is_refused_in_one_line(file: Write, data: bytes, rea
 
 
 def test_missing_files_and_folders_are_named(tmp_path: Path) -> None:
-    with pytest.raises(FormatError, match=re.escape(str(tmp_path / "none")) + ": no such file"):
+    with pytest.raises(
+        FormatError, match=re.escape(str(tmp_path / "none")) + ": no such file"
+    ):
         read_history([str(tmp_path / "none")])
     with pytest.raises(FormatError, match="folder"):
         read_history([str(tmp_path)])
@@ -138,8 +167,13 @@ def test_missing_files_and_folders_are_named(tmp_path: Path) -> None:
 
 
 def test_the_selection_reaches_the_reader(file: Write) -> None:
-    assert read_history([file(CSV)], Selection(time="2", energy=("1",))).time.tolist() == [1.0, 1.5]
-    np.testing.assert_array_equal(read_history([file(GLSTAT)], Selection(energy=("Internal Energy",))).energy, [2e-20])
+    assert read_history(
+        [file(CSV)], Selection(time="2", energy=("1",))
+    ).time.tolist() == [1.0, 1.5]
+    np.testing.assert_array_equal(
+        read_history([file(GLSTAT)], Selection(energy=("Internal Energy",))).energy,
+        [2e-20],
+    )
 
 
 DYNA_HEAD = b" one shell\n                         ls-dyna smp.123456 s           date 02/02/2020\n\n"
@@ -155,19 +189,39 @@ LEGEND = b"{BEGIN LEGEND}\n Entity #        Title\n        1     contact one\n{E
             "rcforc.* of LS-DYNA, which holds",
         ),
         (
-            DYNA_HEAD + LEGEND + b"\n\n contact interface energy output at time 0.0\n 1 0.0 0.0\n",
+            DYNA_HEAD
+            + LEGEND
+            + b"\n\n contact interface energy output at time 0.0\n 1 0.0 0.0\n",
             "a",
             "this is the sleout",
         ),
-        (DYNA_HEAD + LEGEND + b" n o d a l   p r i n t   o u t   f o r\n 1 0.0 0.0\n", "a", "this is the nodout"),
-        (DYNA_HEAD + LEGEND + b" something new\n 1 0.0 0.0\n", "run/NCFORC", "this is the ncforc of LS-DYNA"),
+        (
+            DYNA_HEAD
+            + LEGEND
+            + b" n o d a l   p r i n t   o u t   f o r\n 1 0.0 0.0\n",
+            "a",
+            "this is the nodout",
+        ),
+        (
+            DYNA_HEAD + LEGEND + b" something new\n 1 0.0 0.0\n",
+            "run/NCFORC",
+            "this is the ncforc of LS-DYNA",
+        ),
         (
             DYNA_HEAD + b"\n something new\n 1 0.0 0.0\n",
             "a",
             "this is an ASCII database of LS-DYNA, .*; name the glstat",
         ),
-        (b"    -1\n    58\nNONE\n  1 2 3\n  4 5 6\n", "h.unv", r"this is a universal file \(UNV\)"),
-        (b"Test object number          :1\nName of the channel :internal energy\n0.0\n", "a.001", "ISO-MME"),
+        (
+            b"    -1\n    58\nNONE\n  1 2 3\n  4 5 6\n",
+            "h.unv",
+            r"this is a universal file \(UNV\)",
+        ),
+        (
+            b"Test object number          :1\nName of the channel :internal energy\n0.0\n",
+            "a.001",
+            "ISO-MME",
+        ),
         (
             b"  Abaqus/Explicit 2024\n STEP 1\n INCREMENT TIME\n 0 0.0 1.0\n 1 0.1 1.0\n",
             "a.sta",
@@ -176,22 +230,36 @@ LEGEND = b"{BEGIN LEGEND}\n Entity #        Title\n        1     contact one\n{E
         (b' {"time": [0.0, 0.1], "ie": [1, 2]}', "a.json", "a JSON document"),
         (b"[[0.0, 1.0],\n [0.1, 2.0]]", "a.json", "a JSON document"),
         (b"<?xml version='1.0'?><a/>", "a.xml", "an XML or HTML document"),
-        (zipped("energy.npy"), "a.npz", r"an archive of numpy arrays \(npz\), .*from_frame"),
+        (
+            zipped("energy.npy"),
+            "a.npz",
+            r"an archive of numpy arrays \(npz\), .*from_frame",
+        ),
         (b"\x93NUMPY\x01\0v\0", "a.npy", "a numpy array"),
         (b"HKSRD0  " + bytes(99), "a.odb", r"\(odb\), .*XY report"),
         (b"ARROW1\0\0" + bytes(99), "a.arrow", "an arrow file, .*from_frame"),
         (b"SQLite format 3\0" + bytes(99), "a.db", "an SQLite database"),
         (b"/RUN/BOX/2\n0.02\n/TFILE/4\n0.001 0.1\n", "BOX_0002.rad", "this is a deck"),
-        (b" " + b"*" * 72 + b"\n **  OpenRadioss Engine\n 0.0 1.0\n 0.1 2.0\n", "BOX_0001.out", "a listing of Radioss"),
+        (
+            b" " + b"*" * 72 + b"\n **  OpenRadioss Engine\n 0.0 1.0\n 0.1 2.0\n",
+            "BOX_0001.out",
+            "a listing of Radioss",
+        ),
         (
             b"\n  CYCLE    TIME      TIME-STEP  I-ENERGY\n 0 0.0 1E-6 0.0\n 1 0.1 1E-6 1.0\n",
             "BOX_0001.out",
             "a listing",
         ),
-        (b" Date: 1\n | LS-DYNA, A Program for Nonlinear Dynamic |\n 0 1\n 1 2\n", "d3hsp", "a listing of LS-DYNA"),
+        (
+            b" Date: 1\n | LS-DYNA, A Program for Nonlinear Dynamic |\n 0 1\n 1 2\n",
+            "d3hsp",
+            "a listing of LS-DYNA",
+        ),
     ],
 )
-def test_a_file_beside_the_histories_is_named_for_what_it_is(file: Write, data: bytes, name: str, reason: str) -> None:
+def test_a_file_beside_the_histories_is_named_for_what_it_is(
+    file: Write, data: bytes, name: str, reason: str
+) -> None:
     with pytest.raises(FormatError, match=reason) as error:
         read_history([file(data, Path(name).name)])
     assert "\n" not in str(error.value)
@@ -201,11 +269,25 @@ def test_a_file_beside_the_histories_is_named_for_what_it_is(file: Write, data: 
 def test_a_matsum_is_told_by_its_parts_behind_any_legend(file: Write) -> None:
     states = b" time =   0.0000E+00\n mat.#=    1             inten=   0.0000E+00     kinen=   0.0000E+00\n"
     entries = b"".join(b"%9d     a part\n" % number for number in range(1, 2000))
-    long_legend = b"{BEGIN LEGEND}\n Entity #        Title\n" + entries + b"{END LEGEND}\n\n"
-    for text in (DYNA_HEAD + LEGEND, DYNA_HEAD + LEGEND + states, DYNA_HEAD + long_legend + states):
+    long_legend = (
+        b"{BEGIN LEGEND}\n Entity #        Title\n" + entries + b"{END LEGEND}\n\n"
+    )
+    for text in (
+        DYNA_HEAD + LEGEND,
+        DYNA_HEAD + LEGEND + states,
+        DYNA_HEAD + long_legend + states,
+    ):
         assert open_run([file(text)]).databases[0].format == "matsum"
     with pytest.raises(FormatError, match="this is the rcforc"):
-        open_run([file(DYNA_HEAD + long_legend + b" slave         1 time 0.0E+00  x 0.0 y 0.0 z 0.0\n")])
+        open_run(
+            [
+                file(
+                    DYNA_HEAD
+                    + long_legend
+                    + b" slave         1 time 0.0E+00  x 0.0 y 0.0 z 0.0\n"
+                )
+            ]
+        )
 
 
 def test_words_about_a_solver_in_a_table_make_no_listing_of_it(file: Write) -> None:
@@ -219,7 +301,9 @@ STATES = (
 )
 
 
-def test_a_pattern_gives_what_the_folder_gives_and_names_what_it_leaves_out(tmp_path: Path) -> None:
+def test_a_pattern_gives_what_the_folder_gives_and_names_what_it_leaves_out(
+    tmp_path: Path,
+) -> None:
     for name, data in {
         "matsum": DYNA_HEAD + b"\n" + STATES,
         "nodout": DYNA_HEAD + b" n o d a l   p r i n t   o u t\n 1 0.0 0.0\n",
@@ -228,26 +312,43 @@ def test_a_pattern_gives_what_the_folder_gives_and_names_what_it_leaves_out(tmp_
         "remarks.txt": b"only words\n",
     }.items():
         put(tmp_path / name, data)
-    by_folder, by_pattern = (open_run([str(name)]) for name in (tmp_path, tmp_path / "*"))
+    by_folder, by_pattern = (
+        open_run([str(name)]) for name in (tmp_path, tmp_path / "*")
+    )
     assert by_pattern.sources == by_folder.sources == (str(tmp_path / "matsum"),)
     notes = " ".join(by_pattern.notes)
-    assert "nodout was left out: this is the nodout of LS-DYNA, which holds no internal energy" in notes
+    assert (
+        "nodout was left out: this is the nodout of LS-DYNA, which holds no internal energy"
+        in notes
+    )
     assert "a_deck.k was left out: this is a deck" in notes
-    assert "energy.csv was left out: a table beside databases of the solver; name it to use it" in notes
+    assert (
+        "energy.csv was left out: a table beside databases of the solver; name it to use it"
+        in notes
+    )
     assert "remarks.txt was left out" in notes
     assert not by_folder.notes
 
 
 def test_what_is_named_beside_a_pattern_is_not_left_out(tmp_path: Path) -> None:
-    put(tmp_path / "nodout", DYNA_HEAD + b" n o d a l   p r i n t   o u t\n 1 0.0 0.0\n")
+    put(
+        tmp_path / "nodout", DYNA_HEAD + b" n o d a l   p r i n t   o u t\n 1 0.0 0.0\n"
+    )
     with pytest.raises(FormatError, match="this is the nodout"):
-        open_run([str(put(tmp_path / "matsum", DYNA_HEAD + b"\n" + STATES)), str(tmp_path / "nodout")])
+        open_run(
+            [
+                str(put(tmp_path / "matsum", DYNA_HEAD + b"\n" + STATES)),
+                str(tmp_path / "nodout"),
+            ]
+        )
     with pytest.raises(FormatError, match="this is the nodout"):
         open_run([str(tmp_path / "nod*")])
 
 
 @pytest.mark.parametrize("order", [("runT01", "runT02"), ("runT02", "runT01")])
-def test_legs_that_start_together_are_ordered_by_name(order: tuple[str, str], tmp_path: Path) -> None:
+def test_legs_that_start_together_are_ordered_by_name(
+    order: tuple[str, str], tmp_path: Path
+) -> None:
     rows = "".join(f"{i / 10},{i}\n" for i in range(5))
     for name in order:
         put(tmp_path / name, f"time,internal_energy\n{rows}")

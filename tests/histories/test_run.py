@@ -12,7 +12,14 @@ import pytest
 from d2rpick.base.errors import FormatError
 from d2rpick.choice.overview import survey
 from d2rpick.histories.database import Legs
-from d2rpick.histories.formats import READERS, binout, csv_table, glstat, matsum, radioss_th
+from d2rpick.histories.formats import (
+    READERS,
+    binout,
+    csv_table,
+    glstat,
+    matsum,
+    radioss_th,
+)
 from d2rpick.histories.history import Samples
 from d2rpick.histories.opening import Run, Selection, check_companions, open_run, reader
 from d2rpick.histories.source import Source
@@ -32,11 +39,16 @@ MATSUM = matsum_text(TIMES, [7, 3], np.stack([TIMES, 0 * TIMES], axis=1))
 def opened(files: Mapping[str, bytes], selection: Selection | None = None) -> Run:
     """Open files of different formats, all of a format as legs."""
     legs = {
-        kind: [Source(name, data) for name, data in files.items() if name.startswith(kind)]
+        kind: [
+            Source(name, data) for name, data in files.items() if name.startswith(kind)
+        ]
         for kind in READERS
         if any(name.startswith(kind) for name in files)
     }
-    databases = tuple(Legs(reader(kind).open_legs(sources, selection or Selection())) for kind, sources in legs.items())
+    databases = tuple(
+        Legs(reader(kind).open_legs(sources, selection or Selection()))
+        for kind, sources in legs.items()
+    )
     check_companions(databases)
     return Run(tuple(files), databases)
 
@@ -53,12 +65,24 @@ def test_the_files_of_one_folder_are_a_family_and_those_of_several_are_legs() ->
         "b/binout0000": bytes(made_binout(range(1, 4), shift=4).data),
         "a/binout0000": globals_only,
     }
-    run = Run(tuple(files), (Legs(binout.open_legs([Source(*file) for file in files.items()], Selection())),))
-    assert run.history(Selection()).energy.tolist() == [values("internal_energy", state) for state in range(1, 8)]
-    assert run.part_energies(run.parts).tolist() == [
-        [values("internal_energy", state, id_) for id_ in (7, 3)] for state in range(1, 8)
+    run = Run(
+        tuple(files),
+        (
+            Legs(
+                binout.open_legs([Source(*file) for file in files.items()], Selection())
+            ),
+        ),
+    )
+    assert run.history(Selection()).energy.tolist() == [
+        values("internal_energy", state) for state in range(1, 8)
     ]
-    assert run.notes == ("1 state has the same printed time as the next one; the last of equal times counts",)
+    assert run.part_energies(run.parts).tolist() == [
+        [values("internal_energy", state, id_) for id_ in (7, 3)]
+        for state in range(1, 8)
+    ]
+    assert run.notes == (
+        "1 state has the same printed time as the next one; the last of equal times counts",
+    )
 
 
 def test_a_missing_branch_is_named_with_what_there_is() -> None:
@@ -68,7 +92,8 @@ def test_a_missing_branch_is_named_with_what_there_is() -> None:
         run_of(binout, data.replace(b"glstat", b"nodout")),
     )
     with pytest.raises(
-        FormatError, match="no matsum in it, but glstat, nodout; name the binout of the run that holds it"
+        FormatError,
+        match="no matsum in it, but glstat, nodout; name the binout of the run that holds it",
     ):
         no_parts.history(Selection(parts=("3",)))
     with pytest.raises(FormatError, match="no glstat in it, but matsum, nodout"):
@@ -80,17 +105,29 @@ def test_a_missing_branch_is_named_with_what_there_is() -> None:
 
 
 def test_legs_are_ordered_by_their_start_and_the_newer_one_wins() -> None:
-    legs = [glstat_text([3, 4, 5], [30, 40, 50]), glstat_text([1, 2, 3, 4], [1, 2, 3, 4]), glstat_text([5.5], [55])]
+    legs = [
+        glstat_text([3, 4, 5], [30, 40, 50]),
+        glstat_text([1, 2, 3, 4], [1, 2, 3, 4]),
+        glstat_text([5.5], [55]),
+    ]
     history = history_of(glstat, *legs)
     assert states_of(history) == [(1, 1), (2, 2), (3, 30), (4, 40), (5, 50), (5.5, 55)]
-    assert "time steps back once (restart); where legs overlap the newer one counts" in history.notes[0]
+    assert (
+        "time steps back once (restart); where legs overlap the newer one counts"
+        in history.notes[0]
+    )
 
 
 def test_a_leg_that_gives_no_state_is_named() -> None:
     """Two runs that start alike are hardly legs."""
-    history = history_of(glstat, glstat_text([1, 2], [1, 2]), glstat_text([1, 2], [3, 4]))
+    history = history_of(
+        glstat, glstat_text([1, 2], [1, 2]), glstat_text([1, 2], [3, 4])
+    )
     assert states_of(history) == [(1, 3), (2, 4)]
-    assert "run1 was not used: a newer leg begins at or before its first time" in history.notes
+    assert (
+        "run1 was not used: a newer leg begins at or before its first time"
+        in history.notes
+    )
 
 
 def test_a_leg_without_states_does_not_hide_the_others() -> None:
@@ -101,7 +138,10 @@ def test_a_leg_without_states_does_not_hide_the_others() -> None:
 
 
 def test_a_part_that_only_some_legs_have_is_left_out_and_named() -> None:
-    first, second = t01(3, [MadePart(1, "box"), MadePart(2, "step")]), t01(3, [MadePart(1, "box")], start=3)
+    first, second = (
+        t01(3, [MadePart(1, "box"), MadePart(2, "step")]),
+        t01(3, [MadePart(1, "box")], start=3),
+    )
     run = run_of(radioss_th, bytes(first.data), bytes(second.data))
     assert [part.id for part in run.parts] == [1]
     assert "only some legs have part 2, which was left out" in run.notes[0]
@@ -111,7 +151,9 @@ def test_a_part_that_only_some_legs_have_is_left_out_and_named() -> None:
 
 def test_a_column_that_a_leg_lacks_is_refused() -> None:
     with pytest.raises(FormatError, match="run2: no column 'IE', only heat"):
-        history_of(csv_table, "time,IE,x\n0,1,2\n1,2,3\n", "time,heat,x\n2,1,2\n3,2,3\n")
+        history_of(
+            csv_table, "time,IE,x\n0,1,2\n1,2,3\n", "time,heat,x\n2,1,2\n3,2,3\n"
+        )
 
 
 # Companions.
@@ -123,12 +165,24 @@ def test_companions_of_other_times_are_doubted() -> None:
     assert opened({"glstat": GLSTAT, "matsum": coarse}).notes == ()
     shifted = matsum_text(TIMES + 0.01, [7, 3], np.ones((8, 2)))
     (note,) = opened({"glstat": GLSTAT, "matsum": shifted}).notes
-    assert note == "glstat and matsum have only 0 of 7 states at the same times; are they from the same run?"
+    assert (
+        note
+        == "glstat and matsum have only 0 of 7 states at the same times; are they from the same run?"
+    )
     longer = np.arange(30) * (TIMES[1] - TIMES[0]) + TIMES[0]
-    (note,) = opened({"glstat": GLSTAT, "matsum": matsum_text(longer, [7, 3], np.ones((30, 2)))}).notes
-    assert note.startswith(f"glstat ends at {TIMES[-1]:.6g} and matsum at {longer[-1]:.6g}; are they from the same run")
-    with pytest.raises(FormatError, match="glstat and matsum have no time in common, files of one run were expected"):
-        opened({"glstat": GLSTAT, "matsum": matsum_text(TIMES + 5, [7], np.ones((8, 1)))})
+    (note,) = opened(
+        {"glstat": GLSTAT, "matsum": matsum_text(longer, [7, 3], np.ones((30, 2)))}
+    ).notes
+    assert note.startswith(
+        f"glstat ends at {TIMES[-1]:.6g} and matsum at {longer[-1]:.6g}; are they from the same run"
+    )
+    with pytest.raises(
+        FormatError,
+        match="glstat and matsum have no time in common, files of one run were expected",
+    ):
+        opened(
+            {"glstat": GLSTAT, "matsum": matsum_text(TIMES + 5, [7], np.ones((8, 1)))}
+        )
 
 
 def test_companions_have_legs_of_their_own() -> None:
@@ -152,30 +206,48 @@ def test_companions_have_legs_of_their_own() -> None:
         ([[1, 2], [9, 15], [5, 4]], True),
     ],
 )
-def test_parts_with_more_energy_than_the_model_are_of_another_run(parts: list[list[float]], refused: bool) -> None:
-    run = opened({"glstat": glstat_text([1, 2, 3], [10, 20, 9]), "matsum": matsum_text([1, 2, 3], [7, 3], parts)})
+def test_parts_with_more_energy_than_the_model_are_of_another_run(
+    parts: list[list[float]], refused: bool
+) -> None:
+    run = opened(
+        {
+            "glstat": glstat_text([1, 2, 3], [10, 20, 9]),
+            "matsum": matsum_text([1, 2, 3], [7, 3], parts),
+        }
+    )
     if refused:
-        with pytest.raises(FormatError, match=r"at 2 the parts of matsum have an energy of 24, .*glstat has 20"):
+        with pytest.raises(
+            FormatError,
+            match=r"at 2 the parts of matsum have an energy of 24, .*glstat has 20",
+        ):
             run.history(Selection(parts=("7", "3")))
     else:
-        assert run.history(Selection(parts=("7", "3"))).energy.tolist() == [sum(row) for row in parts]
+        assert run.history(Selection(parts=("7", "3"))).energy.tolist() == [
+            sum(row) for row in parts
+        ]
 
 
 def test_round_off_of_a_free_fall_is_no_energy_of_another_run() -> None:
     """A box that falls has some 1e-18 J in its parts, and another 1e-18 J in all."""
     table = b"time,internal_energy,kinetic_energy\n1,1e-18,5\n2,0,6\n3,0,7\n"
-    run = opened({"csv": table, "matsum": matsum_text([1, 2, 3], [7], [[2e-18], [3e-18], [0.0]])})
+    run = opened(
+        {"csv": table, "matsum": matsum_text([1, 2, 3], [7], [[2e-18], [3e-18], [0.0]])}
+    )
     assert run.history(Selection(parts=("7",))).energy.size == 3
 
 
 # What is taken for the energy.
 
 
-def test_the_energy_of_the_whole_model_is_the_default_and_binary_files_are_preferred() -> None:
+def test_the_energy_of_the_whole_model_is_the_default_and_binary_files_are_preferred() -> (
+    None
+):
     data = bytes(made_binout(range(1, 9)).data)
     run = opened({"glstat": GLSTAT, "binout": data, "matsum": MATSUM})
     assert run.history(Selection()).energy[0] == values("internal_energy", 1)
-    assert run.history(Selection(energy=("internal energy",))).channel == "internal_energy"
+    assert (
+        run.history(Selection(energy=("internal energy",))).channel == "internal_energy"
+    )
     assert run.history(Selection(energy=("time step",))).channel == "time_step"
 
 
@@ -195,18 +267,44 @@ def test_chosen_parts_are_added_and_named() -> None:
     assert [part.id for part in history.parts or ()] == [7]
     idle = history_of(matsum, MATSUM, selection=Selection(parts=("3,7",)))
     assert idle.energy.tolist() == TIMES.tolist()
-    assert idle.notes == ("without any internal energy: part 3 'Part 3'; rigid, or without elements?",)
+    assert idle.notes == (
+        "without any internal energy: part 3 'Part 3'; rigid, or without elements?",
+    )
 
 
 @pytest.mark.parametrize(
     ("files", "selection", "reason"),
     [
-        ({"glstat": GLSTAT}, Selection(parts=("7",)), "glstat: a glstat has no parts; add the matsum of the run"),
-        ({"matsum": MATSUM}, Selection(energy=("internal energy",)), "a matsum has parts only; choose with `parts`"),
-        ({"csv": b"time,IE\n0,1\n"}, Selection(parts=("7",)), "csv: this table has no parts; give the matsum"),
-        ({"radioss-th": bytes(t01(2, []).data)}, Selection(parts=("7",)), "no parts with histories of their own"),
-        ({"glstat": GLSTAT, "matsum": MATSUM}, Selection(energy=("inernal energy",)), "did you mean 'internal energy'"),
-        ({"glstat": GLSTAT}, Selection(energy=("time step", "Time Step")), "an energy is given twice"),
+        (
+            {"glstat": GLSTAT},
+            Selection(parts=("7",)),
+            "glstat: a glstat has no parts; add the matsum of the run",
+        ),
+        (
+            {"matsum": MATSUM},
+            Selection(energy=("internal energy",)),
+            "a matsum has parts only; choose with `parts`",
+        ),
+        (
+            {"csv": b"time,IE\n0,1\n"},
+            Selection(parts=("7",)),
+            "csv: this table has no parts; give the matsum",
+        ),
+        (
+            {"radioss-th": bytes(t01(2, []).data)},
+            Selection(parts=("7",)),
+            "no parts with histories of their own",
+        ),
+        (
+            {"glstat": GLSTAT, "matsum": MATSUM},
+            Selection(energy=("inernal energy",)),
+            "did you mean 'internal energy'",
+        ),
+        (
+            {"glstat": GLSTAT},
+            Selection(energy=("time step", "Time Step")),
+            "an energy is given twice",
+        ),
         (
             {"glstat": GLSTAT.replace(b" internal energy", b" infernal energy")},
             Selection(),
@@ -223,7 +321,10 @@ def test_what_is_not_there_is_refused_with_what_there_is(
 
 def test_times_at_random_are_refused_in_every_format(tmp_path: Path) -> None:
     file = tmp_path / "history"
-    for content in (glstat_text([5, 1, 4, 2, 3], np.ones(5)), matsum_text([5, 1, 4, 2, 3], [7], np.ones((5, 1)))):
+    for content in (
+        glstat_text([5, 1, 4, 2, 3], np.ones(5)),
+        matsum_text([5, 1, 4, 2, 3], [7], np.ones((5, 1))),
+    ):
         file.write_bytes(content)
         with pytest.raises(FormatError, match="time steps back at 2 of 4 states"):
             open_run([str(file)]).history(Selection())
@@ -231,30 +332,59 @@ def test_times_at_random_are_refused_in_every_format(tmp_path: Path) -> None:
 
 def test_a_time_column_is_no_choice_where_there_is_one_only(tmp_path: Path) -> None:
     file = put(tmp_path / "history", GLSTAT)
-    assert open_run([str(file)], Selection(time="Time")).history(Selection()).time.tolist() == TIMES.tolist()
-    with pytest.raises(FormatError, match="no time 'cycle' in glstat, the time is 'time'; leave `time` out"):
+    assert (
+        open_run([str(file)], Selection(time="Time")).history(Selection()).time.tolist()
+        == TIMES.tolist()
+    )
+    with pytest.raises(
+        FormatError,
+        match="no time 'cycle' in glstat, the time is 'time'; leave `time` out",
+    ):
         open_run([str(file)], Selection(time="cycle"))
 
 
 def test_what_is_in_the_files_is_told_where_no_energy_can_be_chosen() -> None:
     """No states, and curves of which none is the one that is meant."""
     empty = survey(run_of(glstat, HEAD), Selection())
-    assert (empty.states, empty.time_start, empty.sampling, empty.notes) == (0, None, None, ())
+    assert (empty.states, empty.time_start, empty.sampling, empty.notes) == (
+        0,
+        None,
+        None,
+        (),
+    )
     begun = survey(run_of(radioss_th, bytes(t01(0).data)), Selection())
-    assert (begun.states, begun.time_start, begun.flights, begun.health) == (0, None, (), None)
-    curves = survey(run_of(csv_table, "2\n1 'a IE'\n0,1\n1,2\n2 'b IE'\n0,1\n2,3\n3,4\n"), Selection())
+    assert (begun.states, begun.time_start, begun.flights, begun.health) == (
+        0,
+        None,
+        (),
+        None,
+    )
+    curves = survey(
+        run_of(csv_table, "2\n1 'a IE'\n0,1\n1,2\n2 'b IE'\n0,1\n2,3\n3,4\n"),
+        Selection(),
+    )
     assert (curves.states, curves.channels) == (None, ("a IE", "b IE"))
-    assert "2 curves are named like an internal energy; choose with `energy`: 1 'a IE', 2 'b IE'" in curves.notes[0]
-    doubtful = opened({"glstat": GLSTAT, "matsum": matsum_text(TIMES + 0.01, [7, 3], np.ones((8, 2)))})
+    assert (
+        "2 curves are named like an internal energy; choose with `energy`: 1 'a IE', 2 'b IE'"
+        in curves.notes[0]
+    )
+    doubtful = opened(
+        {"glstat": GLSTAT, "matsum": matsum_text(TIMES + 0.01, [7, 3], np.ones((8, 2)))}
+    )
     assert "are they from the same run?" in survey(doubtful, Selection()).notes[0]
 
 
 @pytest.mark.parametrize("share", [0.3, 0.7, 0.999])
-def test_packed_data_that_ends_early_is_read_as_far_as_it_goes(tmp_path: Path, share: float) -> None:
+def test_packed_data_that_ends_early_is_read_as_far_as_it_goes(
+    tmp_path: Path, share: float
+) -> None:
     whole = (SAMPLES / "energy.glstat").read_bytes()
     packed = gzip.compress(whole)
     file = put(tmp_path / "glstat.gz", packed[: int(share * len(packed))])
-    history, full = read_history([str(file)]), read_history([str(SAMPLES / "energy.glstat")])
+    history, full = (
+        read_history([str(file)]),
+        read_history([str(SAMPLES / "energy.glstat")]),
+    )
     assert not history.complete
     assert "ends early" in history.notes[0]
     assert 0 < history.time.size <= full.time.size
@@ -263,7 +393,10 @@ def test_packed_data_that_ends_early_is_read_as_far_as_it_goes(tmp_path: Path, s
 
 def test_a_long_gap_between_legs_is_told() -> None:
     legs = [stored(f"rollover_r100_{leg}.gz") for leg in ("T01", "T03")]
-    assert any("no states between 0.0999564 and 0.370008" in note for note in open_run(legs).history(Selection()).notes)
+    assert any(
+        "no states between 0.0999564 and 0.370008" in note
+        for note in open_run(legs).history(Selection()).notes
+    )
 
 
 ZERO = "   0.0000E+00"
@@ -281,23 +414,38 @@ def written(path: Path, parts: dict[int, tuple[float, float]], states: int = 4) 
         for id_, (momentum, velocity) in parts.items():
             block = matsum_part(id_, 1.0 + state).decode()
             for name, number in (("y-mom", momentum), ("y-rbv", velocity)):
-                block = block.replace(f"{name}={ZERO}", f"{name}={number * state / states:13.4E}")
+                block = block.replace(
+                    f"{name}={ZERO}", f"{name}={number * state / states:13.4E}"
+                )
             text += block
     path.write_text(text)
     return path
 
 
 def test_of_a_matsum_they_are_momentum_over_velocity(tmp_path: Path) -> None:
-    found = masses(written(tmp_path / "matsum", {1: (30.0, 2.0), 2: (-4.0, -5.0), 7: (0.0, 0.0), 9: (6.0, 0.0)}))
+    found = masses(
+        written(
+            tmp_path / "matsum",
+            {1: (30.0, 2.0), 2: (-4.0, -5.0), 7: (0.0, 0.0), 9: (6.0, 0.0)},
+        )
+    )
     assert found is not None
     assert found[:3] == pytest.approx([15.0, 0.8, 0.0], rel=1e-4)
     assert np.isnan(found[3])  # a solver that does not write the velocity
 
 
 def test_of_a_time_history_they_are_written(tmp_path: Path) -> None:
-    (tmp_path / "RUNT01").write_bytes(t01(3, (MadePart(3, "box"), MadePart(12, "step"))).data)
-    assert masses(tmp_path / "RUNT01") == pytest.approx([value(1, 3, 6), value(1, 12, 6)])  # the middle of all states
-    (tmp_path / "ENERGYT01").write_bytes(t01(3, (MadePart(3, "box", codes=(1, 2)),)).data)
+    (tmp_path / "RUNT01").write_bytes(
+        t01(3, (MadePart(3, "box"), MadePart(12, "step"))).data
+    )
+    assert masses(tmp_path / "RUNT01") == pytest.approx(
+        [value(1, 3, 6), value(1, 12, 6)]
+    )  # the middle of all states
+    (tmp_path / "ENERGYT01").write_bytes(
+        t01(3, (MadePart(3, "box", codes=(1, 2)),)).data
+    )
     assert masses(tmp_path / "ENERGYT01") is None
-    (tmp_path / "MOTIONT01").write_bytes(t01(3, (MadePart(3, "box", codes=(1, 3, 4, 5)),)).data)
+    (tmp_path / "MOTIONT01").write_bytes(
+        t01(3, (MadePart(3, "box", codes=(1, 3, 4, 5)),)).data
+    )
     assert masses(tmp_path / "MOTIONT01") is None

@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from d2rpick.histories.samples import find_crossings, find_turns, first_above, narrow, outline
+from d2rpick.histories.samples import (
+    find_crossings,
+    find_turns,
+    first_above,
+    narrow,
+    outline,
+)
 
 # small integers hit every coincidence: samples on the level, plateaus, touching
 levels = st.integers(-3, 3)
@@ -30,7 +36,9 @@ CONVENTIONS = {
 
 
 def crossings(energy: list[int], level: float) -> list[tuple[float, bool]]:
-    times, rising = find_crossings(np.arange(len(energy), dtype=float), np.array(energy, dtype=float), level)
+    times, rising = find_crossings(
+        np.arange(len(energy), dtype=float), np.array(energy, dtype=float), level
+    )
     return list(zip(times.tolist(), rising.tolist(), strict=True))
 
 
@@ -66,18 +74,30 @@ def walk(energy: list[int], level: int) -> list[tuple[Fraction, bool]]:
 def test_exact_on_piecewise_linear_data(energy: list[int], level: int) -> None:
     found, expected = crossings(energy, level), walk(energy, level)
     assert [rising for _, rising in found] == [rising for _, rising in expected]
-    assert [time for time, _ in found] == pytest.approx([float(time) for time, _ in expected], rel=1e-15, abs=0)
+    assert [time for time, _ in found] == pytest.approx(
+        [float(time) for time, _ in expected], rel=1e-15, abs=0
+    )
 
 
-@given(energies, levels, st.integers(-5, 5), st.sampled_from([0.25, 2.0, 1024.0]), st.sampled_from([0.5, 4.0]))
+@given(
+    energies,
+    levels,
+    st.integers(-5, 5),
+    st.sampled_from([0.25, 2.0, 1024.0]),
+    st.sampled_from([0.5, 4.0]),
+)
 def test_shifting_and_scaling_shift_and_scale_the_answer(
     energy: list[int], level: int, shift: int, stretch: float, gain: float
 ) -> None:
     time, values = np.arange(len(energy), dtype=float), np.array(energy, dtype=float)
     plain, rising = find_crossings(time, values, level)
-    moved, still_rising = find_crossings(stretch * (time + shift), gain * (values + shift), gain * (level + shift))
+    moved, still_rising = find_crossings(
+        stretch * (time + shift), gain * (values + shift), gain * (level + shift)
+    )
     assert still_rising.tolist() == rising.tolist()
-    assert moved.tolist() == pytest.approx((stretch * (plain + shift)).tolist(), rel=1e-14, abs=1e-14)
+    assert moved.tolist() == pytest.approx(
+        (stretch * (plain + shift)).tolist(), rel=1e-14, abs=1e-14
+    )
 
 
 @given(energies, levels)
@@ -101,7 +121,9 @@ def test_extrema_are_where_the_slope_changes_sign(energy: list[int]) -> None:
 
 
 @given(st.integers(3, 3000), st.integers(0, 100), st.integers(1, 200))
-def test_an_outline_keeps_ends_and_extremes_and_stays_small(states: int, seed: int, stretches: int) -> None:
+def test_an_outline_keeps_ends_and_extremes_and_stays_small(
+    states: int, seed: int, stretches: int
+) -> None:
     energy = np.random.default_rng(seed).standard_normal(states)
     time, drawn = outline(np.arange(states, dtype=float), energy, stretches)
     assert time.size <= min(states, 2 * stretches + 2)
@@ -116,7 +138,10 @@ def test_of_each_stretch_the_extremes_stay(states: int, seed: int) -> None:
     energy = np.random.default_rng(seed).standard_normal(states)
     time, _ = outline(np.arange(states, dtype=float), energy, 4)
     for piece in np.array_split(np.arange(states), 4):
-        assert {piece[0] + energy[piece].argmin(), piece[0] + energy[piece].argmax()} <= {*time.astype(int).tolist()}
+        assert {
+            piece[0] + energy[piece].argmin(),
+            piece[0] + energy[piece].argmax(),
+        } <= {*time.astype(int).tolist()}
 
 
 ROOTS = st.lists(st.floats(0.01, 0.99), min_size=1, max_size=8).map(np.array)
@@ -144,16 +169,24 @@ def test_what_is_within_stays_within_either_way_round(roots: np.ndarray) -> None
 
 
 @given(ROOTS)
-def test_a_root_is_the_same_to_the_last_digit_alone_and_beside_others(roots: np.ndarray) -> None:
+def test_a_root_is_the_same_to_the_last_digit_alone_and_beside_others(
+    roots: np.ndarray,
+) -> None:
     def found(some: np.ndarray) -> list[float]:
         ends = np.zeros(some.size), np.ones(some.size)
-        return [*map(float, narrow(lambda t: some**3 - t**3, *ends, slope=lambda t: -3 * t**2).at)]
+        return [
+            *map(
+                float,
+                narrow(lambda t: some**3 - t**3, *ends, slope=lambda t: -3 * t**2).at,
+            )
+        ]
 
     assert found(roots) == [found(roots[i : i + 1])[0] for i in range(roots.size)]
 
 
 @given(
-    st.lists(levels, min_size=1, max_size=80), st.lists(st.tuples(st.integers(0, 80), levels), min_size=1, max_size=9)
+    st.lists(levels, min_size=1, max_size=80),
+    st.lists(st.tuples(st.integers(0, 80), levels), min_size=1, max_size=9),
 )
 def test_the_first_value_above_a_limit_is_the_one_that_a_walk_meets(
     values: list[int], asked: list[tuple[int, int]]
@@ -161,5 +194,9 @@ def test_the_first_value_above_a_limit_is_the_one_that_a_walk_meets(
     start, limit = (np.array(column) for column in zip(*asked, strict=True))
     start = np.minimum(start, len(values))
     found = first_above(np.array(values, dtype=float), start, limit.astype(float))
-    for at, above, place in zip(start.tolist(), limit.tolist(), found.tolist(), strict=True):
-        assert place == next((i for i in range(at, len(values)) if values[i] > above), len(values))
+    for at, above, place in zip(
+        start.tolist(), limit.tolist(), found.tolist(), strict=True
+    ):
+        assert place == next(
+            (i for i in range(at, len(values)) if values[i] > above), len(values)
+        )

@@ -60,26 +60,50 @@ def test_every_format_is_read_by_its_content_from_a_file_gzip_and_standard_input
     monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(content)))
     histories = [read_history([name]) for name in ("plain", "packed", "-")]
     assert {history.format for history in histories} == {kind}
-    for history, data in zip(histories, (content, Path("packed").read_bytes(), content), strict=True):
+    for history, data in zip(
+        histories, (content, Path("packed").read_bytes(), content), strict=True
+    ):
         assert history.time.tolist() == histories[0].time.tolist()
         assert history.energy.tolist() == histories[0].energy.tolist()
-        assert history.files[0].sha256() == hashlib.sha256(data).hexdigest()  # as it lies there
-    assert read_history([str(here / "plain")], input_format=kind).energy.tolist() == histories[0].energy.tolist()
+        assert (
+            history.files[0].sha256() == hashlib.sha256(data).hexdigest()
+        )  # as it lies there
+    assert (
+        read_history([str(here / "plain")], input_format=kind).energy.tolist()
+        == histories[0].energy.tolist()
+    )
 
 
 @pytest.mark.usefixtures("here")
 def test_a_folder_holds_the_databases_of_one_run() -> None:
-    run = names("run/binout0000", "run/binout0000%001", "run/binout0004", "run/GLSTAT", "run/matsum.gz")
+    run = names(
+        "run/binout0000",
+        "run/binout0000%001",
+        "run/binout0004",
+        "run/GLSTAT",
+        "run/matsum.gz",
+    )
     run = [*run, *names("run/d3plot", "run/d3plot01", "run/d3thdt")]
-    names("run/d3hsp", "run/d3dump01", "run/messag", "run/glstat.txt", "run/nodout", "run/binout.log")
+    names(
+        "run/d3hsp",
+        "run/d3dump01",
+        "run/messag",
+        "run/glstat.txt",
+        "run/nodout",
+        "run/binout.log",
+    )
     assert expand(["run"]) == tuple(sorted(run))
     legs = names("rad/box_T01", "rad/box_T02.gz", "rad/box_T03")
     names("rad/box_0001.out", "rad/box_T01.csv")
     assert expand(["rad", "run/GLSTAT", "rad/box_T01"]) == (*legs, "run/GLSTAT")
 
 
-@pytest.mark.parametrize("change", ["replaced", "cut", "written anew", "appended", "taken away"])
-def test_files_of_one_run_are_not_mixed_with_those_of_the_next(change: str, here: Path) -> None:
+@pytest.mark.parametrize(
+    "change", ["replaced", "cut", "written anew", "appended", "taken away"]
+)
+def test_files_of_one_run_are_not_mixed_with_those_of_the_next(
+    change: str, here: Path
+) -> None:
     first, second, whole = here / "run.glstat", here / "run.matsum", CONTENTS["glstat"]
     for name in (first, here / "next"):
         name.write_bytes(whole)
@@ -87,19 +111,29 @@ def test_files_of_one_run_are_not_mixed_with_those_of_the_next(change: str, here
     time.sleep(0.02)  # above the resolution of the file's times
 
     def write_the_second() -> None:
-        with second.open("wb") as pipe:  # when it is opened for reading, the first file was read
+        with second.open(
+            "wb"
+        ) as pipe:  # when it is opened for reading, the first file was read
             if change == "replaced":
                 Path("next").replace(first)
             elif change == "taken away":
                 first.unlink()
             else:
-                first.write_bytes({"cut": whole[:-900], "written anew": whole, "appended": 2 * whole}[change])
+                first.write_bytes(
+                    {"cut": whole[:-900], "written anew": whole, "appended": 2 * whole}[
+                        change
+                    ]
+                )
             pipe.write(CONTENTS["matsum"])
 
     writer = Thread(target=write_the_second, daemon=True)
     writer.start()
     reason = r"run\.glstat: this file was replaced or written anew"
-    with nullcontext() if change == "appended" else pytest.raises(FormatError, match=reason):
+    with (
+        nullcontext()
+        if change == "appended"
+        else pytest.raises(FormatError, match=reason)
+    ):
         assert len(open_files([str(first), str(second)])) == 2
     writer.join()
 
@@ -119,12 +153,20 @@ def test_a_glob_takes_what_has_such_a_name() -> None:
 @pytest.mark.parametrize(
     ("files", "reason"),
     [
-        (("run/aT01", "run/bT01", "run/bT02"), r"run: this folder holds several runs \(aT01, bT01\)"),
+        (
+            ("run/aT01", "run/bT01", "run/bT02"),
+            r"run: this folder holds several runs \(aT01, bT01\)",
+        ),
         (("run/aT01", "run/binout"), r"several runs \(aT01, one of LS-DYNA\)"),
-        (("run/d3dump01",), "run: no glstat, matsum, binout, d3plot or T01 in this folder; give the file"),
+        (
+            ("run/d3dump01",),
+            "run: no glstat, matsum, binout, d3plot or T01 in this folder; give the file",
+        ),
     ],
 )
-def test_a_folder_of_several_runs_or_none_is_refused(files: Sequence[str], reason: str) -> None:
+def test_a_folder_of_several_runs_or_none_is_refused(
+    files: Sequence[str], reason: str
+) -> None:
     names(*files)
     with pytest.raises(FormatError, match=reason):
         expand(["run"])
@@ -138,7 +180,10 @@ def test_a_folder_is_read_as_one_run() -> None:
     assert run.sources == ("binout", "glstat", "matsum")
     assert run.notes == ()
     history = run.history(Selection())
-    assert (history.format, history.channel) == ("binout + glstat + matsum", "internal_energy")
+    assert (history.format, history.channel) == (
+        "binout + glstat + matsum",
+        "internal_energy",
+    )
     assert history.time.tolist() == TIMES
 
 
@@ -157,9 +202,13 @@ def test_legs_are_files_of_the_same_name_with_a_higher_number(
 ) -> None:
     for name in (*(n for n in named if "/" not in n), *beside):
         (tmp_path / name).touch()
-    assert later_legs([str(tmp_path / name) for name in named]) == [str(tmp_path / name) for name in later]
+    assert later_legs([str(tmp_path / name) for name in named]) == [
+        str(tmp_path / name) for name in later
+    ]
 
 
 def test_a_td_that_only_a_later_leg_reaches_names_it() -> None:
     first = stored("rollover_r100_T01.gz")
-    assert first.replace("T01", "T02") in refused("suggest", "--td", "0.4", "--part", "box", first)
+    assert first.replace("T01", "T02") in refused(
+        "suggest", "--td", "0.4", "--part", "box", first
+    )

@@ -7,7 +7,14 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from d2rpick.base.errors import RangeError
-from d2rpick.models.box_model import GRAVITY, Bars, Parameters, Truss, build, stiffest_rate
+from d2rpick.models.box_model import (
+    GRAVITY,
+    Bars,
+    Parameters,
+    Truss,
+    build,
+    stiffest_rate,
+)
 from d2rpick.models.box_motion import SLIP, Contact, Motion, RigidBody
 from d2rpick.models.box_run import (
     BOX,
@@ -38,7 +45,9 @@ def momenta(motion: Motion) -> tuple[complex, float]:
 @cache
 def known(time: float) -> Motion:
     """A run that has come to ``time``, which is left as it is."""
-    motion = known(round(time - 0.01, 2)).copy() if time > 0 else Motion(COARSE, INTERVAL)
+    motion = (
+        known(round(time - 0.01, 2)).copy() if time > 0 else Motion(COARSE, INTERVAL)
+    )
     run_to(motion, time)
     return motion
 
@@ -51,7 +60,9 @@ def at(time: float) -> Motion:
 @cache
 def run_of(parameters: Parameters, *windows: RigidWindow) -> Record:
     """A run through trip or fall, flight and landing."""
-    return simulate(parameters, 1.2 if parameters.drop else 0.42, *windows, interval=INTERVAL)
+    return simulate(
+        parameters, 1.2 if parameters.drop else 0.42, *windows, interval=INTERVAL
+    )
 
 
 @pytest.mark.parametrize(
@@ -59,7 +70,10 @@ def run_of(parameters: Parameters, *windows: RigidWindow) -> Record:
     [
         (COARSE, ()),
         (COARSE, (RigidWindow(0.1, 0.2), RigidWindow(0.3, 0.35))),
-        (Parameters(mesh=6, stiffness=2e6, yield_strain=2e-3), (RigidWindow(0.03, 0.2),)),
+        (
+            Parameters(mesh=6, stiffness=2e6, yield_strain=2e-3),
+            (RigidWindow(0.03, 0.2),),
+        ),
     ],
 )
 def test_energy_is_balanced_within_one_percent_through_trip_flight_and_landing(
@@ -74,30 +88,42 @@ FALLING = Parameters(mesh=4, speed=0.5, drop=0.4, tilt=40.0, ground_stiffness=2e
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("windows", [(), (RigidWindow(0.0, 0.28),), (RigidWindow(0.0, 0.28), RigidWindow(0.45, 0.5))])
+@pytest.mark.parametrize(
+    "windows",
+    [(), (RigidWindow(0.0, 0.28),), (RigidWindow(0.0, 0.28), RigidWindow(0.45, 0.5))],
+)
 def test_a_box_that_falls_bounces_and_its_energy_is_balanced_however_often_it_is_switched(
     windows: tuple[RigidWindow, ...],
 ) -> None:
     run = run_of(FALLING, *windows)
     assert np.abs(run.imbalance).max() < 0.01
     assert len(run.landings) >= 3
-    assert run.landed == pytest.approx(np.sqrt(2 * 0.4 / GRAVITY), rel=0.01)  # damping brakes the fall a little
+    assert run.landed == pytest.approx(
+        np.sqrt(2 * 0.4 / GRAVITY), rel=0.01
+    )  # damping brakes the fall a little
     assert run.released is None
     before, after = run.landings[0][1], run.landings[1][0]
     flying = (run.time > before + INTERVAL) & (run.time < after - INTERVAL)
     assert np.ptp(run.friction_energy[flying]) == 0.0
-    assert np.ptp(run.momentum.sum(axis=1).real[flying]) < 0.01 * np.ptp(run.momentum.sum(axis=1).imag)
+    assert np.ptp(run.momentum.sum(axis=1).real[flying]) < 0.01 * np.ptp(
+        run.momentum.sum(axis=1).imag
+    )
 
 
 def test_a_free_fall_locks_in_nothing_and_moves_no_landing() -> None:
     whole, switched = (
-        simulate(FALLING, 0.62, *windows, interval=INTERVAL) for windows in ((), (RigidWindow(0.0, 0.28),))
+        simulate(FALLING, 0.62, *windows, interval=INTERVAL)
+        for windows in ((), (RigidWindow(0.0, 0.28),))
     )
     assert whole.internal_energy[whole.time < 0.28].max() < 1e-9
-    np.testing.assert_allclose(np.ravel(switched.landings[:2]), np.ravel(whole.landings[:2]), atol=1e-4)
+    np.testing.assert_allclose(
+        np.ravel(switched.landings[:2]), np.ravel(whole.landings[:2]), atol=1e-4
+    )
 
 
-@pytest.mark.parametrize(("parameters", "window"), [(COARSE, (0.03, 0.35)), (FALLING, None)])
+@pytest.mark.parametrize(
+    ("parameters", "window"), [(COARSE, (0.03, 0.35)), (FALLING, None)]
+)
 def test_momentum_and_angular_momentum_change_by_the_impulses_alone(
     window: tuple[float, float] | None, parameters: Parameters
 ) -> None:
@@ -117,7 +143,9 @@ def test_momentum_and_angular_momentum_change_by_the_impulses_alone(
 
 
 @given(TIMES)
-def test_the_switch_to_rigid_keeps_both_momenta_and_loses_kinetic_energy(tr: float) -> None:
+def test_the_switch_to_rigid_keeps_both_momenta_and_loses_kinetic_energy(
+    tr: float,
+) -> None:
     motion = at(tr)
     motion.box.forces(motion.places)  # yields where it does at this step
     before, energy = momenta(motion), motion.box.internal_energy(motion.places)
@@ -132,23 +160,36 @@ def test_the_switch_to_rigid_keeps_both_momenta_and_loses_kinetic_energy(tr: flo
 
 @settings(max_examples=8, deadline=None)
 @given(TIMES, st.floats(0.0, 0.25))
-def test_the_switch_back_keeps_both_momenta_and_the_frozen_energy_comes_back(tr: float, rigid: float) -> None:
+def test_the_switch_back_keeps_both_momenta_and_the_frozen_energy_comes_back(
+    tr: float, rigid: float
+) -> None:
     motion = at(tr)
     motion.make_rigid()
-    frozen, pulls = motion.box.internal_energy(motion.places), motion.box.forces(motion.places)
+    frozen, pulls = (
+        motion.box.internal_energy(motion.places),
+        motion.box.forces(motion.places),
+    )
     turned = sure(motion.body).arms[0]
     run_to(motion, tr + rigid)
     turned = sure(motion.body).arms[0] / turned
     before = momenta(motion)
     motion.make_deformable()
     assert momenta(motion) == before
-    assert motion.box.internal_energy(motion.places) == pytest.approx(frozen, rel=1e-9, abs=1e-12)
-    np.testing.assert_allclose(motion.box.forces(motion.places), pulls * turned, atol=1e-6 * (1 + np.abs(pulls).max()))
+    assert motion.box.internal_energy(motion.places) == pytest.approx(
+        frozen, rel=1e-9, abs=1e-12
+    )
+    np.testing.assert_allclose(
+        motion.box.forces(motion.places),
+        pulls * turned,
+        atol=1e-6 * (1 + np.abs(pulls).max()),
+    )
 
 
 @settings(max_examples=8, deadline=None)
 @given(TIMES)
-def test_a_rigid_phase_of_no_length_takes_the_vibration_velocity_and_nothing_else(tr: float) -> None:
+def test_a_rigid_phase_of_no_length_takes_the_vibration_velocity_and_nothing_else(
+    tr: float,
+) -> None:
     motion, untouched = at(tr), at(tr)
     motion.make_rigid()
     motion.make_deformable()
@@ -157,8 +198,13 @@ def test_a_rigid_phase_of_no_length_takes_the_vibration_velocity_and_nothing_els
     masses, of_box = motion.structure.masses, slice(motion.structure.of_box)
     assert not lost[motion.structure.of_box :].any()
     assert abs((masses * lost).sum()) < 1e-9 * masses.sum()
-    assert abs(np.vdot(motion.places[of_box], (masses * lost)[of_box]).imag) < 1e-9 * masses.sum()
-    rigid = RigidBody(masses[of_box], motion.places[of_box], untouched.velocities[of_box])
+    assert (
+        abs(np.vdot(motion.places[of_box], (masses * lost)[of_box]).imag)
+        < 1e-9 * masses.sum()
+    )
+    rigid = RigidBody(
+        masses[of_box], motion.places[of_box], untouched.velocities[of_box]
+    )
     np.testing.assert_allclose(motion.velocities[of_box], rigid.velocities)
 
 
@@ -175,13 +221,19 @@ def test_while_it_is_rigid_the_box_keeps_its_energy_and_computes_no_bars() -> No
     structure = build(COARSE)
     of_box, of_step = structure.box.rest.size, structure.step.rest.size
     steps = whole.bar_updates / (of_box + of_step)
-    assert switched.bar_updates == pytest.approx(steps * of_step + steps / 3 * of_box, rel=0.01)
+    assert switched.bar_updates == pytest.approx(
+        steps * of_step + steps / 3 * of_box, rel=0.01
+    )
 
 
 @given(ANGLES, st.integers(0, 2**32 - 1))
-def test_bars_turn_with_their_points_and_push_nothing_as_a_whole(angle: float, seed: int) -> None:
+def test_bars_turn_with_their_points_and_push_nothing_as_a_whole(
+    angle: float, seed: int
+) -> None:
     structure = build(COARSE)
-    shaken = structure.places + 1e-4 * np.random.default_rng(seed).normal(size=structure.places.size)
+    shaken = structure.places + 1e-4 * np.random.default_rng(seed).normal(
+        size=structure.places.size
+    )
     here, there = (Bars(structure.box, structure.places.size) for _ in range(2))
     turn = np.exp(1j * angle)
     forces, turned = here.forces(shaken), there.forces(shaken * turn + 3)
@@ -189,13 +241,17 @@ def test_bars_turn_with_their_points_and_push_nothing_as_a_whole(angle: float, s
     np.testing.assert_allclose(turned, forces * turn, atol=1e-6 * scale)
     assert abs(forces.sum()) < 1e-9 * scale
     assert abs(np.vdot(shaken, forces).imag) < 1e-9 * scale
-    assert there.internal_energy(shaken * turn + 3) == pytest.approx(here.internal_energy(shaken), rel=1e-6)
+    assert there.internal_energy(shaken * turn + 3) == pytest.approx(
+        here.internal_energy(shaken), rel=1e-6
+    )
 
 
 def test_forces_are_the_slope_of_the_elastic_energy() -> None:
     structure = build(Parameters(mesh=4, yield_strain=1.0))
     bars = Bars(structure.box, structure.places.size)
-    places = structure.places + 1e-3 * np.random.default_rng(1).normal(size=structure.places.size)
+    places = structure.places + 1e-3 * np.random.default_rng(1).normal(
+        size=structure.places.size
+    )
     forces = bars.forces(places)
     for point in (0, 7, 20):
         for way in (1e-6, 1e-6j):
@@ -203,16 +259,24 @@ def test_forces_are_the_slope_of_the_elastic_energy() -> None:
             moved[point] += way
             back[point] -= way
             slope = (bars.internal_energy(moved) - bars.internal_energy(back)) / 2e-6
-            assert slope == pytest.approx(-(forces[point] * np.conj(way)).real / 1e-6, rel=1e-5)
+            assert slope == pytest.approx(
+                -(forces[point] * np.conj(way)).real / 1e-6, rel=1e-5
+            )
 
 
 def test_a_bar_yields_at_its_strength_and_keeps_the_plastic_work() -> None:
-    truss = Truss.between(np.array([0j, 1 + 0j]), [(0, 1)], axial=1e6, yield_strain=1e-3)
+    truss = Truss.between(
+        np.array([0j, 1 + 0j]), [(0, 1)], axial=1e6, yield_strain=1e-3
+    )
     bars = Bars(truss, 2)
-    assert bars.forces(np.array([0j, 1.003 + 0j])).tolist() == pytest.approx([1e3, -1e3])
+    assert bars.forces(np.array([0j, 1.003 + 0j])).tolist() == pytest.approx(
+        [1e3, -1e3]
+    )
     assert bars.elastic_energy(np.array([0j, 1.003 + 0j])) == pytest.approx(0.5)
     assert bars.internal_energy(np.array([0j, 1.003 + 0j])) == pytest.approx(0.5 + 2.0)
-    assert bars.forces(np.array([0j, 1.002 + 0j])).tolist() == pytest.approx([0, 0], abs=1e-6)
+    assert bars.forces(np.array([0j, 1.002 + 0j])).tolist() == pytest.approx(
+        [0, 0], abs=1e-6
+    )
     assert bars.internal_energy(np.array([0j, 1.002 + 0j])) == pytest.approx(2.0)
 
 
@@ -225,18 +289,27 @@ def test_no_mode_is_faster_than_the_stiffest_bar_says(mesh: int) -> None:
         for (one, other), rigidity in zip(truss.ends, truss.stiffness, strict=True):
             along = structure.places[other] - structure.places[one]
             row = np.zeros(2 * count)
-            row[[2 * other, 2 * other + 1]] = along.real / abs(along), along.imag / abs(along)
+            row[[2 * other, 2 * other + 1]] = (
+                along.real / abs(along),
+                along.imag / abs(along),
+            )
             row[[2 * one, 2 * one + 1]] = -row[[2 * other, 2 * other + 1]]
             stiffness += rigidity * np.outer(row, row)
     masses = np.repeat(structure.masses, 2)
-    fastest = np.sqrt(np.linalg.eigvalsh(stiffness / np.sqrt(np.outer(masses, masses)))[-1])
-    bound = stiffest_rate(structure.masses, structure.box, structure.step, extra=np.zeros(count))
+    fastest = np.sqrt(
+        np.linalg.eigvalsh(stiffness / np.sqrt(np.outer(masses, masses)))[-1]
+    )
+    bound = stiffest_rate(
+        structure.masses, structure.box, structure.step, extra=np.zeros(count)
+    )
     assert fastest <= bound <= 2 * fastest
 
 
 def test_a_body_without_forces_moves_and_turns_evenly() -> None:
     masses, places = np.array([1.0, 2.0, 3.0]), np.array([0j, 1 + 0j, 1j])
-    body = RigidBody(masses, places, np.asarray(2.0 + 1j * 3.0 * (places - 0.5), dtype=np.complex128))
+    body = RigidBody(
+        masses, places, np.asarray(2.0 + 1j * 3.0 * (places - 0.5), dtype=np.complex128)
+    )
     spin, velocity, centre = body.spin, body.velocity, body.centre
     for _ in range(100):
         body.push(np.zeros(3, dtype=complex), 0.0, 0.01)
@@ -250,12 +323,22 @@ def test_floor_and_ground_push_up_with_coulomb_friction_against_the_sliding() ->
     p = Parameters(tilt=0.0, mesh=4)
     structure = build(p)
     for depth, level in ((0.001, 0.0), (0.002, -p.ground - 5.0)):
-        contact = Contact(structure, Parameters(tilt=0.0, mesh=4, ground=p.ground + 5.0))
+        contact = Contact(
+            structure, Parameters(tilt=0.0, mesh=4, ground=p.ground + 5.0)
+        )
         places = structure.places + 1j * (level - depth)
-        push = sure(contact.push(1.0, places - 1.0 + p.speed * p.braking / 2, np.full(places.size, 2.0 + 0j)))
+        push = sure(
+            contact.push(
+                1.0,
+                places - 1.0 + p.speed * p.braking / 2,
+                np.full(places.size, 2.0 + 0j),
+            )
+        )
         normal = push.forces.imag
         assert normal.min() >= 0
-        np.testing.assert_allclose(push.forces.real, -p.friction * normal * 2.0 / np.hypot(2.0, SLIP))
+        np.testing.assert_allclose(
+            push.forces.real, -p.friction * normal * 2.0 / np.hypot(2.0, SLIP)
+        )
         assert push.sled.normal.any() == (level == 0)
 
 
@@ -288,7 +371,9 @@ def test_contact_sleeps_in_the_flight_and_misses_nothing() -> None:
 @pytest.mark.slow
 def test_the_mean_energy_of_a_scan_and_its_errors_are_those_of_single_runs() -> None:
     reference, times, td = run_of(COARSE), [0.02, 0.15], 0.36
-    alone = [compare(reference, run_of(COARSE, RigidWindow(tr, td)), tr, td) for tr in times]
+    alone = [
+        compare(reference, run_of(COARSE, RigidWindow(tr, td)), tr, td) for tr in times
+    ]
     assert list(scan(COARSE, reference, times[::-1], td, jobs=1)) == alone
     assert list(scan(COARSE, reference, times, td, jobs=2)) == alone
     assert abs(alone[0].roll_error) > abs(alone[1].roll_error)
@@ -311,13 +396,23 @@ def test_times_of_a_scan_are_before_td_and_dense_in_the_trip() -> None:
 
 
 def test_what_is_no_model_or_no_window_is_refused() -> None:
-    for wrong in ({"mesh": 3}, {"stiffness": 0.0}, {"speed": float("nan")}, {"friction": -0.1}):
+    for wrong in (
+        {"mesh": 3},
+        {"stiffness": 0.0},
+        {"speed": float("nan")},
+        {"friction": -0.1},
+    ):
         with pytest.raises(RangeError, match=next(iter(wrong))):
             Parameters(**wrong)
     for refused, why in (
         (lambda: simulate(Parameters(stiffness=1e12), 100), "softer bars"),
         (lambda: RigidWindow(0.2, 0.1), "must be in this order"),
-        (lambda: simulate(COARSE, 0.3, RigidWindow(0.1, 0.2), RigidWindow(0.15, 0.25)), "begins before the one up to"),
+        (
+            lambda: simulate(
+                COARSE, 0.3, RigidWindow(0.1, 0.2), RigidWindow(0.15, 0.25)
+            ),
+            "begins before the one up to",
+        ),
         (lambda: comparison_end(simulate(COARSE, 0.05), 0.06), "end of the flight"),
     ):
         with pytest.raises(RangeError, match=why):
@@ -327,9 +422,13 @@ def test_what_is_no_model_or_no_window_is_refused() -> None:
 @pytest.mark.slow
 def test_the_strength_of_the_roof_acts_after_the_landing_alone() -> None:
     """It yields when it hits the ground; up to there the run is the same to the last digit."""
-    base, weak = (simulate(Parameters(mesh=8, roof_strength=share), 0.42) for share in (1.0, 0.7))
+    base, weak = (
+        simulate(Parameters(mesh=8, roof_strength=share), 0.42) for share in (1.0, 0.7)
+    )
     before = base.time < sure(base.landed)
-    np.testing.assert_array_equal(weak.internal_energy[before], base.internal_energy[before])
+    np.testing.assert_array_equal(
+        weak.internal_energy[before], base.internal_energy[before]
+    )
     assert np.abs(weak.internal_energy - base.internal_energy).max() > 1.0
     with pytest.raises(RangeError, match="roof_strength is 0"):
         Parameters(roof_strength=0.0)

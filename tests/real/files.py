@@ -10,7 +10,10 @@ import csv
 import os
 from pathlib import Path
 
-REAL = Path(os.environ.get("D2RPICK_REAL") or Path(__file__).resolve().parents[3] / "shared" / "real").absolute()
+REAL = Path(
+    os.environ.get("D2RPICK_REAL")
+    or Path(__file__).resolve().parents[3] / "shared" / "real"
+).absolute()
 
 
 def real(name: str) -> str:
@@ -27,4 +30,8 @@ def content(name: str) -> bytes:
 
 def rows_of(table: str) -> list[dict[str, str]]:
     """Rows of a table of expected numbers beside this file."""
-    return list(csv.DictReader(Path(__file__).with_name(f"{table}.csv").read_text("utf-8").splitlines()))
+    return list(
+        csv.DictReader(
+            Path(__file__).with_name(f"{table}.csv").read_text("utf-8").splitlines()
+        )
+    )

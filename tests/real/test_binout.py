@@ -32,7 +32,13 @@ def test_real_files_have_the_numbers_of_lasso(file: str) -> None:
     for row in rows:
         name, part = row["variable"], row["part"]
         time = run.part_time if part else run.time
-        values = run.part_channel(name, [int(part)])[:, 0] if part else time if name == "time" else run.channel(name)
+        values = (
+            run.part_channel(name, [int(part)])[:, 0]
+            if part
+            else time
+            if name == "time"
+            else run.channel(name)
+        )
         assert time.size == int(row["states"])
         assert values[int(row["state"])] == float(row["number"])
 
@@ -41,15 +47,23 @@ def test_real_files_have_the_numbers_of_lasso(file: str) -> None:
 def test_real_glstat_prints_as_the_solvers_own_converter_printed_it(file: str) -> None:
     text = content(f"{file}.l2a-glstat").decode("latin-1")
     run = opened(content(file))
-    for label, column in (("time..", run.time), ("internal energy..", run.channel("internal_energy"))):
+    for label, column in (
+        ("time..", run.time),
+        ("internal energy..", run.channel("internal_energy")),
+    ):
         lines = [line for line in text.splitlines() if line.startswith(f" {label}")]
-        np.testing.assert_allclose(column, [float(line[32:46]) for line in lines], rtol=6e-6)
+        np.testing.assert_allclose(
+            column, [float(line[32:46]) for line in lines], rtol=6e-6
+        )
 
 
 def test_titles_belong_to_ids_not_to_places() -> None:
     """R7 lists legend_ids 101, 1 beside ids 1, 101; only part 1 has a title (l2a, d3hsp)."""
     run = opened(content(R7))
-    assert [(part.id, part.title) for part in run.parts] == [(1, "null shells for visualization"), (101, "")]
+    assert [(part.id, part.title) for part in run.parts] == [
+        (1, "null shells for visualization"),
+        (101, ""),
+    ]
 
 
 def test_a_branch_that_is_missing_is_named_with_those_there_are() -> None:

@@ -16,7 +16,13 @@ from tests.real.files import real
 if TYPE_CHECKING:
     from d2rpick.histories.run import Run
 
-FAMILIES = ("one_shell", "ten_bricks_smp", "four_parts", "gaps_in_numbers", "projectile_double")
+FAMILIES = (
+    "one_shell",
+    "ten_bricks_smp",
+    "four_parts",
+    "gaps_in_numbers",
+    "projectile_double",
+)
 
 
 @cache
@@ -29,29 +35,48 @@ def test_states_are_those_that_were_read_before(folder: str) -> None:
     truth = json.loads(Path(real(f"d3plot/{folder}/truth.json")).read_text("utf-8"))
     (database,) = opened(folder).databases
     ids = [part.id for part in database.parts]
-    assert ids == (truth["part_ids"] or list(range(1, len(ids) + 1)))  # where they are numbered one by one
+    assert ids == (
+        truth["part_ids"] or list(range(1, len(ids) + 1))
+    )  # where they are numbered one by one
     assert database.time.size == truth["states"]
     for state in truth["at"]:
         at, parts = int(state["state"]), state["parts"]
         assert database.time[at] == state["time"]
-        for name, value in (("internal_energy", "internal"), ("kinetic_energy", "kinetic"), ("total_energy", "total")):
+        for name, value in (
+            ("internal_energy", "internal"),
+            ("kinetic_energy", "kinetic"),
+            ("total_energy", "total"),
+        ):
             assert database.channel(name)[at] == state[value]
-        assert [database.channel(f"{axis}_velocity")[at] for axis in "xyz"] == state["velocity"]
-        quantities = {"internal_energy": "internal", "kinetic_energy": "kinetic", "mass": "mass"}
+        assert [database.channel(f"{axis}_velocity")[at] for axis in "xyz"] == state[
+            "velocity"
+        ]
+        quantities = {
+            "internal_energy": "internal",
+            "kinetic_energy": "kinetic",
+            "mass": "mass",
+        }
         for name, value in quantities.items():
             assert database.part_channel(name, ids)[at].tolist() == parts[value]
-        velocities = [database.part_channel(f"{axis}_rbvelocity", ids)[at] for axis in "xyz"]
+        velocities = [
+            database.part_channel(f"{axis}_rbvelocity", ids)[at] for axis in "xyz"
+        ]
         assert np.transpose(velocities).tolist() == parts["velocity"]
 
 
 def test_energies_are_those_of_the_glstat_of_the_same_run() -> None:
-    run, glstat = opened("one_shell"), open_run([real("d3plot/one_shell/glstat")]).history(Selection())
+    run, glstat = (
+        opened("one_shell"),
+        open_run([real("d3plot/one_shell/glstat")]).history(Selection()),
+    )
     time = run.part_time
     places = np.abs(glstat.time[:, np.newaxis] - time).argmin(axis=0)
     same = np.abs(glstat.time[places] - time) < 1e-6 * time[-1]
     assert same.sum() == 11
     energies = run.part_energies(run.parts)[same, 0]
-    np.testing.assert_allclose(energies, glstat.energy[places[same]], rtol=1e-5, atol=1e-18)  # of its six digits
+    np.testing.assert_allclose(
+        energies, glstat.energy[places[same]], rtol=1e-5, atol=1e-18
+    )  # of its six digits
 
 
 @pytest.mark.parametrize("folder", FAMILIES)
@@ -62,10 +87,20 @@ def test_all_states_are_as_lasso_reads_them(folder: str) -> None:
     (database,) = opened(folder).databases
     ids = [part.id for part in database.parts]
     np.testing.assert_array_equal(database.time, theirs["timesteps"])
-    np.testing.assert_array_equal(database.channel("kinetic_energy"), theirs["global_kinetic_energy"])
-    np.testing.assert_array_equal(database.channel("internal_energy"), theirs["global_internal_energy"])
+    np.testing.assert_array_equal(
+        database.channel("kinetic_energy"), theirs["global_kinetic_energy"]
+    )
+    np.testing.assert_array_equal(
+        database.channel("internal_energy"), theirs["global_internal_energy"]
+    )
     for name in ("internal_energy", "kinetic_energy", "mass", "hourglass_energy"):
-        np.testing.assert_array_equal(database.part_channel(name, ids), theirs[f"part_{name}"])
+        np.testing.assert_array_equal(
+            database.part_channel(name, ids), theirs[f"part_{name}"]
+        )
     momenta = theirs["part_velocity"] * theirs["part_mass"][:, :, np.newaxis]
     for axis, name in enumerate("xyz"):
-        np.testing.assert_allclose(database.part_channel(f"{name}_momentum", ids), momenta[:, :, axis], rtol=1e-6)
+        np.testing.assert_allclose(
+            database.part_channel(f"{name}_momentum", ids),
+            momenta[:, :, axis],
+            rtol=1e-6,
+        )

@@ -56,7 +56,9 @@ def test_findings(name: str) -> None:
 
 def test_all_decks_are_covered() -> None:
     folder = Path(real("decks"))
-    files = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+    files = {
+        str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()
+    }
     assert files == FOUND.keys() | set(OF_RADIOSS)
 
 
@@ -67,25 +69,40 @@ def test_decks_of_another_solver_are_not_passed_silently(name: str) -> None:
 
 
 def test_the_disabled_card_is_shown_where_it_stands() -> None:
-    (finding,) = (finding for finding in check("batmac_nail_main.k").findings if finding.rule == "D2R301")
+    (finding,) = (
+        finding
+        for finding in check("batmac_nail_main.k").findings
+        if finding.rule == "D2R301"
+    )
     assert finding.line == 587
     assert "*COMMENT c:*DEFORMABLE_TO_RIGID_AUTOMATIC" in finding.message
 
 
 def test_the_snippet_is_not_in_legal_columns() -> None:
-    first = next(finding for finding in check("koo_plan_doc_snippet.txt").findings if finding.rule == "D2R002")
+    first = next(
+        finding
+        for finding in check("koo_plan_doc_snippet.txt").findings
+        if finding.rule == "D2R002"
+    )
     assert "'2    0.'" in first.message
 
 
 def test_swapped_codes_are_named() -> None:
-    (finding,) = (finding for finding in check("koo_pair_code42_wrong.k").findings if finding.rule == "D2R005")
+    (finding,) = (
+        finding
+        for finding in check("koo_pair_code42_wrong.k").findings
+        if finding.rule == "D2R005"
+    )
     assert "seem to be swapped" in finding.message
     assert finding.severity == "error"
 
 
 @pytest.mark.parametrize("name", ["jr_pendulum.k", "k2rad_plain_lrb.k"])
 def test_plain_cards_are_rigid_from_the_start(name: str) -> None:
-    assert [(window.part, window.tr, window.td) for window in check(name).windows] == [(1, 0.0, None), (2, 0.0, None)]
+    assert [(window.part, window.tr, window.td) for window in check(name).windows] == [
+        (1, 0.0, None),
+        (2, 0.0, None),
+    ]
 
 
 # Radioss.
@@ -94,7 +111,9 @@ def test_plain_cards_are_rigid_from_the_start(name: str) -> None:
 @pytest.mark.parametrize("name", ["IDEL8_0000.rad", "IDEL8_0001.rad", "IDEL8_0002.rad"])
 def test_any_file_of_a_public_run_is_the_run(name: str) -> None:
     checked = check_deck(real(f"radioss-decks/{name}"))
-    assert [finding.rule for finding in checked.findings] == ["D2R003"]  # qadiags.inc is not there
+    assert [finding.rule for finding in checked.findings] == [
+        "D2R003"
+    ]  # qadiags.inc is not there
     assert len(checked.files) == 3
     assert {(window.tr, window.td) for window in checked.windows} == {(0.0, 0.05)}
     assert [window.part for window in checked.windows] == [1]
@@ -102,15 +121,18 @@ def test_any_file_of_a_public_run_is_the_run(name: str) -> None:
 
 def test_a_public_run_that_switches_nobody() -> None:
     checked = check_deck(real("radioss-decks/BLOCK_0000.rad"))
-    assert [finding.rule for finding in checked.findings] == ["D2R003"]  # qadiags.inc is not there
+    assert [finding.rule for finding in checked.findings] == [
+        "D2R003"
+    ]  # qadiags.inc is not there
     assert checked.windows == ()
 
 
 def test_legs_without_their_starter_deck_tell_main_nodes() -> None:
     checked = check("radioss/IDEL8_0001.rad")
-    assert [(window.unit.id, window.unit.kind, window.tr, window.td) for window in checked.windows] == [
-        (450, "main node", 0.0, 0.05)
-    ]
+    assert [
+        (window.unit.id, window.unit.kind, window.tr, window.td)
+        for window in checked.windows
+    ] == [(450, "main node", 0.0, 0.05)]
     assert checked.findings == ()
 
 
@@ -122,7 +144,11 @@ def test_real_decks_hold_what_a_plain_count_finds() -> None:
     plain: Counter[int] = Counter()
     reading = False
     for line in text:
-        reading = line.upper().startswith(("*ELEMENT_SHELL", "*ELEMENT_BEAM")) if line.startswith("*") else reading
+        reading = (
+            line.upper().startswith(("*ELEMENT_SHELL", "*ELEMENT_BEAM"))
+            if line.startswith("*")
+            else reading
+        )
         if reading and line[:1] not in "*$" and line.strip():
             plain[int(line[8:16])] += 1
     found = ls_dyna_inventory.read(read_deck(real("decks/nodes.k")))

@@ -21,7 +21,9 @@ from d2rpick.histories.opening import Selection, open_run
 from tests.reading import read_history
 from tests.real.files import real, rows_of
 
-READABLE = {row["file"]: row for row in rows_of("readable")}  # asked: refused without, taken when it is asked for
+READABLE = {
+    row["file"]: row for row in rows_of("readable")
+}  # asked: refused without, taken when it is asked for
 
 LISTING = "this is a listing of LS-DYNA"
 REFUSED = {
@@ -39,15 +41,28 @@ def test_read(file: str) -> None:
         with pytest.raises(FormatError, match="by its name not an internal energy"):
             read_history([real(f"histories/{file}")])
     history = read_history([real(f"histories/{file}")], Selection(energy=energy))
-    assert (history.channel, str(history.time.size)) == (expected["channel"], expected["states"])
-    digits = {"radioss-th": 1e-6, "matsum": 1e-15}.get(history.format, 0.0)  # sums depend on their order
-    for place, state in (("first", 0), ("middle", history.time.size // 2), ("last", -1)):
+    assert (history.channel, str(history.time.size)) == (
+        expected["channel"],
+        expected["states"],
+    )
+    digits = {"radioss-th": 1e-6, "matsum": 1e-15}.get(
+        history.format, 0.0
+    )  # sums depend on their order
+    for place, state in (
+        ("first", 0),
+        ("middle", history.time.size // 2),
+        ("last", -1),
+    ):
         written = float(expected[f"{place}_time"]), float(expected[f"{place}_energy"])
-        assert (history.time[state], history.energy[state]) == pytest.approx(written, rel=digits, abs=0.0)
+        assert (history.time[state], history.energy[state]) == pytest.approx(
+            written, rel=digits, abs=0.0
+        )
     assert history.complete is not file.endswith(".head16000")
     notes = expected["notes"].split("; ") if expected["notes"] else []
     assert len(history.notes) == len(notes)
-    assert all(phrase in note for note, phrase in zip(history.notes, notes, strict=True))
+    assert all(
+        phrase in note for note, phrase in zip(history.notes, notes, strict=True)
+    )
 
 
 @pytest.mark.parametrize("file", REFUSED)
@@ -57,7 +72,10 @@ def test_refused(file: str) -> None:
 
 
 def test_no_file_is_left_out() -> None:
-    assert {file.name for file in Path(real("histories")).iterdir()} == {*READABLE, *REFUSED}
+    assert {file.name for file in Path(real("histories")).iterdir()} == {
+        *READABLE,
+        *REFUSED,
+    }
 
 
 # Tables among the files beside them, and what is said of each.
@@ -68,8 +86,16 @@ MORE = {
     "Masters-Project__Steel_Implicit-Energy_Ratio.head6": "'Energy Ratio', by its name not an internal energy",
 }
 PAIRS = {
-    "UMAT_2scale_LSDYNA__curve.txt": (300, (0.0, 4e7), (4.2000001606841885e-06, 42607482.295758456)),
-    "UMAT_2scale_LSDYNA__stress_x_av.csv": (24, (0.0, 922.56408691), (0.50034189224, 667.45178223)),
+    "UMAT_2scale_LSDYNA__curve.txt": (
+        300,
+        (0.0, 4e7),
+        (4.2000001606841885e-06, 42607482.295758456),
+    ),
+    "UMAT_2scale_LSDYNA__stress_x_av.csv": (
+        24,
+        (0.0, 922.56408691),
+        (0.50034189224, 667.45178223),
+    ),
 }
 
 
@@ -77,7 +103,11 @@ def test_a_time_history_as_text_is_read() -> None:
     """One state, whose second line of numbers begins with the mass, as the file shows."""
     file = real("more-histories/luchete80__radioss_tutorials-test-testT01.ascii")
     history = read_history([file])
-    assert (history.format, history.channel, history.time.tolist()) == ("radioss-th", "internal_energy", [0.0])
+    assert (history.format, history.channel, history.time.tolist()) == (
+        "radioss-th",
+        "internal_energy",
+        [0.0],
+    )
     run = open_run([file])
     assert run.databases[0].channel("mass").tolist() == [0.500980584]
     assert run.databases[0].channel("contact_energy").tolist() == [381.780503]
@@ -96,7 +126,9 @@ def test_pairs_with_a_count_are_read(file: str) -> None:
     states, first, second = PAIRS[file]
     history = read_history([real(f"more-histories/{file}")])
     assert history.time.size == states
-    assert list(zip(history.time[:2].tolist(), history.energy[:2].tolist(), strict=True)) == [first, second]
+    assert list(
+        zip(history.time[:2].tolist(), history.energy[:2].tolist(), strict=True)
+    ) == [first, second]
     assert not history.notes
     assert history.complete
 
@@ -105,5 +137,7 @@ def test_a_history_whose_part_variables_have_no_code_has_those_of_the_model() ->
     file = "OpenRadioss__miniqa-OPTIONS-damp-new_test_v11-reference-FFO25SCBT01"
     history = read_history([real(f"more-histories/{file}")])
     assert history.time.size == 11
-    assert (history.energy[0], history.energy[-1]) == pytest.approx((0.0, 0.001894467), rel=1e-6)
+    assert (history.energy[0], history.energy[-1]) == pytest.approx(
+        (0.0, 0.001894467), rel=1e-6
+    )
     assert any("no variables of parts 1, 2" in note for note in history.notes)

@@ -33,19 +33,25 @@ _TIMES = 7
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_nothing_fails_at_any_td_and_no_flight_contradicts_the_health(name: str) -> None:
+def test_nothing_fails_at_any_td_and_no_flight_contradicts_the_health(
+    name: str,
+) -> None:
     try:
         reference = Reference.of(open_run([real(name)]))
     except D2RPickError:
         return  # refused; what is said of it is tested with the readers
-    for td in np.linspace(reference.history.time[0], reference.history.time[-1], _TIMES).tolist():
+    for td in np.linspace(
+        reference.history.time[0], reference.history.time[-1], _TIMES
+    ).tolist():
         try:
             answer = suggest_of(reference, td, PLAIN)
         except D2RPickError:
             assert reference.history.time.size < 3 or not reference.history.energy.any()
             continue
         if answer.situation.in_flight:
-            assert not {"work-in-window", "contact-in-window"} & {caution.code for caution in answer.cautions}
+            assert not {"work-in-window", "contact-in-window"} & {
+                caution.code for caution in answer.cautions
+            }
 
 
 @pytest.mark.parametrize("name", DRIVEN)

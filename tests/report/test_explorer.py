@@ -29,13 +29,23 @@ from selenium.webdriver.common.keys import Keys
 if TYPE_CHECKING:
     from selenium.webdriver.remote.webelement import WebElement
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+CHROMIUM = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))),
+    None,
+)
 DRIVER = shutil.which("chromedriver")
 _NEEDED = pytest.mark.skipif(
-    not (CHROMIUM and DRIVER), reason="Chromium and chromedriver are not installed (Debian: chromium, chromium-driver)"
+    not (CHROMIUM and DRIVER),
+    reason="Chromium and chromedriver are not installed (Debian: chromium, chromium-driver)",
 )
 Test = TypeVar("Test", bound=Callable[..., None])
-_OPTIONS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking")
+_OPTIONS = (
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--no-first-run",
+    "--disable-background-networking",
+)
 # Everything that shows on the page, reaches over its right edge, and lies in nothing that scrolls.
 _CUT = """
 const scrolls = (one) => one.closest(".scroll, pre") !== null;
@@ -60,8 +70,16 @@ class Browser:
 
     def open(self, page: Path, *, width: int = 1280, **media: str) -> None:
         """Show a page at a width [px], with what the reader prefers: ``prefers_color_scheme="dark"``."""
-        size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
-        features = [{"name": name.replace("_", "-"), "value": value} for name, value in media.items()]
+        size = {
+            "width": width,
+            "height": 900,
+            "deviceScaleFactor": 1,
+            "mobile": width < 500,
+        }
+        features = [
+            {"name": name.replace("_", "-"), "value": value}
+            for name, value in media.items()
+        ]
         self.ask("Emulation.setDeviceMetricsOverride", **size)
         self.ask("Emulation.setEmulatedMedia", media="", features=features)
         self.driver.get(page.as_uri())
@@ -82,15 +100,25 @@ class Browser:
         """What the interactive part says under a name."""
         return str(self.find(f'[data-value="{name}"]').get_property("textContent"))
 
-    def spoken(self, roles: set[str], value: float | None = None) -> list[dict[str, Any]]:
+    def spoken(
+        self, roles: set[str], value: float | None = None
+    ) -> list[dict[str, Any]]:
         """Elements with these roles, and this value, as a screen reader finds them, which is told a little later."""
 
         from selenium.webdriver.support.wait import WebDriverWait  # slow
 
         def found(_: object) -> list[dict[str, Any]]:
             nodes = self.ask("Accessibility.getFullAXTree")["nodes"]
-            used = [node for node in nodes if node["role"]["value"] in roles and not node["ignored"]]
-            used = [node for node in used if value is None or isclose(node["value"]["value"], value, rel_tol=1e-6)]
+            used = [
+                node
+                for node in nodes
+                if node["role"]["value"] in roles and not node["ignored"]
+            ]
+            used = [
+                node
+                for node in used
+                if value is None or isclose(node["value"]["value"], value, rel_tol=1e-6)
+            ]
             return used if {node["role"]["value"] for node in used} == roles else []
 
         return WebDriverWait(self.driver, timeout=20).until(found)
@@ -105,7 +133,9 @@ class Browser:
 
     def pdf(self) -> bytes:
         """Print the page."""
-        return base64.b64decode(self.ask("Page.printToPDF", preferCSSPageSize=True)["data"])
+        return base64.b64decode(
+            self.ask("Page.printToPDF", preferCSSPageSize=True)["data"]
+        )
 
     def complaints(self) -> list[dict[str, Any]]:
         """What stands in the console since the last call."""
@@ -138,14 +168,25 @@ def written(folder: Path, *args: str) -> Path:
 @pytest.fixture(scope="module")
 def paper(tmp_path_factory: pytest.TempPathFactory) -> Path:
     window = ("--td-window", "0.05", "0.09")
-    return written(tmp_path_factory.mktemp("paper"), "explore", "--td", "0.064", *window, "--steps", "24", ENERGY)
+    return written(
+        tmp_path_factory.mktemp("paper"),
+        "explore",
+        "--td",
+        "0.064",
+        *window,
+        "--steps",
+        "24",
+        ENERGY,
+    )
 
 
 @pytest.fixture(scope="module")
 def box(tmp_path_factory: pytest.TempPathFactory) -> Path:
     window = ("--td-window", "0.33", "0.37", "--after", "0.0910048")
     energy = ("--no-verify", "--energy", "boxIE_J", ROLLOVER)
-    return written(tmp_path_factory.mktemp("box"), "explore", *window, "--steps", "4", *energy)
+    return written(
+        tmp_path_factory.mktemp("box"), "explore", *window, "--steps", "4", *energy
+    )
 
 
 @pytest.fixture(scope="module")
@@ -153,10 +194,15 @@ def started(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     """A browser that keeps what it writes in a folder of its own."""
     options = webdriver.ChromeOptions()
     options.binary_location = str(CHROMIUM)
-    for option in (*_OPTIONS, f"--user-data-dir={tmp_path_factory.mktemp('browser') / 'profile'}"):
+    for option in (
+        *_OPTIONS,
+        f"--user-data-dir={tmp_path_factory.mktemp('browser') / 'profile'}",
+    ):
         options.add_argument(option)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(str(DRIVER)))
+    driver = webdriver.Chrome(
+        options=options, service=webdriver.ChromeService(str(DRIVER))
+    )
     yield Browser(driver)
     driver.quit()
 
@@ -170,7 +216,10 @@ def browser(started: Browser) -> Iterator[Browser]:
 
 def content(page: Path) -> dict[str, Any]:
     """What the script reads."""
-    text = re.findall(r'<script type="application/json" id="explorer-data">(.*?)</script>', page.read_text("utf-8"))[0]
+    text = re.findall(
+        r'<script type="application/json" id="explorer-data">(.*?)</script>',
+        page.read_text("utf-8"),
+    )[0]
     found: dict[str, Any] = json.loads(text)
     return found
 
@@ -178,7 +227,9 @@ def content(page: Path) -> dict[str, Any]:
 def numbers(page: Path, flight: int = 0) -> list[dict[str, Any]]:
     """Numbers of each td of a flight."""
     found = content(page)["flights"][flight]
-    return [dict(zip(found["numbers"], values, strict=True)) for values, _ in found["rows"]]
+    return [
+        dict(zip(found["numbers"], values, strict=True)) for values, _ in found["rows"]
+    ]
 
 
 @cache
@@ -195,7 +246,11 @@ def check(browser: Browser) -> float:
     said = browser.driver.execute_script(SAID)
     found = suggested(said["command"])
     best = next((one for one in found["candidates"] if one["recommended"]), None)
-    expected = {"td": short(found["td"]), "tr": short(best["tr"]) if best else "none", "exact_td": repr(found["td"])}
+    expected = {
+        "td": short(found["td"]),
+        "tr": short(best["tr"]) if best else "none",
+        "exact_td": repr(found["td"]),
+    }
     if best:
         expected["residual"] = measure(best["residual"])
         expected["kinetic"] = measure(found["kinetic_share"])
@@ -209,28 +264,40 @@ def check(browser: Browser) -> float:
 
 
 @in_browser
-def test_td_typed_at_some_places_shows_the_digits_of_suggest(paper: Path, browser: Browser) -> None:
+def test_td_typed_at_some_places_shows_the_digits_of_suggest(
+    paper: Path, browser: Browser
+) -> None:
     browser.open(paper)
     known = np.array([row["td"] for row in numbers(paper)])
     field = browser.find("#explorer-td")
     for td in np.random.default_rng(1).uniform(0.05, 0.09, 6).round(5).tolist():
         field.clear()
-        field.send_keys(repr(td).replace(".", ",") if td > 0.07 else repr(td), Keys.ENTER)
+        field.send_keys(
+            repr(td).replace(".", ",") if td > 0.07 else repr(td), Keys.ENTER
+        )
         assert check(browser) == known[np.abs(known - td).argmin()]
-        assert f"{td}: this td was not computed" in browser.find(".said").text.replace(",", ".", 1)
+        assert f"{td}: this td was not computed" in browser.find(".said").text.replace(
+            ",", ".", 1
+        )
 
 
 @in_browser
-def test_td_dragged_to_some_places_shows_the_digits_of_suggest(paper: Path, browser: Browser) -> None:
+def test_td_dragged_to_some_places_shows_the_digits_of_suggest(
+    paper: Path, browser: Browser
+) -> None:
     browser.open(paper)
-    browser.driver.execute_script("document.querySelector('.energy').scrollIntoView({block: 'center'})")
+    browser.driver.execute_script(
+        "document.querySelector('.energy').scrollIntoView({block: 'center'})"
+    )
     mouse = webdriver.ActionChains(browser.driver, duration=0)
     mouse.click_and_hold(browser.find(".handle")).perform()
     over = browser.find(".energy .u-over")
     first, last = browser.driver.execute_script(ENDS)
     seen = set()
     for place in np.linspace(first, last, 8).astype(int).tolist():
-        mouse.move_to_element_with_offset(over, place - over.size["width"] // 2, -9).perform()
+        mouse.move_to_element_with_offset(
+            over, place - over.size["width"] // 2, -9
+        ).perform()
         seen.add(check(browser))
     mouse.release().perform()
     assert len(seen) > 6
@@ -242,12 +309,18 @@ def test_td_dragged_to_some_places_shows_the_digits_of_suggest(paper: Path, brow
 @in_browser
 def test_a_finger_moves_td_too(paper: Path, browser: Browser) -> None:
     browser.open(paper, width=390)
-    browser.driver.execute_script("document.querySelector('.energy').scrollIntoView({block: 'center'})")
+    browser.driver.execute_script(
+        "document.querySelector('.energy').scrollIntoView({block: 'center'})"
+    )
     x, y = browser.driver.execute_script(
         "const box = document.querySelector('.handle').getBoundingClientRect(); return [box.x + 22, box.y + 99]"
     )
     before = check(browser)
-    for kind, points in (("Start", [{"x": x, "y": y}]), ("Move", [{"x": x + 25, "y": y + 9}]), ("End", [])):
+    for kind, points in (
+        ("Start", [{"x": x, "y": y}]),
+        ("Move", [{"x": x + 25, "y": y + 9}]),
+        ("End", []),
+    ):
         browser.ask("Input.dispatchTouchEvent", type=f"touch{kind}", touchPoints=points)
     assert check(browser) > before
 
@@ -284,10 +357,14 @@ def test_keys_and_buttons_move_td(paper: Path, browser: Browser) -> None:
 
 
 @in_browser
-def test_a_click_on_a_point_of_the_trade_off_selects_it(paper: Path, browser: Browser) -> None:
+def test_a_click_on_a_point_of_the_trade_off_selects_it(
+    paper: Path, browser: Browser
+) -> None:
     browser.open(paper)
     over = browser.find(".trade .u-over")
-    browser.driver.execute_script("document.querySelector('.trade').scrollIntoView({block: 'center'})")
+    browser.driver.execute_script(
+        "document.querySelector('.trade').scrollIntoView({block: 'center'})"
+    )
     webdriver.ActionChains(browser.driver).move_to_element_with_offset(
         over, over.size["width"] // 2 - 9, over.size["height"] // 2 - 9
     ).click().perform()
@@ -314,18 +391,29 @@ def test_who_listens_can_use_it(paper: Path, browser: Browser) -> None:
         handle.send_keys(keys)  # which it takes, so it can be reached
         (slider,) = browser.spoken({"slider"}, td)
         told = {one["name"]: one["value"].get("value") for one in slider["properties"]}
-        assert (told["valuemin"], told["valuemax"]) == pytest.approx((known[0], known[-1]), rel=1e-6)
+        assert (told["valuemin"], told["valuemax"]) == pytest.approx(
+            (known[0], known[-1]), rel=1e-6
+        )
         assert told["focusable"]
         # the words instead of the number: the tree of some versions passes over them, what speaks it does not
-        assert handle.get_attribute("aria-valuetext") == words(suggested(browser.value("command")))
+        assert handle.get_attribute("aria-valuetext") == words(
+            suggested(browser.value("command"))
+        )
 
 
 @in_browser
 @pytest.mark.parametrize("width", WIDTHS)
-def test_nothing_is_cut_with_and_without_scripts(paper: Path, box: Path, browser: Browser, width: int) -> None:
+def test_nothing_is_cut_with_and_without_scripts(
+    paper: Path, box: Path, browser: Browser, width: int
+) -> None:
     for page in (paper, box):
         plain = page.with_name("plain.html")  # to a browser that runs no scripts
-        plain.write_text(re.sub(r"<script>.*?</script>", "", page.read_text("utf-8"), flags=re.DOTALL), "utf-8")
+        plain.write_text(
+            re.sub(
+                r"<script>.*?</script>", "", page.read_text("utf-8"), flags=re.DOTALL
+            ),
+            "utf-8",
+        )
         for shown, scripts in ((page, True), (plain, False)):
             browser.open(shown, width=width)
             assert browser.cut() == []
@@ -336,9 +424,16 @@ def test_nothing_is_cut_with_and_without_scripts(paper: Path, box: Path, browser
 
 
 @in_browser
-def test_it_prints_as_the_static_page_also_where_it_is_dark(paper: Path, browser: Browser) -> None:
+def test_it_prints_as_the_static_page_also_where_it_is_dark(
+    paper: Path, browser: Browser
+) -> None:
     browser.open(paper, prefers_color_scheme="dark")
-    assert browser.driver.execute_script("return getComputedStyle(document.body).backgroundColor") == "rgb(20, 24, 28)"
+    assert (
+        browser.driver.execute_script(
+            "return getComputedStyle(document.body).backgroundColor"
+        )
+        == "rgb(20, 24, 28)"
+    )
     assert 2 <= len(re.findall(rb"/Type\s*/Page\b", browser.pdf())) <= 6
     browser.ask("Emulation.setEmulatedMedia", media="print")
     assert not browser.shown("#explorer")
@@ -355,22 +450,43 @@ def test_windows_of_acceptable_tr_follow_td(box: Path, browser: Browser) -> None
         (kept,) = (one for one in found["acceptable_windows"] if one["recommended"])
         assert window_as_read(kept["start"], kept["end"]) in browser.value("windows")
         share = [f"{found[end]:.0%}" for end in ("mean_energy_low", "mean_energy_high")]
-        assert browser.value("after").startswith(f"{share[0]} to {share[1]} of what the reference has")
+        assert browser.value("after").startswith(
+            f"{share[0]} to {share[1]} of what the reference has"
+        )
     assert not browser.driver.find_elements("css selector", ".motion")
 
 
 @in_browser
-def test_each_flight_of_a_plan_can_be_explored(tmp_path: Path, browser: Browser) -> None:
+def test_each_flight_of_a_plan_can_be_explored(
+    tmp_path: Path, browser: Browser
+) -> None:
     from selenium.webdriver.support.select import Select  # slow
 
     motion = str(tmp_path / "tumbling.matsum")
-    assert run("rollover", "--mesh", "4", "--dt", "1e-3", "--drop", "0.4", "--tilt", "40", "-o", motion).exit_code == 0
+    assert (
+        run(
+            "rollover",
+            "--mesh",
+            "4",
+            "--dt",
+            "1e-3",
+            "--drop",
+            "0.4",
+            "--tilt",
+            "40",
+            "-o",
+            motion,
+        ).exit_code
+        == 0
+    )
     page = written(tmp_path, "plan", "--no-verify", "--part", "box", motion)
     browser.open(page)
     flights = content(page)["flights"]
     assert len(flights) > 1
     Select(browser.find("#explorer-flight")).select_by_index(1)
-    assert browser.value("exact_td") == repr(numbers(page, 1)[flights[1]["start"]]["td"])
+    assert browser.value("exact_td") == repr(
+        numbers(page, 1)[flights[1]["start"]]["td"]
+    )
 
 
 def test_a_page_of_many_states_stays_small(tmp_path: Path) -> None:
@@ -378,16 +494,34 @@ def test_a_page_of_many_states_stays_small(tmp_path: Path) -> None:
     noise = np.random.default_rng(1).normal(1, 0.01, time.size)
     energy = noise * 150 * np.exp(-10 * time) * np.sin(250 * time) ** 2
     table = tmp_path / "many.csv"
-    np.savetxt(table, np.stack([time, energy], axis=1), delimiter=",", header="time,internal_energy", comments="")
+    np.savetxt(
+        table,
+        np.stack([time, energy], axis=1),
+        delimiter=",",
+        header="time,internal_energy",
+        comments="",
+    )
     page = written(
-        tmp_path, "explore", "--no-verify", "--after", "0.001", "--td-window", "0.1", "0.11", "--steps", "2", str(table)
+        tmp_path,
+        "explore",
+        "--no-verify",
+        "--after",
+        "0.001",
+        "--td-window",
+        "0.1",
+        "0.11",
+        "--steps",
+        "2",
+        str(table),
     )
     (flight,) = content(page)["flights"]
     least = energy[(time > 0.001) & (time < 0.149)]
     assert max(flight["energy"][1]) == pytest.approx(least.max(), rel=0.05)
     assert max(flight["whole"][1]) == pytest.approx(energy.max(), rel=1e-5)
     row = len(json.dumps(flight["rows"])) / len(flight["rows"])
-    assert page.stat().st_size + 2 * STEPS * row < 600_000  # the most td that a page explores
+    assert (
+        page.stat().st_size + 2 * STEPS * row < 600_000
+    )  # the most td that a page explores
 
 
 def contrast(one: str, other: str) -> float:
@@ -395,7 +529,10 @@ def contrast(one: str, other: str) -> float:
 
     def luminance(colour: str) -> float:
         parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
-        linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+        linear = [
+            part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4
+            for part in parts
+        ]
         return float(np.dot(linear, (0.2126, 0.7152, 0.0722)))
 
     dark, light = sorted((luminance(one), luminance(other)))

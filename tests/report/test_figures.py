@@ -23,7 +23,13 @@ def texts(axes: Axes) -> list[str]:
 
 
 def test_load_and_landing_are_both_cut_with_a_mark() -> None:
-    (axes,) = d2.suggest(d2.read(ROOT / "sample_data" / "rollover_box.matsum"), td=0.37, parts="box").plot().axes
+    (axes,) = (
+        d2.suggest(
+            d2.read(ROOT / "sample_data" / "rollover_box.matsum"), td=0.37, parts="box"
+        )
+        .plot()
+        .axes
+    )
     assert [text for text in texts(axes) if "\u2191" in text] == [
         "load, up to 70.09 \u2191",
         "landing, up to 52.09 \u2191",
@@ -42,9 +48,15 @@ def test_many_candidates_become_a_band_and_the_landing_is_cut_with_a_mark() -> N
     assert axes.get_xlim() == pytest.approx((0.0736, 0.3989), abs=1e-3)
     assert "landing, up to 1248 \u2191" in texts(axes)
     assert marks(axes) == [1]  # the recommended one alone
-    bands = [one for one in axes.patches if isinstance(one, Rectangle) and one.get_height() < 0.1]
+    bands = [
+        one
+        for one in axes.patches
+        if isinstance(one, Rectangle) and one.get_height() < 0.1
+    ]
     drawn = sum(one.get_width() for one in bands)
-    assert drawn == pytest.approx(sum(one.end - one.start for one in sure(answer.windows)), rel=0.03)
+    assert drawn == pytest.approx(
+        sum(one.end - one.start for one in sure(answer.windows)), rel=0.03
+    )
     assert len(bands) < len(sure(answer.windows))  # gaps that nobody sees are closed
 
 
@@ -69,20 +81,37 @@ def test_the_figure_of_a_page_holds_the_better_pair_in_a_look_of_its_own() -> No
     better = sure(answer.clearly_better)
     figure = draw_suggestion(answer, page=True)
     energy, motion = figure.axes
-    lines = [line for line in (*energy.lines, *motion.lines) if line.get_label() == "better pair"]
+    lines = [
+        line
+        for line in (*energy.lines, *motion.lines)
+        if line.get_label() == "better pair"
+    ]
     assert len(lines) == 6  # its level, its times in both axes, and what follows
-    assert np.unique(lines[0].get_ydata()).tolist() == [answer.situation.at(better.td).energy_td]
-    assert np.unique([line.get_xdata() for line in lines[1:3]]).tolist() == [better.tr, better.td]
+    assert np.unique(lines[0].get_ydata()).tolist() == [
+        answer.situation.at(better.td).energy_td
+    ]
+    assert np.unique([line.get_xdata() for line in lines[1:3]]).tolist() == [
+        better.tr,
+        better.td,
+    ]
     assert {line.get_linestyle() for line in lines} == {"-."}
-    assert not any(line.get_label() == "better pair" for axes in draw_suggestion(answer).axes for line in axes.lines)
+    assert not any(
+        line.get_label() == "better pair"
+        for axes in draw_suggestion(answer).axes
+        for line in axes.lines
+    )
     (legend,) = figure.legends
     assert "better pair" in {text.get_text() for text in legend.get_texts()}
 
 
 @pytest.mark.parametrize("scale", [1e-12, 1.0, 7e4, 1e15])
-def test_nothing_of_a_pages_figure_lies_outside_of_it_whatever_the_unit(scale: float) -> None:
+def test_nothing_of_a_pages_figure_lies_outside_of_it_whatever_the_unit(
+    scale: float,
+) -> None:
     time, energy = np.loadtxt(ENERGY, delimiter=",", skiprows=1, usecols=(0, 5)).T
-    history = History(time * scale, (energy + energy.max()) * scale, ("made",), "made", "E")
+    history = History(
+        time * scale, (energy + energy.max()) * scale, ("made",), "made", "E"
+    )
     figure = draw_suggestion(suggest(history, 0.064 * scale, Settings()), page=True)
     box, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
     assert box.x0 >= -0.01
@@ -95,7 +124,9 @@ def test_what_rests_is_drawn_flat_beside_what_the_run_has() -> None:
     """Round-off of 1e-21 J before a landing of 40 J; where nothing ever comes, beside the energy it is measured by."""
     time = np.linspace(0, 1, 501)
     energy = 1e-21 * (1 + np.sin(40 * time)) + 40.0 * (time > 0.9)
-    answer = suggest(History(time, energy, ("made",), "made", "E"), 0.8, Settings(after=0.01))
+    answer = suggest(
+        History(time, energy, ("made",), "made", "E"), 0.8, Settings(after=0.01)
+    )
     assert answer.situation.at_rest
     for page in (False, True):
         axes = draw_suggestion(answer, page=page).axes[0]
@@ -103,13 +134,20 @@ def test_what_rests_is_drawn_flat_beside_what_the_run_has() -> None:
         assert axes.get_ylim() == pytest.approx((-3.2, 43.2))
     best = sure(answer.chosen)
     assert (best.level_error, best.energy_ratio) == (0.0, None)
-    resting = replace(row("run", 0.01), curve=np.stack([time, energy]), energy_td=1e-21, warnings=("at-rest",))
+    resting = replace(
+        row("run", 0.01),
+        curve=np.stack([time, energy]),
+        energy_td=1e-21,
+        warnings=("at-rest",),
+    )
     assert draw_study(study(resting)).axes[0].get_ylim()[1] == pytest.approx(43.2)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", [False, True])
-def test_the_first_and_the_last_td_of_a_trade_off_stand_clear_of_the_edge(page: bool) -> None:
+def test_the_first_and_the_last_td_of_a_trade_off_stand_clear_of_the_edge(
+    page: bool,
+) -> None:
     found = d2.explore(d2.read(ENERGY), td_window=(0.06, 0.0687534), replay=False)
     offers = found.offers
     for axes in draw_trade_off(found, page=page).axes:
@@ -129,7 +167,9 @@ def study(*rows: StudyRow) -> Study:
 
 
 def test_up_to_ten_runs_have_a_name_and_a_look_of_their_own() -> None:
-    (axes,) = draw_study(study(*(row(f"runs/{i}/glstat", 0.2 + i / 100, 1 + i) for i in range(10)))).axes
+    (axes,) = draw_study(
+        study(*(row(f"runs/{i}/glstat", 0.2 + i / 100, 1 + i) for i in range(10)))
+    ).axes
     lines = axes.lines[:10]
     assert len({(line.get_color(), line.get_linestyle()) for line in lines}) == 10
     assert {*texts(axes)} >= {str(i) for i in range(10)}
@@ -155,7 +195,10 @@ def test_runs_of_any_energy_can_be_drawn(page: bool) -> None:
 
 
 def test_short_names_tell_runs_apart() -> None:
-    assert short_names(["a/b/soft/box/glstat", "a/b/hard/box/glstat"]) == ("soft", "hard")
+    assert short_names(["a/b/soft/box/glstat", "a/b/hard/box/glstat"]) == (
+        "soft",
+        "hard",
+    )
     assert short_names(["one.csv"]) == ("one.csv",)
     assert short_names(["x/one.csv", "x/one.csv"]) == ("one.csv", "one.csv")
     assert short_names(["one.csv", "deep/er/one.csv"]) == ("one.csv", "deep/er/one.csv")

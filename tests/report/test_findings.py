@@ -16,17 +16,33 @@ from tests.deck.test_radioss_run import place
 from tests.decks import write
 from tests.json_schemas import check_by_schema, junit_is_valid, sarif_is_valid
 
-BAD = HEAD + PARTS + automatic(1, "0.02", rigid=["1", "2"]) + automatic(2, "0.5", deformable=["1"]) + END
+BAD = (
+    HEAD
+    + PARTS
+    + automatic(1, "0.02", rigid=["1", "2"])
+    + automatic(2, "0.5", deformable=["1"])
+    + END
+)
 
 
 @pytest.fixture
 def results(tmp_path: Path) -> list[Checked]:
     (tmp_path / "good").mkdir()
-    return [check_deck(write(tmp_path, BAD)), check_deck(write(tmp_path / "good", GOOD))]
+    return [
+        check_deck(write(tmp_path, BAD)),
+        check_deck(write(tmp_path / "good", GOOD)),
+    ]
 
 
-def written(form: str, results: list[Checked], root: Path, fail_on: Severity = Severity.ERROR) -> str:
-    return formats.write("findings", form, report.Checks(results, str(root), fail_on=fail_on), formats.Shown())
+def written(
+    form: str, results: list[Checked], root: Path, fail_on: Severity = Severity.ERROR
+) -> str:
+    return formats.write(
+        "findings",
+        form,
+        report.Checks(results, str(root), fail_on=fail_on),
+        formats.Shown(),
+    )
 
 
 def test_table(results: list[Checked], tmp_path: Path) -> None:
@@ -34,8 +50,13 @@ def test_table(results: list[Checked], tmp_path: Path) -> None:
     assert lines[0] == "main.k"
     assert "  part 1: rigid from 0.02 to 0.5 (main.k:14)" in lines
     assert "  part 2: rigid from 0.02 to the end (main.k:14)" in lines
-    assert any(line.startswith("  main.k:23:28: error D2R101 TIME1 is 0.5") for line in lines)
-    assert lines[-1] == "1 error, 0 warnings, 1 info in 2 decks; times not judged: no `history`"
+    assert any(
+        line.startswith("  main.k:23:28: error D2R101 TIME1 is 0.5") for line in lines
+    )
+    assert (
+        lines[-1]
+        == "1 error, 0 warnings, 1 info in 2 decks; times not judged: no `history`"
+    )
 
 
 def test_a_card_without_a_window_is_not_passed_over(tmp_path: Path) -> None:
@@ -55,7 +76,9 @@ def test_json(results: list[Checked], tmp_path: Path) -> None:
 
 def test_github(results: list[Checked], tmp_path: Path) -> None:
     lines = written("github", results, tmp_path).split("\n")
-    assert lines[1].startswith("::error file=main.k,line=23,col=28,title=D2R101::TIME1 is 0.5")
+    assert lines[1].startswith(
+        "::error file=main.k,line=23,col=28,title=D2R101::TIME1 is 0.5"
+    )
     assert lines[0].startswith("::notice file=main.k")
 
 
@@ -63,7 +86,10 @@ def test_junit(results: list[Checked], tmp_path: Path) -> None:
     text = written("junit", results, tmp_path)
     junit_is_valid(text)
     suites = ET.fromstring(text)
-    assert [(suite.get("name"), suite.get("tests"), suite.get("failures")) for suite in suites] == [
+    assert [
+        (suite.get("name"), suite.get("tests"), suite.get("failures"))
+        for suite in suites
+    ] == [
         ("main.k", "2", "1"),
         ("good/main.k", "1", "0"),
     ]
@@ -78,9 +104,15 @@ def test_sarif(results: list[Checked], tmp_path: Path) -> None:
     (run,) = json.loads(text)["runs"]
     assert [rule["id"] for rule in run["tool"]["driver"]["rules"]] == list(RULES)
     for result in run["results"]:
-        assert run["tool"]["driver"]["rules"][result["ruleIndex"]]["id"] == result["ruleId"]
+        assert (
+            run["tool"]["driver"]["rules"][result["ruleIndex"]]["id"]
+            == result["ruleId"]
+        )
     place = run["results"][1]["locations"][0]["physicalLocation"]
-    assert place == {"artifactLocation": {"uri": "main.k"}, "region": {"startLine": 23, "startColumn": 28}}
+    assert place == {
+        "artifactLocation": {"uri": "main.k"},
+        "region": {"startLine": 23, "startColumn": 28},
+    }
 
 
 def test_paths_outside_are_absolute(results: list[Checked], tmp_path: Path) -> None:
@@ -112,7 +144,9 @@ def test_only_a_deck_of_another_name_is_named() -> None:
     named = [
         name
         for rule in RULES.values()
-        for name in re.findall(r"^\w+, as (\S+):$", report.as_text(rule, 100), re.MULTILINE)
+        for name in re.findall(
+            r"^\w+, as (\S+):$", report.as_text(rule, 100), re.MULTILINE
+        )
     ]
     assert named
     assert "main.k" not in named

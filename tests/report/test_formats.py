@@ -14,18 +14,34 @@ COMMANDS = {
     "study": ("study", "--td", "0.064", ENERGY),
     "plan": ("plan", ENERGY),
     "trade_off": ("explore", "--steps", "5", ENERGY),
-    "parts": ("parts", "--deck", "sample_data/rollover_box.k", "sample_data/rollover_box.matsum"),
+    "parts": (
+        "parts",
+        "--deck",
+        "sample_data/rollover_box.k",
+        "sample_data/rollover_box.matsum",
+    ),
     "calibration": ("calibrate", "sample_data/flying_box"),
     "rollover": ("rollover", "--scan"),
     "drive": ("drive",),
-    "findings": ("check", "--exit-zero", "sample_data/switching.k", "--history", "sample_data/energy.glstat"),
+    "findings": (
+        "check",
+        "--exit-zero",
+        "sample_data/switching.k",
+        "--history",
+        "sample_data/energy.glstat",
+    ),
 }
 
 
 pytestmark = pytest.mark.usefixtures("by_level")  # what is found does not matter here
 
 # A scan takes seconds, and a run that is driven a solver: their own tests write each of their forms.
-QUICK = [(result, form) for result in FORMATS for form in FORMATS[result] if result not in ("rollover", "drive")]
+QUICK = [
+    (result, form)
+    for result in FORMATS
+    for form in FORMATS[result]
+    if result not in ("rollover", "drive")
+]
 
 
 @pytest.mark.parametrize(("result", "form"), QUICK)
@@ -39,7 +55,9 @@ def test_every_form_is_written(result: str, form: str) -> None:
 def test_commands_offer_the_forms_of_their_result(result: str) -> None:
     command = d2rpick.get_command(click.Context(d2rpick), COMMANDS[result][0])
     assert command is not None
-    (kind,) = (option.type for option in command.params if option.name == "output_format")
+    (kind,) = (
+        option.type for option in command.params if option.name == "output_format"
+    )
     assert isinstance(kind, click.Choice)
     choice = list(kind.choices)
     assert [form for form in choice if form != "card"] == list(FORMATS[result])

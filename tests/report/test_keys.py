@@ -13,4 +13,6 @@ def test_every_measure_of_the_vibration_is_shown_as_one() -> None:
 
 @pytest.mark.parametrize("name", documents())
 def test_the_schema_that_ships_is_made_from_the_fields(name: str) -> None:
-    assert schema_of(documents()[name]) == shipped(name), "run python -m tests.generated_schemas"
+    assert schema_of(documents()[name]) == shipped(name), (
+        "run python -m tests.generated_schemas"
+    )

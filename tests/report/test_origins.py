@@ -28,7 +28,9 @@ def digest(file: Path | str) -> str:
 def deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A deck of two files, of which one is included twice, and weights."""
     monkeypatch.chdir(tmp_path)
-    main = DECK.read_text("utf-8").replace("*END", "*INCLUDE\nnote.k\n*INCLUDE\nnote.k\n*END")
+    main = DECK.read_text("utf-8").replace(
+        "*END", "*INCLUDE\nnote.k\n*INCLUDE\nnote.k\n*END"
+    )
     Path("main.k").write_text(main, "utf-8")
     Path("note.k").write_text("*TITLE\nnothing\n", "utf-8")
     Path("site.toml").write_text(WEIGHTS, "utf-8")
@@ -38,8 +40,15 @@ def deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("command", ASKED)
 def test_a_deck_and_weights_that_took_part_are_named(command: str) -> None:
     args = (command, *ASKED[command], "--deck", "main.k", MATSUM)
-    named = {"source": ["main.k", "note.k"], "sha256": [digest("main.k"), digest("note.k")]}
-    by_file = {"source": "our cluster", "file": "site.toml", "sha256": digest("site.toml")}
+    named = {
+        "source": ["main.k", "note.k"],
+        "sha256": [digest("main.k"), digest("note.k")],
+    }
+    by_file = {
+        "source": "our cluster",
+        "file": "site.toml",
+        "sha256": digest("site.toml"),
+    }
     found = checked(*args, "--weights", "site.toml")
     assert {key: found["deck"][key] for key in named} == named
     assert {key: found["weights"][key] for key in by_file} == by_file
@@ -56,18 +65,29 @@ def test_without_a_deck_none_is_named(command: str) -> None:
 
 
 def test_what_took_no_part_is_not_named() -> None:
-    weights = answer("suggest", *ASKED["suggest"], "--deck", "main.k", MATSUM)["weights"]
+    weights = answer("suggest", *ASKED["suggest"], "--deck", "main.k", MATSUM)[
+        "weights"
+    ]
     assert (weights["file"], weights["sha256"]) == (None, None)  # those that ship
     asked = ("suggest", "--td", "0.37", "--deck", "main.k", MATSUM)
     assert answer(*asked)["deck"] is None  # without parts a deck tells nothing
-    given = answer(*asked, "--part", "all", "--weights", "site.toml", "--cost-share", "0.5")
+    given = answer(
+        *asked, "--part", "all", "--weights", "site.toml", "--cost-share", "0.5"
+    )
     assert given["deck"]["source"] == ["main.k", "note.k"]
     assert given["weights"] is None
 
 
 @pytest.mark.slow
 def test_the_library_names_them_too() -> None:
-    found = d2.suggest(d2.read(MATSUM), td=0.37, parts="all", replay=False, deck="main.k", weights="site.toml")
+    found = d2.suggest(
+        d2.read(MATSUM),
+        td=0.37,
+        parts="all",
+        replay=False,
+        deck="main.k",
+        weights="site.toml",
+    )
     assert found.to_dict()["weights"]["sha256"] == digest("site.toml")
     assert digest("note.k") in found.report("page.html").read_text("utf-8")
 
@@ -78,9 +98,14 @@ def test_of_a_deck_of_many_files_a_page_names_the_first() -> None:
     for name in names:
         Path(name).write_text("*TITLE\nnothing\n", "utf-8")
     includes = "".join(f"*INCLUDE\n{name}\n" for name in names)
-    Path("main.k").write_text(DECK.read_text("utf-8").replace("*END", f"{includes}*END"), "utf-8")
+    Path("main.k").write_text(
+        DECK.read_text("utf-8").replace("*END", f"{includes}*END"), "utf-8"
+    )
     asked = ("suggest", *ASKED["suggest"], "--deck", "main.k", MATSUM)
-    assert answer(*asked, "--report", "page.html")["deck"]["source"] == ["main.k", *names]
+    assert answer(*asked, "--report", "page.html")["deck"]["source"] == [
+        "main.k",
+        *names,
+    ]
     page = Path("page.html").read_text("utf-8")
     assert ("part18.k: " in page, "part19.k: " in page) == (True, False)
     assert "of 11 more files of the deck: in the JSON result" in page

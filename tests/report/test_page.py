@@ -29,7 +29,13 @@ class Page(HTMLParser):
 
     def __init__(self, source: str) -> None:
         super().__init__()
-        self.source, self.names, self.ids, self.targets, self.text = source, set[str](), list[str](), list[str](), ""
+        self.source, self.names, self.ids, self.targets, self.text = (
+            source,
+            set[str](),
+            list[str](),
+            list[str](),
+            "",
+        )
         self.headings, self.unnamed = list[int](), list[str]()
         self.styles, self.scripts, self.data = list[str](), list[str](), list[str]()
         self._open: list[str] = []
@@ -40,7 +46,11 @@ class Page(HTMLParser):
         self.handle_startendtag(tag, attrs)
         self._open += [] if tag in VOID else [tag]
         if tag == "script":
-            self._filling = self.data if dict(attrs).get("type") == "application/json" else self.scripts
+            self._filling = (
+                self.data
+                if dict(attrs).get("type") == "application/json"
+                else self.scripts
+            )
         if tag == "style":
             self._filling = self.styles
 
@@ -48,11 +58,23 @@ class Page(HTMLParser):
         self.names.add(tag)
         given = {key: value or "" for key, value in attrs}
         self.headings += [int(tag[1])] if tag in {"h1", "h2", "h3"} else []
-        self.unnamed += [tag] if given.get("role") in {"img", "region"} and not given.get("aria-label") else []
+        self.unnamed += (
+            [tag]
+            if given.get("role") in {"img", "region"} and not given.get("aria-label")
+            else []
+        )
         self.unnamed += ["th"] if tag == "th" and given.get("scope") != "col" else []
         self.ids += [given["id"]] if "id" in given else []
-        self.targets += [given[key] for key in ("href", "src", "xlink:href", "action", "data") if key in given]
-        self.targets += [f"#{name}" for value in given.values() for name in re.findall(r"url\(#([^)]*)\)", value)]
+        self.targets += [
+            given[key]
+            for key in ("href", "src", "xlink:href", "action", "data")
+            if key in given
+        ]
+        self.targets += [
+            f"#{name}"
+            for value in given.values()
+            for name in re.findall(r"url\(#([^)]*)\)", value)
+        ]
 
     def handle_endtag(self, tag: str) -> None:
         assert self._open.pop() == tag
@@ -65,11 +87,23 @@ class Page(HTMLParser):
 
     def last_command(self) -> list[str]:
         """Words of the last command on the page, behind the name of the program."""
-        return shlex.split(html.unescape(re.findall(r"<pre[^>]*>d2rpick ([^<]*)</pre>", self.source)[-1]))
+        return shlex.split(
+            html.unescape(
+                re.findall(r"<pre[^>]*>d2rpick ([^<]*)</pre>", self.source)[-1]
+            )
+        )
 
 
-def page_of(folder: Path, *args: str, command: str = "suggest", code: int = 0, stdin: bytes | None = None) -> Page:
-    result = run(command, *args, "-q", "--report", str(folder / "report.html"), stdin=stdin)
+def page_of(
+    folder: Path,
+    *args: str,
+    command: str = "suggest",
+    code: int = 0,
+    stdin: bytes | None = None,
+) -> Page:
+    result = run(
+        command, *args, "-q", "--report", str(folder / "report.html"), stdin=stdin
+    )
     assert result.exit_code == code, result.stderr
     assert not result.stderr
     return Page((folder / "report.html").read_text("utf-8"))
@@ -90,14 +124,27 @@ def paper(folder: Path) -> Page:
 
 def test_it_tells_the_choice_what_was_read_and_how_to_repeat_it(paper: Page) -> None:
     digest = hashlib.sha256(Path(ENERGY).read_bytes()).hexdigest()
-    for text in ("0.0128853", "0.064", "0.0135867", "0.0687534", "poor-td", digest, "1501 states"):
+    for text in (
+        "0.0128853",
+        "0.064",
+        "0.0135867",
+        "0.0687534",
+        "poor-td",
+        digest,
+        "1501 states",
+    ):
         assert text in paper.text
     assert f"d2rpick suggest --td 0.064 {ENERGY} -q --report" in paper.text
     assert {"svg", "table", "pre"} <= paper.names
 
 
-def test_the_method_is_folded_and_how_to_repeat_it_stands_there_once(paper: Page) -> None:
-    assert paper.source.count("<details><summary><h2>Method and limits</h2></summary>") == 1
+def test_the_method_is_folded_and_how_to_repeat_it_stands_there_once(
+    paper: Page,
+) -> None:
+    assert (
+        paper.source.count("<details><summary><h2>Method and limits</h2></summary>")
+        == 1
+    )
     assert paper.source.partition("</details>")[0].count("<h3>Limits</h3>") == 1
     assert paper.text.count("To repeat this") == 1
 
@@ -113,25 +160,50 @@ def test_of_a_flight_at_rest_no_error_of_round_off_is_told(tmp_path: Path) -> No
 
 
 def test_it_needs_nothing_but_itself(paper: Page) -> None:
-    assert not paper.names & {"link", "img", "iframe", "object", "embed", "form", "base"}
+    assert not paper.names & {
+        "link",
+        "img",
+        "iframe",
+        "object",
+        "embed",
+        "form",
+        "base",
+    }
     assert {target[0] for target in paper.targets} == {"#"}
     assert "src=" not in paper.source.partition("<body>")[2].replace("xlink:", "")
     assert not re.findall(r"@import|url\((?!#)", paper.source)
 
 
 def test_only_what_belongs_to_the_page_takes_effect(paper: Page) -> None:
-    policy = html.unescape(re.findall(r'Content-Security-Policy" content="([^"]*)"', paper.source)[0])
-    rules = {name: texts for name, *texts in (rule.split() for rule in policy.split(";"))}
-    assert rules["default-src"] == rules["base-uri"] == rules["form-action"] == ["'none'"]
-    for name, texts in (("script-src", paper.scripts), ("style-src-elem", paper.styles)):
-        digests = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in texts]
+    policy = html.unescape(
+        re.findall(r'Content-Security-Policy" content="([^"]*)"', paper.source)[0]
+    )
+    rules = {
+        name: texts for name, *texts in (rule.split() for rule in policy.split(";"))
+    }
+    assert (
+        rules["default-src"] == rules["base-uri"] == rules["form-action"] == ["'none'"]
+    )
+    for name, texts in (
+        ("script-src", paper.scripts),
+        ("style-src-elem", paper.styles),
+    ):
+        digests = [
+            base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+            for text in texts
+        ]
         assert rules[name] == [f"'sha256-{digest}'" for digest in digests]
     assert (len(paper.scripts), len(paper.styles), len(paper.data)) == (2, 3, 1)
     assert "The MIT License" in paper.scripts[0]
 
 
-def test_without_a_flight_nothing_can_be_explored_and_no_script_runs(tmp_path: Path) -> None:
-    table = put(tmp_path / "growing.csv", "time,internal_energy\n" + "".join(f"{i / 10},{i * i}\n" for i in range(40)))
+def test_without_a_flight_nothing_can_be_explored_and_no_script_runs(
+    tmp_path: Path,
+) -> None:
+    table = put(
+        tmp_path / "growing.csv",
+        "time,internal_energy\n" + "".join(f"{i / 10},{i * i}\n" for i in range(40)),
+    )
     page = page_of(tmp_path, "--td", "2.5", "--no-verify", str(table), code=1)
     assert not page.scripts
     assert not page.data
@@ -197,7 +269,11 @@ TOLD = {
 @pytest.mark.slow
 @pytest.mark.parametrize(("asked", "code", "said", "unsaid"), TOLD.values(), ids=TOLD)
 def test_it_tells_what_is_known_and_nothing_else(
-    asked: tuple[str, ...], code: int, said: tuple[str, ...], unsaid: tuple[str, ...], tmp_path: Path
+    asked: tuple[str, ...],
+    code: int,
+    said: tuple[str, ...],
+    unsaid: tuple[str, ...],
+    tmp_path: Path,
 ) -> None:
     page = page_of(tmp_path, *asked[1:], command=asked[0], code=code)
     assert [text for text in said if text not in page.text] == []
@@ -207,9 +283,17 @@ def test_it_tells_what_is_known_and_nothing_else(
     assert not page.unnamed
 
 
-def test_a_title_of_html_and_a_file_name_that_is_no_text_are_shown_as_text(tmp_path: Path) -> None:
-    evil = tmp_path / (os.fsdecode(b"evil\xff.glstat") if sys.platform == "linux" else "evil\ufffd.glstat")
-    evil.write_text(f" {NASTY}\n{Path(GLSTAT).read_text('ascii').partition(chr(10))[2]}", "ascii")
+def test_a_title_of_html_and_a_file_name_that_is_no_text_are_shown_as_text(
+    tmp_path: Path,
+) -> None:
+    evil = tmp_path / (
+        os.fsdecode(b"evil\xff.glstat")
+        if sys.platform == "linux"
+        else "evil\ufffd.glstat"
+    )
+    evil.write_text(
+        f" {NASTY}\n{Path(GLSTAT).read_text('ascii').partition(chr(10))[2]}", "ascii"
+    )
     page = page_of(tmp_path, "--td", "0.064", str(evil))
     assert NASTY in page.text
     assert "evil\ufffd.glstat" in page.text
@@ -221,9 +305,13 @@ def test_a_title_of_html_and_a_file_name_that_is_no_text_are_shown_as_text(tmp_p
 @pytest.mark.parametrize("name", [NASTY, r"IE $\foo$", "_energy", "$"])
 def test_a_column_of_any_name_stays_text(tmp_path: Path, name: str) -> None:
     head, *rows = Path(ENERGY).read_text("utf-8").splitlines(keepends=True)
-    (tmp_path / "energy & <i>.csv").write_text(head.replace("internal_energy", f"'{name}'") + "".join(rows[::5]))
+    (tmp_path / "energy & <i>.csv").write_text(
+        head.replace("internal_energy", f"'{name}'") + "".join(rows[::5])
+    )
     energy = ("--no-verify", "--energy", f"'{name}'")
-    page = page_of(tmp_path, "--td", "0.064", *energy, str(tmp_path / "energy & <i>.csv"))
+    page = page_of(
+        tmp_path, "--td", "0.064", *energy, str(tmp_path / "energy & <i>.csv")
+    )
     assert name in page.text
     assert "energy & <i>.csv" in page.text
     assert "foreignobject" not in page.names
@@ -233,58 +321,146 @@ def test_a_column_of_any_name_stays_text(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [f"IE{'x' * 300}", "énergie_内部_🙂", "IE\x01\x1b[31m"])
-def test_a_long_or_strange_name_spoils_no_figure_and_says_nothing(tmp_path: Path, name: str) -> None:
-    (tmp_path / "energy.csv").write_text(Path(ENERGY).read_text("utf-8").replace("internal_energy", name), "utf-8")
-    page = page_of(tmp_path, "--td", "0.064", "--no-verify", "--energy", "6", str(tmp_path / "energy.csv"))
+@pytest.mark.parametrize(
+    "name", [f"IE{'x' * 300}", "énergie_内部_🙂", "IE\x01\x1b[31m"]
+)
+def test_a_long_or_strange_name_spoils_no_figure_and_says_nothing(
+    tmp_path: Path, name: str
+) -> None:
+    (tmp_path / "energy.csv").write_text(
+        Path(ENERGY).read_text("utf-8").replace("internal_energy", name), "utf-8"
+    )
+    page = page_of(
+        tmp_path,
+        "--td",
+        "0.064",
+        "--no-verify",
+        "--energy",
+        "6",
+        str(tmp_path / "energy.csv"),
+    )
     assert name[:20].partition("\x01")[0] in page.text
     assert not re.search(r"[\x00-\x08\x0b-\x1f]", page.source)
     assert 'd="M' in page.source
 
 
 @pytest.mark.slow
-def test_the_command_for_the_card_reads_and_judges_as_the_choice_was(tmp_path: Path) -> None:
+def test_the_command_for_the_card_reads_and_judges_as_the_choice_was(
+    tmp_path: Path,
+) -> None:
     head, *rows = unpacked(stored("chain_ref.csv.gz")).splitlines(keepends=True)
     source = str(tmp_path / "chain.csv")
     Path(source).write_bytes(head + b"".join(rows[::10]))
     energies = ("--energy", "IE_spring1_J", "--energy", "IE_spring2_J")
-    options = ("--time", "time_s", "--after", "0.01", "--margin", "0.001", "--tolerance", "0.1")
-    words = page_of(tmp_path, "--td", "0.13505", *energies, *options, source).last_command()
-    assert words[5:] == ["--part", "IDS", "--history", source, *options[:2], *energies, *options[2:6], *options[6:]]
+    options = (
+        "--time",
+        "time_s",
+        "--after",
+        "0.01",
+        "--margin",
+        "0.001",
+        "--tolerance",
+        "0.1",
+    )
+    words = page_of(
+        tmp_path, "--td", "0.13505", *energies, *options, source
+    ).last_command()
+    assert words[5:] == [
+        "--part",
+        "IDS",
+        "--history",
+        source,
+        *options[:2],
+        *energies,
+        *options[2:6],
+        *options[6:],
+    ]
     assert run(*("7" if word == "IDS" else word for word in words)).exit_code == 0
 
 
 @pytest.mark.slow
 def test_the_command_for_radioss_names_the_parts(tmp_path: Path) -> None:
-    words = page_of(tmp_path, "--td", "0.37", "--part", "box", "--flying", "box,step", ROLLOVER_T01).last_command()
-    assert words[-6:] == ["--history", ROLLOVER_T01, "--flying", "box,step", "--part", "box"]
+    words = page_of(
+        tmp_path, "--td", "0.37", "--part", "box", "--flying", "box,step", ROLLOVER_T01
+    ).last_command()
+    assert words[-6:] == [
+        "--history",
+        ROLLOVER_T01,
+        "--flying",
+        "box,step",
+        "--part",
+        "box",
+    ]
     assert run(*("1001" if word == "IDS" else word for word in words)).exit_code == 0
 
 
 @pytest.mark.slow
-def test_the_command_for_another_td_holds_every_option_that_it_is_judged_by(tmp_path: Path) -> None:
-    choosing = shlex.split("--after 0.001 --tolerance 0.1 --fit-window 0.01 0.1 --max-residual 2.5 --strict")
+def test_the_command_for_another_td_holds_every_option_that_it_is_judged_by(
+    tmp_path: Path,
+) -> None:
+    choosing = shlex.split(
+        "--after 0.001 --tolerance 0.1 --fit-window 0.01 0.1 --max-residual 2.5 --strict"
+    )
     page = page_of(tmp_path, "--td", "0.064", *choosing, ENERGY)
     before, behind = json.loads(page.data[0])["command"]
-    assert (before, sorted(shlex.split(behind))) == ("d2rpick suggest --td ", sorted([*choosing, ENERGY]))
+    assert (before, sorted(shlex.split(behind))) == (
+        "d2rpick suggest --td ",
+        sorted([*choosing, ENERGY]),
+    )
     about_output = {
-        *("td", "td_window", "limit", "history", "plot", "report", "min_quality", "output_format", "exit_zero"),
+        *(
+            "td",
+            "td_window",
+            "limit",
+            "history",
+            "plot",
+            "report",
+            "min_quality",
+            "output_format",
+            "exit_zero",
+        ),
         *("output_file", "overwrite", "quiet", "verbose", "show_settings", "debug"),
-        *("solver", "merge", "swset", "step_cap", "node", "end", "name", "contact", "wall"),
+        *(
+            "solver",
+            "merge",
+            "swset",
+            "step_cap",
+            "node",
+            "end",
+            "name",
+            "contact",
+            "wall",
+        ),
     }
-    assert {str(option.name) for option in one_run.suggest.params} == {*about_output, *OPTIONS}
+    assert {str(option.name) for option in one_run.suggest.params} == {
+        *about_output,
+        *OPTIONS,
+    }
 
 
 def test_a_time_that_no_card_can_hold_costs_the_card_only(tmp_path: Path) -> None:
     motion, earlier = tmp_path / "motion.matsum", re.compile(r"(?<=time =)[^\n]*")
-    motion.write_text(earlier.sub(lambda time: f"{float(time[0]) - 0.02:13.4E}", replayed("matsum").decode()))
+    motion.write_text(
+        earlier.sub(
+            lambda time: f"{float(time[0]) - 0.02:13.4E}", replayed("matsum").decode()
+        )
+    )
     page = page_of(tmp_path, "--td", "0.044", "--part", "3", str(motion))
     assert "No card can be printed for these times: tr is -0.00" in page.text
 
 
-def test_options_set_by_the_environment_and_standard_input_are_needed_to_repeat_it(tmp_path: Path) -> None:
+def test_options_set_by_the_environment_and_standard_input_are_needed_to_repeat_it(
+    tmp_path: Path,
+) -> None:
     content, page = Path(ENERGY).read_bytes(), tmp_path / "report.html"
-    result = run("suggest", "-", "--report", str(page), stdin=content, env={"D2RPICK_SUGGEST_TD": "0.064"})
+    result = run(
+        "suggest",
+        "-",
+        "--report",
+        str(page),
+        stdin=content,
+        env={"D2RPICK_SUGGEST_TD": "0.064"},
+    )
     assert result.exit_code == 0
     text = Page(page.read_text("utf-8")).text
     assert f"env D2RPICK_SUGGEST_TD=0.064 d2rpick suggest - --report {page}" in text
@@ -294,11 +470,30 @@ def test_options_set_by_the_environment_and_standard_input_are_needed_to_repeat_
 
 @pytest.mark.slow
 def test_a_verdict_tells_health_parts_and_the_switched_run(tmp_path: Path) -> None:
-    reference, *legs = (ROLLOVER_T01, *(stored(f"rollover_r100_T0{leg}.gz") for leg in (1, 2, 3)))
+    reference, *legs = (
+        ROLLOVER_T01,
+        *(stored(f"rollover_r100_T0{leg}.gz") for leg in (1, 2, 3)),
+    )
     asked = ("--tr", "0.1", "--td", "0.37", "--no-verify", "--part", "box")
-    page = page_of(tmp_path, *asked, reference, "--switched", stored("rollover_r100_T0*.gz"), command="verify", code=1)
+    page = page_of(
+        tmp_path,
+        *asked,
+        reference,
+        "--switched",
+        stored("rollover_r100_T0*.gz"),
+        command="verify",
+        code=1,
+    )
     for name in (reference, *legs):
-        assert f"{name}: {hashlib.sha256(Path(name).read_bytes()).hexdigest()}" in page.text
-    told = ("The switched run", "mean energy after td", "hourglass energy of box", "The window is 0.1 to 0.37")
+        assert (
+            f"{name}: {hashlib.sha256(Path(name).read_bytes()).hexdigest()}"
+            in page.text
+        )
+    told = (
+        "The switched run",
+        "mean energy after td",
+        "hourglass energy of box",
+        "The window is 0.1 to 0.37",
+    )
     for text in (*told, "0.66 times that of the reference"):
         assert text in page.text

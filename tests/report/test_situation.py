@@ -10,15 +10,22 @@ PARTS = tuple(Part(number, f"p{number}") for number in range(1, 9))
 
 
 def of_parts(parts: tuple[Part, ...], springs: tuple[Part, ...] = ()) -> History:
-    channel = "internal energy of " + ", ".join(part.title for part in parts if part not in springs)
+    channel = "internal energy of " + ", ".join(
+        part.title for part in parts if part not in springs
+    )
     time = np.linspace(0.0, 1.0, 5)
-    return History(time, time, ("run",), "matsum", channel, parts=parts, springs=springs)
+    return History(
+        time, time, ("run",), "matsum", channel, parts=parts, springs=springs
+    )
 
 
 def test_of_many_parts_the_first_are_named() -> None:
     history = of_parts(PARTS, springs=PARTS[1:2])
     assert energy_name(history) == "internal energy of p1, p3, p4, p5, p6 and 2 more"
-    assert what_was_read(history) == f"run: matsum, {energy_name(history)}, 5 states, 0 to 1"
+    assert (
+        what_was_read(history)
+        == f"run: matsum, {energy_name(history)}, 5 states, 0 to 1"
+    )
 
 
 def test_few_parts_and_channels_are_named_as_they_are() -> None:

@@ -10,25 +10,45 @@ from d2rpick.report.tables import Cell, as_csv, as_text, wrapped
 WORDS = st.lists(st.text("abc-1", min_size=1, max_size=9), max_size=6).map(" ".join)
 
 
-@given(st.integers(1, 5).flatmap(lambda n: st.lists(st.lists(WORDS, min_size=n, max_size=n), min_size=1, max_size=5)))
+@given(
+    st.integers(1, 5).flatmap(
+        lambda n: st.lists(
+            st.lists(WORDS, min_size=n, max_size=n), min_size=1, max_size=5
+        )
+    )
+)
 def test_a_narrow_table_keeps_every_word_below_its_name(rows: list[list[str]]) -> None:
     head = [f"{chr(ord('P') + at)} name" for at in range(len(rows[0]))]
     plain, narrow = as_text(head, rows).split("\n"), as_text(head, rows, 40).split("\n")
     if max(map(len, plain)) <= 40:
         assert narrow == plain
-    longest = [max(map(len, " ".join(column).split())) for column in zip(head, *rows, strict=True)]
+    longest = [
+        max(map(len, " ".join(column).split()))
+        for column in zip(head, *rows, strict=True)
+    ]
     assert max(map(len, narrow)) <= max(40, sum(longest) + 2 * (len(head) - 1))
     starts = [narrow[0].index(name[0]) for name in head] + [None]
-    for column, start, end in zip(zip(head, *rows, strict=True), starts, starts[1:], strict=False):
+    for column, start, end in zip(
+        zip(head, *rows, strict=True), starts, starts[1:], strict=False
+    ):
         shown = " ".join(line[start:end] for line in narrow).split()
         assert shown == " ".join(column).split()
 
 
-@given(st.integers(40, 100), st.lists(st.text("ab1/,_", min_size=13, max_size=60), min_size=1, max_size=3))
-def test_words_that_are_too_long_are_broken_and_numbers_are_not(width: int, names: list[str]) -> None:
+@given(
+    st.integers(40, 100),
+    st.lists(st.text("ab1/,_", min_size=13, max_size=60), min_size=1, max_size=3),
+)
+def test_words_that_are_too_long_are_broken_and_numbers_are_not(
+    width: int, names: list[str]
+) -> None:
     number = -1.23456e-05
-    shown = as_text([f"name {at}" for at in range(len(names))] + ["td"], [[*names, number]], width)
-    assert max(map(len, shown.split("\n"))) <= max(width, 12 * len(names) + 2 * len(names) + 12)
+    shown = as_text(
+        [f"name {at}" for at in range(len(names))] + ["td"], [[*names, number]], width
+    )
+    assert max(map(len, shown.split("\n"))) <= max(
+        width, 12 * len(names) + 2 * len(names) + 12
+    )
     assert f"{number:.6g}" in shown
     if len(names) == 1:
         assert "".join(line.split()[0] for line in shown.split("\n")[1:]) == names[0]
@@ -37,11 +57,17 @@ def test_words_that_are_too_long_are_broken_and_numbers_are_not(width: int, name
 def test_a_long_word_breaks_behind_what_joins_its_parts() -> None:
     lines = as_text(["shares"], [["1,7,11,13,15,16"]], 12).split("\n")
     assert lines == ["shares", "1,7,11,13,", "15,16"]
-    assert as_text(["run"], [["speed-12-thick-3"]], 12).split("\n") == ["run", "speed-12-", "thick-3"]
+    assert as_text(["run"], [["speed-12-thick-3"]], 12).split("\n") == [
+        "run",
+        "speed-12-",
+        "thick-3",
+    ]
 
 
 @given(st.integers(20, 60), st.lists(WORDS, min_size=1, max_size=4).map("  ".join))
-def test_wrapped_text_loses_no_word_and_no_line_is_longer_than_it_may_be(width: int, text: str) -> None:
+def test_wrapped_text_loses_no_word_and_no_line_is_longer_than_it_may_be(
+    width: int, text: str
+) -> None:
     lines = wrapped(text, width).split("\n")
     assert " ".join(lines).split() == text.split()
     assert max(map(len, lines)) <= width
@@ -49,16 +75,22 @@ def test_wrapped_text_loses_no_word_and_no_line_is_longer_than_it_may_be(width: 
 
 
 @given(st.integers(1, 80))
-def test_spare_columns_are_left_out_in_their_order_and_only_where_room_is_short(width: int) -> None:
+def test_spare_columns_are_left_out_in_their_order_and_only_where_room_is_short(
+    width: int,
+) -> None:
     head = ["tr", "tolerance", "verdict", "+-"]
     row: list[Cell] = [0.123456, "1.0e-04", "acceptable", "2.0e-05"]
     names = as_text(head, [row], width, ("+-", "tolerance")).split("\n")[0].split()
-    assert names == (head if width >= 40 else head[:3] if width >= 31 else ["tr", "verdict"])
+    assert names == (
+        head if width >= 40 else head[:3] if width >= 31 else ["tr", "verdict"]
+    )
 
 
 def cell_of(value: Cell) -> str:
     """What a reader of csv gets for a value."""
-    ((cell, last),) = csv.reader(io.StringIO(as_csv([], [[value, "last"]]).removeprefix("\n")), strict=True)
+    ((cell, last),) = csv.reader(
+        io.StringIO(as_csv([], [[value, "last"]]).removeprefix("\n")), strict=True
+    )
     assert last == "last"
     return cell
 

@@ -30,7 +30,9 @@ def test_the_flight_is_shown_and_what_stands_above_it_is_named() -> None:
 
 
 def test_what_does_not_stand_above_the_flight_is_not_named() -> None:
-    assert view(made(np.where(TIME < 2, 1, RECORD)), Flight(2.0, 8.0, "given"), [7.0]).above == (("landing", 500),)
+    assert view(
+        made(np.where(TIME < 2, 1, RECORD)), Flight(2.0, 8.0, "given"), [7.0]
+    ).above == (("landing", 500),)
 
 
 def test_times_beyond_the_flight_are_shown_too() -> None:
@@ -41,22 +43,39 @@ def test_times_beyond_the_flight_are_shown_too() -> None:
 
 
 def test_without_a_flight_the_whole_record_is_shown_and_nothing_is_cut() -> None:
-    assert view(made(), Flight(None, None, None), [5.0]) == (0.0, 10.0, RECORD.min(), 500, ())
+    assert view(made(), Flight(None, None, None), [5.0]) == (
+        0.0,
+        10.0,
+        RECORD.min(),
+        500,
+        (),
+    )
 
 
 def test_a_flight_without_an_end_lasts_as_far_as_it_is_known() -> None:
-    assert view(made(), Flight(2.0, None, "oscillator"), [3.0], known=6.0).end == pytest.approx(6.24)
+    assert view(
+        made(), Flight(2.0, None, "oscillator"), [3.0], known=6.0
+    ).end == pytest.approx(6.24)
     assert view(made(), Flight(2.0, None, "momentum"), [3.0]).end == 10
 
 
 @given(
-    st.lists(st.floats(0, 1), min_size=3, max_size=9, unique=True), st.floats(0, 1), st.floats(0, 1), st.floats(0, 1)
+    st.lists(st.floats(0, 1), min_size=3, max_size=9, unique=True),
+    st.floats(0, 1),
+    st.floats(0, 1),
+    st.floats(0, 1),
 )
-def test_any_flight_of_any_record_can_be_shown(times: list[float], one: float, other: float, td: float) -> None:
+def test_any_flight_of_any_record_can_be_shown(
+    times: list[float], one: float, other: float, td: float
+) -> None:
     time = np.sort(times) + np.arange(float(len(times)))
     start, end = sorted((one * time[-1], other * time[-1]))
     history = History(time, np.cos(time), ("made",), "made", "energy")
-    seen = view(history, Flight(start, end, "given"), [float(time[0] + td * (time[-1] - time[0]))])
+    seen = view(
+        history,
+        Flight(start, end, "given"),
+        [float(time[0] + td * (time[-1] - time[0]))],
+    )
     assert time[0] <= seen.start < seen.end <= time[-1]
     assert seen.low <= seen.high
     highest = history.between(seen.start, seen.end)[1].max(initial=seen.high)
@@ -71,9 +90,16 @@ def test_the_motion_is_that_of_the_record_until_tr_rigid_then_and_continuous() -
     motion = sure(replayed_motion(situation, tr, time))
     states = np.linspace(0.0, 0.1, 1001)  # those of the record
     whole = sure(replayed_motion(situation, tr, states))
-    np.testing.assert_allclose(whole.reference**2, situation.history.energies_at(states), rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(
+        whole.reference**2, situation.history.energies_at(states), rtol=1e-5, atol=1e-6
+    )
     before, rigid = time <= tr, (time >= tr) & (time <= 0.064)
     np.testing.assert_array_equal(motion.switched[before], motion.reference[before])
     assert np.ptp(motion.switched[rigid]) < 1e-9
     assert np.abs(np.diff(motion.switched)).max() < 0.1
-    assert replayed_motion(examine(read_history([ENERGY]), 0.064, Settings(replay=False)), tr) is None
+    assert (
+        replayed_motion(
+            examine(read_history([ENERGY]), 0.064, Settings(replay=False)), tr
+        )
+        is None
+    )

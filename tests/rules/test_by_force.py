@@ -24,7 +24,12 @@ def bounces(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 def pair(more: str = "") -> str:
     """Write a deck with a pair of sets that act by a force, to the end of the history."""
-    return RULES["D2R208"].failing[0].deck.replace("       0.7", "       1.2", 1).replace("*END", f"{more}*END")
+    return (
+        RULES["D2R208"]
+        .failing[0]
+        .deck.replace("       0.7", "       1.2", 1)
+        .replace("*END", f"{more}*END")
+    )
 
 
 def windows(found: dict[str, object]) -> list[tuple[float, float | None]]:
@@ -36,19 +41,36 @@ def test_a_pair_is_followed_through_the_contacts(bounces: str, tmp_path: Path) -
     deck = write(tmp_path, pair())
     assert windows(answer("check", deck)) == []
     found = answer("check", deck, "--history", bounces)
-    flights = [(one.start, one.end) for one in d2.plan(d2.read(bounces), parts=1, replay=False).flights]
+    flights = [
+        (one.start, one.end)
+        for one in d2.plan(d2.read(bounces), parts=1, replay=False).flights
+    ]
     spans = windows(found)
     assert len(spans) >= len(flights)
     for start, end in flights:
-        near = [td for tr, td in spans if td is not None and tr <= start + 0.01 and abs(td - end) < 0.002]
+        near = [
+            td
+            for tr, td in spans
+            if td is not None and tr <= start + 0.01 and abs(td - end) < 0.002
+        ]
         assert near or end > 1.19  # the last flight may go on
     told = next(one["message"] for one in found["findings"] if one["rule"] == "D2R302")
-    assert re.search(r"switches when the force of contact 0 is zero: by the momenta of the history \d+ times", told)
-    assert {one["rule"] for one in found["findings"]} & {"D2R204", "D2R201"}  # they are judged
+    assert re.search(
+        r"switches when the force of contact 0 is zero: by the momenta of the history \d+ times",
+        told,
+    )
+    assert {one["rule"] for one in found["findings"]} & {
+        "D2R204",
+        "D2R201",
+    }  # they are judged
 
 
-def test_of_several_contacts_nobody_knows_which_one_pushes(bounces: str, tmp_path: Path) -> None:
-    contacts = "".join(f"*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_ID\n{one:10d}floor\n" for one in (7, 8))
+def test_of_several_contacts_nobody_knows_which_one_pushes(
+    bounces: str, tmp_path: Path
+) -> None:
+    contacts = "".join(
+        f"*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_ID\n{one:10d}floor\n" for one in (7, 8)
+    )
     found = answer("check", write(tmp_path, pair(contacts)), "--history", bounces)
     assert windows(found) == []
     assert any("not judged by time" in one["message"] for one in found["findings"])
@@ -57,7 +79,9 @@ def test_of_several_contacts_nobody_knows_which_one_pushes(bounces: str, tmp_pat
 def radioss(folder: Path, sensor: str, more: str = "/RWALL/PLANE/3\nground\n") -> str:
     for name, text in engine_files(("1.2", "")).items():
         put(folder / name, text)
-    deck = starter_deck(more=sensor + more).replace(wide(1808, 0)[:-1], wide(1808, 5)[:-1])
+    deck = starter_deck(more=sensor + more).replace(
+        wide(1808, 0)[:-1], wide(1808, 5)[:-1]
+    )
     return str(put(folder / "box_0000.rad", deck))
 
 
@@ -66,10 +90,15 @@ def force(kind: str = "RWALL", wait: float = 0.05, highest: float = 0.0) -> str:
     return f"/SENSOR/{kind}/5\nforce\n{wide(wait, width=20)}{row}"
 
 
-def test_a_sensor_of_a_force_is_followed_through_the_contacts(bounces: str, tmp_path: Path) -> None:
+def test_a_sensor_of_a_force_is_followed_through_the_contacts(
+    bounces: str, tmp_path: Path
+) -> None:
     found = answer("check", radioss(tmp_path, force()), "--history", bounces)
     spans = windows(found)
-    flights = [(one.start, one.end) for one in d2.plan(d2.read(bounces), parts=1, replay=False).flights]
+    flights = [
+        (one.start, one.end)
+        for one in d2.plan(d2.read(bounces), parts=1, replay=False).flights
+    ]
     assert spans[0][0] == 0
     for start, end in flights[1:]:
         if end - start > 0.06:
@@ -86,7 +115,9 @@ def test_a_sensor_of_a_force_is_followed_through_the_contacts(bounces: str, tmp_
     ],
     ids=["a force above a limit", "two that push", "none that pushes"],
 )
-def test_sensors_that_momenta_do_not_show_are_told(bounces: str, tmp_path: Path, sensor: str, more: str) -> None:
+def test_sensors_that_momenta_do_not_show_are_told(
+    bounces: str, tmp_path: Path, sensor: str, more: str
+) -> None:
     found = answer("check", radioss(tmp_path, sensor, more), "--history", bounces)
     assert windows(found) == []
     assert "D2R302" in {one["rule"] for one in found["findings"]}
@@ -95,4 +126,8 @@ def test_sensors_that_momenta_do_not_show_are_told(bounces: str, tmp_path: Path,
 def test_each_window_of_a_pair_has_its_line(bounces: str, tmp_path: Path) -> None:
     deck = write(tmp_path, pair())
     shown = run("check", deck, "--history", bounces).stdout
-    assert shown.count("part 1: rigid from") == len(windows(answer("check", deck, "--history", bounces))) > 2
+    assert (
+        shown.count("part 1: rigid from")
+        == len(windows(answer("check", deck, "--history", bounces)))
+        > 2
+    )

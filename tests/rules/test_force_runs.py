@@ -40,10 +40,21 @@ def bounces() -> list[Bounce]:
     random.seed(5)
     made = []
     for number in range(20):
-        speed, height = round(random.uniform(0.3, 2.0), 2), round(random.uniform(0.005, 0.03), 4)
-        slope, modulus = round(random.uniform(0.0, 0.15), 3), random.choice([2e8, 2e9, 2e10])
-        thickness, wait = random.choice([0.01, 0.02]), round(random.uniform(0.004, 0.03), 4)
-        made.append(Bounce(number % 2 == 1, speed, height, slope, modulus, thickness, wait))
+        speed, height = (
+            round(random.uniform(0.3, 2.0), 2),
+            round(random.uniform(0.005, 0.03), 4),
+        )
+        slope, modulus = (
+            round(random.uniform(0.0, 0.15), 3),
+            random.choice([2e8, 2e9, 2e10]),
+        )
+        thickness, wait = (
+            random.choice([0.01, 0.02]),
+            round(random.uniform(0.004, 0.03), 4),
+        )
+        made.append(
+            Bounce(number % 2 == 1, speed, height, slope, modulus, thickness, wait)
+        )
     return made
 
 
@@ -55,16 +66,26 @@ def deck(run: Bounce, *, switched: bool) -> str:
     """Write the starter deck; its body has the sensor where the run is ``switched``."""
     corners = range(_CELLS + 1)
     nodes = {(i, j): 1 + i * (_CELLS + 1) + j for i in corners for j in corners}
-    text = f"#RADIOSS STARTER\n/BEGIN\nX\n{wide(2023, 0)}" + 2 * wide("kg", "m", "s", width=WIDE)
-    text += f"/TITLE\nplate\n/MAT/ELAST/1\nsteel\n{reals(7850.0)}{reals(run.modulus, 0.3)}"
+    text = f"#RADIOSS STARTER\n/BEGIN\nX\n{wide(2023, 0)}" + 2 * wide(
+        "kg", "m", "s", width=WIDE
+    )
+    text += (
+        f"/TITLE\nplate\n/MAT/ELAST/1\nsteel\n{reals(7850.0)}{reals(run.modulus, 0.3)}"
+    )
     text += f"/PROP/SHELL/1\nshell\n{wide(24, 0, 0, 0)}\n{wide(3, 0)[:-1]}{reals(run.thickness)}/NODE\n"
     for (i, j), node in nodes.items():
         x, y = i / _CELLS, j / _CELLS
         text += wide(node)[:-1] + reals(x, y, run.height + GAP + run.slope * x)
-    text += wide(MAIN)[:-1] + reals(0.5, 0.5, run.height + 0.2) + f"/PART/1\nplate\n{wide(1, 1)}/SHELL/1\n"
+    text += (
+        wide(MAIN)[:-1]
+        + reals(0.5, 0.5, run.height + 0.2)
+        + f"/PART/1\nplate\n{wide(1, 1)}/SHELL/1\n"
+    )
     cells = [(i, j) for i in range(_CELLS) for j in range(_CELLS)]
     for number, (i, j) in enumerate(cells, start=1):
-        text += wide(number, nodes[i, j], nodes[i + 1, j], nodes[i + 1, j + 1], nodes[i, j + 1])
+        text += wide(
+            number, nodes[i, j], nodes[i + 1, j], nodes[i + 1, j + 1], nodes[i, j + 1]
+        )
     every = [*nodes.values(), MAIN]
     text += f"/GRNOD/PART/1\nplate\n{wide(1)}/GRNOD/NODE/6\nall\n"
     text += "".join(wide(*every[at : at + 10]) for at in range(0, len(every), 10))
@@ -76,7 +97,10 @@ def deck(run: Bounce, *, switched: bool) -> str:
     text += f"/SENSOR/{kind}/{SENSOR}\nforce\n{reals(run.wait)}{wide(ENTITY, 'NF')[:-1]}{reals(-1.0, 0.0, 0.0)}"
     text += f"/RBODY/1\nbody\n{wide(MAIN, SENSOR * switched, 0, 0)[:-1]}{reals(0.0)[:-1]}{wide(1, 1, 0, 0)}"
     text += 2 * reals(0.0, 0.0, 0.0) + wide(0, 0, 0)
-    return text + f"/TH/PART/1\nparts\nDEF       XMOM      YMOM      ZMOM      MASS\n{wide(1)}/END\n"
+    return (
+        text
+        + f"/TH/PART/1\nparts\nDEF       XMOM      YMOM      ZMOM      MASS\n{wide(1)}/END\n"
+    )
 
 
 def _wall() -> str:
@@ -86,12 +110,18 @@ def _wall() -> str:
 def _contact() -> str:
     places = ((-1.0, -1.0), (2.0, -1.0), (2.0, 2.0), (-1.0, 2.0))
     ids = range(1001, 1005)
-    text = "/NODE\n" + "".join(wide(node)[:-1] + reals(*place, 0.0) for node, place in zip(ids, places, strict=True))
+    text = "/NODE\n" + "".join(
+        wide(node)[:-1] + reals(*place, 0.0)
+        for node, place in zip(ids, places, strict=True)
+    )
     text += f"/PART/2\nground\n{wide(1, 1)}/SHELL/2\n{wide(900, *ids)}/GRNOD/NODE/2\nground\n{wide(*ids)}"
     text += f"/BCS/1\nfixed\n   111 111{wide(0, 2)}/SURF/PART/7\nground\n{wide(2)}"
     text += f"/INTER/TYPE7/{ENTITY}\nplate on ground\n{wide(1, 7, 4, 0, 0)}{wide('', 0, 0, 0, 0)}"
     text += 2 * reals(0.0, 0.0) + reals(1.0, 0.0, GAP, 0.0, 0.0)
-    return text + f"{'000':>10}{'':10}{0:10d}{reals(0.05, 0.0, 0.0)}{wide(0, 0)[:-1]}{reals(0.0)[:-1]}{wide(0)}"
+    return (
+        text
+        + f"{'000':>10}{'':10}{0:10d}{reals(0.05, 0.0, 0.0)}{wide(0, 0)[:-1]}{reals(0.0)[:-1]}{wide(0)}"
+    )
 
 
 def listed_windows(folder: Path) -> list[tuple[float, float]]:
@@ -100,7 +130,10 @@ def listed_windows(folder: Path) -> list[tuple[float, float]]:
     for line in (folder / "X_0001.out").read_text("latin-1").splitlines():
         if cycle := re.match(r"\s+\d+\s+([\d.E+-]+)\s+[\d.E+-]+ [A-Z]+ ", line):
             now = float(cycle[1])
-        elif event := re.search(rf"SENSOR \(\w+\) NUMBER +{SENSOR} ,?(DE)?ACTIVATED AT TIME +([\d.E+-]+)", line):
+        elif event := re.search(
+            rf"SENSOR \(\w+\) NUMBER +{SENSOR} ,?(DE)?ACTIVATED AT TIME +([\d.E+-]+)",
+            line,
+        ):
             time = float(event[2])
             ends.append(time if time < END else now)
     return list(zip(ends[::2], [*ends[1::2], END][: len(ends[::2])], strict=True))
@@ -112,7 +145,9 @@ def met(window: tuple[float, float], others: list[tuple[float, float]]) -> bool:
 
 
 @pytest.mark.parametrize("run", bounces())
-def test_the_sensor_switches_as_often_as_momenta_say(tmp_path: Path, run: Bounce) -> None:
+def test_the_sensor_switches_as_often_as_momenta_say(
+    tmp_path: Path, run: Bounce
+) -> None:
     """In the run without switching the sensor switches nothing: its listing is the truth of what it would do."""
     reference, switched = tmp_path / "reference", tmp_path / "switched"
     engine = f"/RUN/X/1\n{END}\n/VERS/2023\n/DT\n0.9 0.0\n{{}}/DTIX\n2e-05 2e-05\n/TFILE/4\n{INTERVAL}\n/PRINT/-10\n"

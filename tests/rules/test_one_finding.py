@@ -10,7 +10,9 @@ from d2rpick.rules.rule import HEAD, PARTS, automatic
 from tests.command import answer, run
 from tests.decks import write
 
-OSCILLATOR = "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.15 --dt 1e-4"
+OSCILLATOR = (
+    "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.15 --dt 1e-4"
+)
 
 
 def deck(folder: Path, tr: str, td: str, end: str = "       0.2") -> str:
@@ -27,24 +29,37 @@ def deck(folder: Path, tr: str, td: str, end: str = "       0.2") -> str:
     ],
     ids=["ms in a deck in s", "a deck in ms", "a deck in mus"],
 )
-def test_a_mistake_of_units_is_one_finding(tmp_path: Path, times: tuple[str, ...], rule: str) -> None:
+def test_a_mistake_of_units_is_one_finding(
+    tmp_path: Path, times: tuple[str, ...], rule: str
+) -> None:
     history = str(tmp_path / "energy.csv")
     assert run("replay", *OSCILLATOR.split(), "-o", history).exit_code == 0
-    found = answer("check", deck(tmp_path, *times), "--history", history, "--ignore", "D2R111")["findings"]
+    found = answer(
+        "check", deck(tmp_path, *times), "--history", history, "--ignore", "D2R111"
+    )["findings"]
     assert [one["rule"] for one in found] == [rule]
 
 
 def test_what_follows_is_reported_where_its_cause_is_ignored(tmp_path: Path) -> None:
     path = deck(tmp_path, "13.5867", "68.7534")
-    assert [one.rule for one in check_deck(path).findings if one.rule != "D2R111"] == ["D2R115"]
+    assert [one.rule for one in check_deck(path).findings if one.rule != "D2R111"] == [
+        "D2R115"
+    ]
     ignored = check_deck(path, Configuration(ignore=("D2R115",))).findings
     assert {one.rule for one in ignored} >= {"D2R101"}
 
 
 def test_a_deck_without_contacts_has_none_to_name(tmp_path: Path) -> None:
     example = RULES["D2R007"].failing[1].deck
-    (message,) = [one.message for one in check_deck(write(tmp_path, example)).findings if one.rule == "D2R007"]
-    assert message == "ENTNO is 7, but the deck has no contact, so the switch never comes; add one"
+    (message,) = [
+        one.message
+        for one in check_deck(write(tmp_path, example)).findings
+        if one.rule == "D2R007"
+    ]
+    assert (
+        message
+        == "ENTNO is 7, but the deck has no contact, so the switch never comes; add one"
+    )
 
 
 def test_only_what_is_nearly_a_rule_is_suggested() -> None:

@@ -24,29 +24,60 @@ def rules(path: str) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    "last", ["/END/ENGINE", "/MON/ON", "/PARITH/ON", "# made by hand", "$ a comment", "/ANIM/ELEM/VONM"]
+    "last",
+    [
+        "/END/ENGINE",
+        "/MON/ON",
+        "/PARITH/ON",
+        "# made by hand",
+        "$ a comment",
+        "/ANIM/ELEM/VONM",
+    ],
 )
-def test_a_last_line_that_can_lose_nothing_needs_no_line_end(tmp_path: Path, last: str) -> None:
+def test_a_last_line_that_can_lose_nothing_needs_no_line_end(
+    tmp_path: Path, last: str
+) -> None:
     path = place(tmp_path, engine=ENGINE + last)
     assert rules(path) == []
-    starter = starter_deck(more="/NODE\n" + "".join(f"{one:10d}{one:20}{0:20}{0:20}\n" for one in (1, 2, 3, 4)))
+    starter = starter_deck(
+        more="/NODE\n"
+        + "".join(f"{one:10d}{one:20}{0:20}{0:20}\n" for one in (1, 2, 3, 4))
+    )
     assert bodies_for(place(tmp_path, starter, ENGINE + last), [1]).nodes == (1808,)
 
 
 @pytest.mark.parametrize(
-    "last", ["/RBODY/O", "/RBODY/ON", "/RBODY/ON\n18", "/R", "/DT", "/VERS/202", "/DTIX\n1e-5 1e-", "/EN"]
+    "last",
+    [
+        "/RBODY/O",
+        "/RBODY/ON",
+        "/RBODY/ON\n18",
+        "/R",
+        "/DT",
+        "/VERS/202",
+        "/DTIX\n1e-5 1e-",
+        "/EN",
+    ],
 )
-def test_a_last_line_that_may_have_lost_something_is_told(tmp_path: Path, last: str) -> None:
+def test_a_last_line_that_may_have_lost_something_is_told(
+    tmp_path: Path, last: str
+) -> None:
     assert "D2R011" in rules(place(tmp_path, engine=ENGINE + last))
 
 
 def test_what_stands_behind_the_end_is_not_read(tmp_path: Path) -> None:
-    found = check_deck(place(tmp_path, engine=f"{ENGINE}/END/ENGINE\n/RBODY/ON\n1808\n"))
+    found = check_deck(
+        place(tmp_path, engine=f"{ENGINE}/END/ENGINE\n/RBODY/ON\n1808\n")
+    )
     assert [*found.windows] == []
 
 
 def test_a_missing_include_is_an_error_whatever_the_legs_say(tmp_path: Path) -> None:
-    path = place(tmp_path, starter_deck(more="#include body.inc\n"), engine_files(("0.2", ""))["box_0001.rad"])
+    path = place(
+        tmp_path,
+        starter_deck(more="#include body.inc\n"),
+        engine_files(("0.2", ""))["box_0001.rad"],
+    )
     (finding,) = check_deck(path).findings
     assert (finding.rule, str(finding.severity)) == ("D2R003", "error")
     assert finding.message.endswith("add the file")
@@ -71,6 +102,12 @@ def test_included_files_are_no_decks_of_their_own(tmp_path: Path) -> None:
 
 def test_what_is_no_main_node_is_told_once(tmp_path: Path) -> None:
     for name, text in engine_files(("0.02", "OFF"), ("0.2", "ON")).items():
-        put(tmp_path / name, text.replace("1808", "1808 1 2") if "0002" in name else text)
+        put(
+            tmp_path / name,
+            text.replace("1808", "1808 1 2") if "0002" in name else text,
+        )
     path = str(put(tmp_path / "box_0000.rad", starter_deck()))
-    assert [rule for rule in rules(path) if rule.startswith("D2R4")] == ["D2R402", "D2R402"]
+    assert [rule for rule in rules(path) if rule.startswith("D2R4")] == [
+        "D2R402",
+        "D2R402",
+    ]

@@ -39,7 +39,11 @@ def restart(end: str, *cards: str) -> str:
 @pytest.fixture
 def legs(tmp_path: Path) -> list[str]:
     """A run to 0.02 and two restarts: parts 11 and 12 are rigid from 0.02 to 0.09."""
-    files = {"main.k": MAIN.format(0.02), "r1.k": restart("0.09", TO_RIGID), "r2.k": restart("0.15", BACK)}
+    files = {
+        "main.k": MAIN.format(0.02),
+        "r1.k": restart("0.09", TO_RIGID),
+        "r2.k": restart("0.15", BACK),
+    }
     return [str(put(tmp_path / name, text)) for name, text in files.items()]
 
 
@@ -47,16 +51,24 @@ def test_cards_of_restarts_switch_when_they_begin(legs: list[str]) -> None:
     (main, *restarts) = legs
     for order in (restarts, restarts[::-1]):
         found = check_deck(main, restarts=order)
-        assert [(one.part, one.tr, one.td) for one in found.windows] == [(11, 0.02, 0.09), (12, 0.02, 0.09)]
+        assert [(one.part, one.tr, one.td) for one in found.windows] == [
+            (11, 0.02, 0.09),
+            (12, 0.02, 0.09),
+        ]
         assert found.findings == ()
         assert set(found.files) == set(legs)
 
 
-def test_the_command_takes_them_together_in_any_order_and_from_a_folder(legs: list[str]) -> None:
+def test_the_command_takes_them_together_in_any_order_and_from_a_folder(
+    legs: list[str],
+) -> None:
     for names in (legs, legs[::-1], [str(Path(legs[0]).parent)]):
         found = answer("check", *names)
         assert found["decks"] == [legs[0]]
-        assert [(one["part"], one["tr"], one["td"]) for one in found["windows"]] == [(11, 0.02, 0.09), (12, 0.02, 0.09)]
+        assert [(one["part"], one["tr"], one["td"]) for one in found["windows"]] == [
+            (11, 0.02, 0.09),
+            (12, 0.02, 0.09),
+        ]
     assert [one.td for one in d2.check(legs).windows] == [0.09, 0.09]
 
 
@@ -95,7 +107,9 @@ def test_both_ways_in_one_restart_is_an_error(legs: list[str]) -> None:
         assert "part 11 made rigid and deformable" in both.message
 
 
-def test_a_part_stays_rigid_over_restarts_that_do_not_name_it(legs: list[str], tmp_path: Path) -> None:
+def test_a_part_stays_rigid_over_restarts_that_do_not_name_it(
+    legs: list[str], tmp_path: Path
+) -> None:
     main, first, second = legs
     third = str(put(tmp_path / "r3.k", restart("0.2", BACK)))
     put(Path(second), restart("0.15"))
@@ -103,7 +117,9 @@ def test_a_part_stays_rigid_over_restarts_that_do_not_name_it(legs: list[str], t
     assert {(one.tr, one.td) for one in found.windows} == {(0.02, 0.15)}
 
 
-def test_what_has_parts_or_no_restart_card_is_none(legs: list[str], tmp_path: Path) -> None:
+def test_what_has_parts_or_no_restart_card_is_none(
+    legs: list[str], tmp_path: Path
+) -> None:
     assert [is_restart(name) for name in legs] == [False, True, True]
     full = put(tmp_path / "full.k", MAIN.format(0.1).replace("*END", BACK + "*END"))
     assert not is_restart(str(full))
@@ -111,7 +127,9 @@ def test_what_has_parts_or_no_restart_card_is_none(legs: list[str], tmp_path: Pa
     assert not is_restart(str(tmp_path))
 
 
-def test_of_two_runs_nobody_knows_whose_restart_it_is(legs: list[str], tmp_path: Path) -> None:
+def test_of_two_runs_nobody_knows_whose_restart_it_is(
+    legs: list[str], tmp_path: Path
+) -> None:
     other = str(put(tmp_path / "other.k", MAIN.format(0.3)))
     found = answer("check", *legs, other)
     assert found["windows"] == []

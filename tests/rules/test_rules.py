@@ -10,7 +10,13 @@ from typing import Any
 import pytest
 
 from d2rpick.base.errors import ConfigurationError, DeckError
-from d2rpick.rules import RULES, Configuration, check_deck, configuration_for, read_configuration
+from d2rpick.rules import (
+    RULES,
+    Configuration,
+    check_deck,
+    configuration_for,
+    read_configuration,
+)
 from d2rpick.rules.base import Severity
 from d2rpick.rules.rule import END, GOOD, HEAD, PARTS, THERE, Example, Rule, automatic
 from tests.command import answer, run
@@ -34,11 +40,15 @@ def findings(folder: Path, rule: Rule, example: Example) -> list[dict[str, Any]]
     """What the rule finds in an example, checked as `d2rpick rule` says."""
     options = shlex.split(example.options)
     if example.history:
-        (folder / "energy.csv").write_bytes(history(example.computed_by, example.history))
+        (folder / "energy.csv").write_bytes(
+            history(example.computed_by, example.history)
+        )
         options += ["--history", str(folder / "energy.csv")]
     path = write(folder, example.deck, example.files, example.name)
     if example.stdin:
-        found = json.loads(run("check", "-", "-f", "json", stdin=example.deck.encode()).stdout)["findings"]
+        found = json.loads(
+            run("check", "-", "-f", "json", stdin=example.deck.encode()).stdout
+        )["findings"]
     else:
         found = answer("check", path, *options)["findings"]
     return [finding for finding in found if finding["rule"] == rule.id]
@@ -68,26 +78,46 @@ def test_every_rule_has_examples_and_an_explanation() -> None:
         assert rule.explanation.endswith(".")
 
 
-SWAPPED = HEAD + PARTS + automatic(1, "0.09", rigid=["1"]) + automatic(2, "0.02", deformable=["1"]) + END
+SWAPPED = (
+    HEAD
+    + PARTS
+    + automatic(1, "0.09", rigid=["1"])
+    + automatic(2, "0.02", deformable=["1"])
+    + END
+)
 
 
 @pytest.mark.parametrize(
-    "comment", ["$ d2rpick: ignore D2R102", "$D2RPICK:ignore D2R101, D2R102", "$ d2rpick: ignore D2R102\n$ why"]
+    "comment",
+    [
+        "$ d2rpick: ignore D2R102",
+        "$D2RPICK:ignore D2R101, D2R102",
+        "$ d2rpick: ignore D2R102\n$ why",
+    ],
 )
-def test_a_comment_before_the_card_silences_a_rule_for_it(tmp_path: Path, comment: str) -> None:
+def test_a_comment_before_the_card_silences_a_rule_for_it(
+    tmp_path: Path, comment: str
+) -> None:
     card = "*DEFORMABLE_TO_RIGID_AUTOMATIC"
     first, second = (match.start() for match in re.finditer(re.escape(card), SWAPPED))
     assert found(tmp_path, SWAPPED) == {"D2R102": 1}
     assert not found(tmp_path, f"{SWAPPED[:second]}{comment}\n{SWAPPED[second:]}")
-    assert found(tmp_path, f"{SWAPPED[:first]}{comment}\n{SWAPPED[first:]}") == {"D2R102": 1}
-    assert found(tmp_path, f"{SWAPPED[:second]}{comment}\n*NODE\n{SWAPPED[second:]}") == {"D2R102": 1}
+    assert found(tmp_path, f"{SWAPPED[:first]}{comment}\n{SWAPPED[first:]}") == {
+        "D2R102": 1
+    }
+    assert found(
+        tmp_path, f"{SWAPPED[:second]}{comment}\n*NODE\n{SWAPPED[second:]}"
+    ) == {"D2R102": 1}
 
 
 def test_rules_are_selected_ignored_and_weighed(tmp_path: Path) -> None:
     path = write(tmp_path, HEAD + PARTS + THERE + "*INCLUDE\nnowhere.k\n")
 
     def rules(configuration: Configuration) -> dict[str, Severity]:
-        return {finding.rule: finding.severity for finding in check_deck(path, configuration).findings}
+        return {
+            finding.rule: finding.severity
+            for finding in check_deck(path, configuration).findings
+        }
 
     assert rules(Configuration()) == {"D2R003": "error", "D2R104": "info"}
     assert rules(Configuration(select=("D2R1",))) == {"D2R104": "info"}
@@ -96,9 +126,12 @@ def test_rules_are_selected_ignored_and_weighed(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "configuration", [Configuration(select=("D2R999",)), Configuration(severity={"D2R1": "error"})]
+    "configuration",
+    [Configuration(select=("D2R999",)), Configuration(severity={"D2R1": "error"})],
 )
-def test_an_unknown_rule_is_an_error(tmp_path: Path, configuration: Configuration) -> None:
+def test_an_unknown_rule_is_an_error(
+    tmp_path: Path, configuration: Configuration
+) -> None:
     with pytest.raises(ConfigurationError, match="no rule"):
         check_deck(write(tmp_path, GOOD), configuration)
 
@@ -108,16 +141,29 @@ def test_decks_are_judged_apart(tmp_path: Path) -> None:
     decks = []
     for name in "ab":
         (tmp_path / name).mkdir()
-        decks.append(write(tmp_path / name, HEAD + PARTS + "*INCLUDE\ncards.k\n", cards))
+        decks.append(
+            write(tmp_path / name, HEAD + PARTS + "*INCLUDE\ncards.k\n", cards)
+        )
     alone = [check_deck(deck).findings for deck in decks]
     assert all("D2R101" in {finding.rule for finding in findings} for findings in alone)
-    assert [finding.deck for findings in alone for finding in findings if finding.rule == "D2R101"] == decks
+    assert [
+        finding.deck
+        for findings in alone
+        for finding in findings
+        if finding.rule == "D2R101"
+    ] == decks
     with pytest.raises(DeckError):
         check_deck(str(tmp_path / "absent.k"))
 
 
 def test_one_wrong_id_does_not_hide_another(tmp_path: Path) -> None:
-    deck = HEAD + PARTS + automatic(1, "0.02", rigid=["7", "8", "1"]) + automatic(1, "0.3", deformable=["1"]) + END
+    deck = (
+        HEAD
+        + PARTS
+        + automatic(1, "0.02", rigid=["7", "8", "1"])
+        + automatic(1, "0.3", deformable=["1"])
+        + END
+    )
     assert found(tmp_path, deck) == {"D2R106": 1, "D2R101": 1, "D2R004": 1, "D2R104": 1}
 
 
@@ -136,16 +182,21 @@ def test_parts_without_end_are_one_finding_per_card(tmp_path: Path) -> None:
         ("ignored D2R102", False),
     ],
 )
-def test_only_the_list_behind_ignore_counts(tmp_path: Path, comment: str, silenced: bool) -> None:
+def test_only_the_list_behind_ignore_counts(
+    tmp_path: Path, comment: str, silenced: bool
+) -> None:
     checked = check_deck(write(tmp_path, before_the_second(f"$ d2rpick: {comment}")))
     assert (not checked.findings) is silenced
     assert checked.remarks == ()
 
 
 @pytest.mark.parametrize(
-    ("comment", "told"), [("ignore D2R10l", "did you mean D2R1"), ("ignore", "''"), ("ignore D", "'D'")]
+    ("comment", "told"),
+    [("ignore D2R10l", "did you mean D2R1"), ("ignore", "''"), ("ignore D", "'D'")],
 )
-def test_a_comment_that_names_no_rule_is_told(tmp_path: Path, comment: str, told: str) -> None:
+def test_a_comment_that_names_no_rule_is_told(
+    tmp_path: Path, comment: str, told: str
+) -> None:
     checked = check_deck(write(tmp_path, before_the_second(f"$ d2rpick: {comment}")))
     (remark,) = checked.remarks
     assert told in remark
@@ -160,44 +211,72 @@ def before_the_second(comment: str) -> str:
 
 def message(folder: Path, rule: str, deck: str) -> str:
     """The only finding of a rule."""
-    (finding,) = (one for one in check_deck(write(folder, deck)).findings if one.rule == rule)
+    (finding,) = (
+        one for one in check_deck(write(folder, deck)).findings if one.rule == rule
+    )
     return finding.message
 
 
 @pytest.mark.parametrize("paired", [True, False])
-@pytest.mark.parametrize(("codes", "weight"), [((4, 2), {"error"}), ((2, 4), set()), ((3, 1), {"error"})])
+@pytest.mark.parametrize(
+    ("codes", "weight"), [((4, 2), {"error"}), ((2, 4), set()), ((3, 1), {"error"})]
+)
 def test_rigid_in_the_impact_and_deformable_in_flight_is_an_error(
     tmp_path: Path, codes: tuple[int, int], weight: set[str], paired: bool
 ) -> None:
     pairs = ((2, 1), (1, -1)) if paired else ((0, 0), (0, 0))
     there = automatic(1, "0.0", rigid=["1"], code=codes[0], pair=pairs[0])
-    deck = HEAD + PARTS + there + automatic(2, "0.0", deformable=["1"], code=codes[1], pair=pairs[1]) + END
+    deck = (
+        HEAD
+        + PARTS
+        + there
+        + automatic(2, "0.0", deformable=["1"], code=codes[1], pair=pairs[1])
+        + END
+    )
     findings = check_deck(write(tmp_path, deck)).findings
-    assert {finding.severity for finding in findings if finding.rule == "D2R005"} == weight
-    weighed = check_deck(write(tmp_path, deck), Configuration(severity={"D2R005": "info"})).findings
-    assert {finding.severity for finding in weighed if finding.rule == "D2R005"} <= {"info"}
+    assert {
+        finding.severity for finding in findings if finding.rule == "D2R005"
+    } == weight
+    weighed = check_deck(
+        write(tmp_path, deck), Configuration(severity={"D2R005": "info"})
+    ).findings
+    assert {finding.severity for finding in weighed if finding.rule == "D2R005"} <= {
+        "info"
+    }
 
 
 def test_an_unknown_part_lists_its_neighbours_with_their_titles(tmp_path: Path) -> None:
-    told = message(tmp_path, "D2R106", HEAD + PARTS + automatic(1, "0.02", rigid=["7"]) + END)
+    told = message(
+        tmp_path, "D2R106", HEAD + PARTS + automatic(1, "0.02", rigid=["7"]) + END
+    )
     assert told.startswith("part 7 not in the deck (nearest to 7: 1 'door', 2 'frame')")
 
 
 def test_shared_nodes_of_a_part_set_name_the_set(tmp_path: Path) -> None:
-    mesh = "*ELEMENT_SHELL\n" + "".join(f"{one:8d}{one:8d}{one:8d}{3:8d}{8:8d}{9:8d}\n" for one in (1, 2))
+    mesh = "*ELEMENT_SHELL\n" + "".join(
+        f"{one:8d}{one:8d}{one:8d}{3:8d}{8:8d}{9:8d}\n" for one in (1, 2)
+    )
     sets = "*SET_PART\n         3\n         1         2\n"
     line = "         3         0      PSET"
     deck = HEAD + PARTS + mesh + sets + automatic(1, "0.02", rigid=[line]) + END
-    assert "part 1 (of part set 3) and part 2 (of part set 3) share node 8" in message(tmp_path, "D2R108", deck)
+    assert "part 1 (of part set 3) and part 2 (of part set 3) share node 8" in message(
+        tmp_path, "D2R108", deck
+    )
 
 
 def test_missing_lines_of_a_card_are_named(tmp_path: Path) -> None:
     lines = THERE.split("\n")
     without = {
-        "the first line (SWSET to PAIRED) and the second (NRBF to OFFSET) are missing;": lines[:1],
+        "the first line (SWSET to PAIRED) and the second (NRBF to OFFSET) are missing;": lines[
+            :1
+        ],
         "the second line (NRBF to OFFSET) is missing": lines[:3],
         "is missing, '1         0      PART' stands": lines[:3] + lines[5:],
-        "are missing, '1         0      PART' stands in their place": [lines[0], lines[5], lines[5]],
+        "are missing, '1         0      PART' stands in their place": [
+            lines[0],
+            lines[5],
+            lines[5],
+        ],
         "the third line, with the first part, is missing": lines[:5],
     }
     for told, kept in without.items():
@@ -209,37 +288,61 @@ def test_missing_lines_of_a_card_are_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("rows", "told"),
     [
-        ("         1\n", "the second line (XC to TM) and the third line (IXX to IZZ) are missing;"),
+        (
+            "         1\n",
+            "the second line (XC to TM) and the third line (IXX to IZZ) are missing;",
+        ),
         ("         1\n       0.0\n", "the third line (IXX to IZZ) is missing;"),
     ],
 )
-def test_missing_lines_of_an_inertia_are_named(rows: str, told: str, tmp_path: Path) -> None:
-    assert told in message(tmp_path, "D2R001", HEAD + PARTS + "*DEFORMABLE_TO_RIGID_INERTIA\n" + rows + END)
+def test_missing_lines_of_an_inertia_are_named(
+    rows: str, told: str, tmp_path: Path
+) -> None:
+    assert told in message(
+        tmp_path, "D2R001", HEAD + PARTS + "*DEFORMABLE_TO_RIGID_INERTIA\n" + rows + END
+    )
 
 
 def test_contacts_are_listed_where_none_has_the_number(tmp_path: Path) -> None:
     deck = next(iter(RULES["D2R007"].failing)).deck
-    assert "the deck has 7 (*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_ID 'floor')" in message(tmp_path, "D2R007", deck)
+    assert (
+        "the deck has 7 (*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_ID 'floor')"
+        in message(tmp_path, "D2R007", deck)
+    )
 
 
 def test_a_file_with_nothing_but_its_end_says_what_is_missing(tmp_path: Path) -> None:
-    with pytest.raises(DeckError, match=r"only \*END was found.*\*KEYWORD and the cards were expected"):
+    with pytest.raises(
+        DeckError, match=r"only \*END was found.*\*KEYWORD and the cards were expected"
+    ):
         check_deck(write(tmp_path, "$ title\n*END\n"))
 
 
 @pytest.mark.slow
-def test_a_deck_cut_within_a_line_or_its_mesh_is_never_passed_in_silence(tmp_path: Path) -> None:
+def test_a_deck_cut_within_a_line_or_its_mesh_is_never_passed_in_silence(
+    tmp_path: Path,
+) -> None:
     """Wherever it is cut, unless in a comment or at the end of a line of a card that holds no mesh."""
-    whole = GOOD.removesuffix(END) + "*NODE\n       1             0.0\n*ELEMENT_SHELL\n       1       1       1\n"
+    whole = (
+        GOOD.removesuffix(END)
+        + "*NODE\n       1             0.0\n*ELEMENT_SHELL\n       1       1       1\n"
+    )
     mesh = whole.index("*NODE")
     deck = tmp_path / "main.k"
     for end in range(whole.rindex("*DEFORM") + 2, len(whole) + 1):
         text = whole[:end]
         deck.write_text(text)
-        told = [finding.message for finding in check_deck(str(deck)).findings if finding.rule == "D2R011"]
+        told = [
+            finding.message
+            for finding in check_deck(str(deck)).findings
+            if finding.rule == "D2R011"
+        ]
         within = not (text.endswith("\n") or text.splitlines()[-1].startswith("$"))
         assert len(told) == (within or end > mesh + len("*NODE"))
-        assert all(one.endswith("or end its last line" if within else "or add that line") for one in told)
+        assert all(
+            one.endswith("or end its last line" if within else "or add that line")
+            for one in told
+        )
     deck.write_text(f"{whole}*END")
     assert not check_deck(str(deck)).findings
 
@@ -264,7 +367,9 @@ def test_the_nearest_file_wins(tmp_path: Path) -> None:
     assert configuration.ignore == ("D2R104",)
     assert configuration.severity == {"D2R101": "warning"}
     assert configuration.source == str(tmp_path / "d2rpick.toml")
-    (tmp_path / "a" / "pyproject.toml").write_text("[tool.d2rpick]\nselect = ['D2R0']\n")
+    (tmp_path / "a" / "pyproject.toml").write_text(
+        "[tool.d2rpick]\nselect = ['D2R0']\n"
+    )
     assert configuration_in(inner).select == ("D2R0",)
     (tmp_path / "a" / "d2rpick.toml").write_text("")
     assert configuration_in(inner).select == ()
@@ -287,7 +392,9 @@ def test_the_nearest_file_wins(tmp_path: Path) -> None:
         (f"select = {'[' * 9999}", "valid TOML"),
     ],
 )
-def test_wrong_settings_say_what_is_wrong(tmp_path: Path, text: str, message: str) -> None:
+def test_wrong_settings_say_what_is_wrong(
+    tmp_path: Path, text: str, message: str
+) -> None:
     name = "pyproject.toml" if "[tool]" in text else "d2rpick.toml"
     (tmp_path / name).write_bytes(text.encode("latin-1"))
     with pytest.raises(ConfigurationError, match=message) as caught:
@@ -295,7 +402,9 @@ def test_wrong_settings_say_what_is_wrong(tmp_path: Path, text: str, message: st
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("text", ["tool = 3", "[tool]\nother = 1", "[tool.other]\nx = 1"])
+@pytest.mark.parametrize(
+    "text", ["tool = 3", "[tool]\nother = 1", "[tool.other]\nx = 1"]
+)
 def test_a_pyproject_without_a_table_for_us(tmp_path: Path, text: str) -> None:
     (tmp_path / "pyproject.toml").write_text(text)
     assert configuration_in(tmp_path).source != str(tmp_path / "pyproject.toml")

@@ -17,7 +17,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from tests.made_t01 import MadePart, headed
 
-PUSHES = ((0.0, 0.03), (0.17, 0.19))  # of the box; it reaches the ground a little later while it is rigid
+PUSHES = (
+    (0.0, 0.03),
+    (0.17, 0.19),
+)  # of the box; it reaches the ground a little later while it is rigid
 LATER, STEP, PACE = 0.002, 1e-3, 0.02
 SIZE = 400  # bytes of a restart
 MASS = 10.0
@@ -27,8 +30,14 @@ CODES = (1, 2, 3, 4, 5, 6)
 def momentum(now: float, *, rigid: bool) -> float:
     """Momentum of the box along z: gravity and each push, softly, add to it."""
     late = LATER if rigid else 0.0
-    shares = (min(max(now - begin - late * (begin > 0), 0.0) / (end - begin), 1.0) for begin, end in PUSHES)
-    return sum(30.0 * math.sin(math.pi / 2 * share) ** 2 for share in shares) - 9.81 * MASS * now
+    shares = (
+        min(max(now - begin - late * (begin > 0), 0.0) / (end - begin), 1.0)
+        for begin, end in PUSHES
+    )
+    return (
+        sum(30.0 * math.sin(math.pi / 2 * share) ** 2 for share in shares)
+        - 9.81 * MASS * now
+    )
 
 
 def state(now: float, *, rigid: bool) -> tuple[list[float], list[float]]:
@@ -55,7 +64,9 @@ def engine(deck: Path) -> None:
     name, number, end = head[1], int(head[2]), float(head[3])
     own_name, begins, *held = restart(name, number - 1).read_text().split()
     assert own_name == restart(name, number - 1).name
-    assert not (held and "/RBODY/ON" in text), "OpenRadioss adds to the energy of what is rigid already"
+    assert not (held and "/RBODY/ON" in text), (
+        "OpenRadioss adds to the energy of what is rigid already"
+    )
     rigid = "/RBODY/ON" in text or bool(held and "/RBODY/OFF" not in text)
     history, listing = Path(f"{name}T{number:02d}"), Path(f"{name}_{number:04d}.out")
     listing.write_text(" started\n")
@@ -78,7 +89,11 @@ def engine(deck: Path) -> None:
                 print(" ** ERROR: NEGATIVE VOLUME IN ELEMENT 7", flush=True)
                 sys.exit(2)
     left = restart(name, number, f"{step}{' rigid' * rigid}")
-    if wrong in ("empty", "cut", "damaged") and number == 3 and not Path("full.once").exists():
+    if (
+        wrong in ("empty", "cut", "damaged")
+        and number == 3
+        and not Path("full.once").exists()
+    ):
         content = left.read_bytes()
         kept = {"empty": 0, "cut": SIZE // 2}.get(wrong, len(left.name) + 1)
         left.write_bytes(content[:kept] + b"?" * (SIZE - kept) * (wrong == "damaged"))
@@ -95,4 +110,6 @@ if __name__ == "__main__":
         engine(main)
     else:
         restart(main.stem.removesuffix("_0000"), 0, "0")
-        Path(f"{main.stem}.out").write_text("     NORMAL TERMINATION\n     0 ERROR(S)\n")
+        Path(f"{main.stem}.out").write_text(
+            "     NORMAL TERMINATION\n     0 ERROR(S)\n"
+        )

@@ -21,7 +21,18 @@ from d2rpick.api.drives import Driving
 from d2rpick.base.errors import D2RPickError
 from d2rpick.histories.opening import open_run
 from d2rpick.running import engine
-from d2rpick.running.sequence import LOAD, PROBE, RIGID, Leg, Limits, Order, Seen, next_order, window_of, windows
+from d2rpick.running.sequence import (
+    LOAD,
+    PROBE,
+    RIGID,
+    Leg,
+    Limits,
+    Order,
+    Seen,
+    next_order,
+    window_of,
+    windows,
+)
 from tests.command import ROOT, put, refused, run
 from tests.deck.test_openradioss import ENGINE, starter
 from tests.decks import wide
@@ -43,8 +54,12 @@ def asked(folder: Path, *more: str) -> list[str]:
     deck = folder / "deck"
     if not deck.exists():
         deck.mkdir()
-        (deck / "strip_0000.rad").write_text(starter().replace("/TH/PART", f"{GRAVITY}{WALL}/TH/PART"))
-        text = ENGINE.replace("0.02\n/VERS", f"{END}\n/VERS").replace("/TFILE/4\n2e-05", "/TFILE/4\n0.001")
+        (deck / "strip_0000.rad").write_text(
+            starter().replace("/TH/PART", f"{GRAVITY}{WALL}/TH/PART")
+        )
+        text = ENGINE.replace("0.02\n/VERS", f"{END}\n/VERS").replace(
+            "/TFILE/4\n2e-05", "/TFILE/4\n0.001"
+        )
         (deck / "strip_0001.rad").write_text(text)
     return [
         "drive", str(deck / "strip_0000.rad"), "-o", str(folder / "run"), "--wait", str(WAIT),
@@ -60,11 +75,17 @@ def drives(folder: Path) -> Driving:
 def check(found: dict[str, object], folder: Path) -> None:
     """What must hold of every run that came to its end: it is whole, and rigid in the flight alone."""
     switched = [one for one in found["windows"] if one["reason"] is None]  # type: ignore[attr-defined]
-    joined = open_run([str(path) for path in sorted((folder / "run").glob("stripT??"))]).databases[0]
+    joined = open_run(
+        [str(path) for path in sorted((folder / "run").glob("stripT??"))]
+    ).databases[0]
     assert joined.time[-1] == pytest.approx(END, abs=0.002)
-    assert np.diff(joined.time) == pytest.approx(0.001, abs=1e-5)  # no state is missing where legs meet
+    assert np.diff(joined.time) == pytest.approx(
+        0.001, abs=1e-5
+    )  # no state is missing where legs meet
     parts = joined.part_channel("internal_energy", [1])[:, 0]
-    rigid = joined.time[parts > 1e9]  # what the parts say is void exactly where they were rigid
+    rigid = joined.time[
+        parts > 1e9
+    ]  # what the parts say is void exactly where they were rigid
     (window,) = switched
     assert LOADED - 0.002 <= window["free"] <= LOADED + 0.002
     assert window["tr"] >= window["free"] + WAIT / 2
@@ -74,24 +95,33 @@ def check(found: dict[str, object], folder: Path) -> None:
 
 
 def histories(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in sorted((folder / "run").glob("stripT??"))}
+    return {
+        path.name: path.read_bytes()
+        for path in sorted((folder / "run").glob("stripT??"))
+    }
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, object]]:
     """A run that nothing disturbed, and what was said of it."""
     folder = tmp_path_factory.mktemp("whole")
-    return folder, json.loads(run(*asked(folder, "--report", str(folder / "page.html"), "-q")).stdout)
+    return folder, json.loads(
+        run(*asked(folder, "--report", str(folder / "page.html"), "-q")).stdout
+    )
 
 
-def test_a_run_is_rigid_in_its_flight_and_comes_to_its_end(whole: tuple[Path, dict[str, object]]) -> None:
+def test_a_run_is_rigid_in_its_flight_and_comes_to_its_end(
+    whole: tuple[Path, dict[str, object]],
+) -> None:
     folder, found = whole
     check(found, folder)
     legs: list[dict[str, object]] = found["legs"]  # type: ignore[assignment]
     assert {"load", "probe"} <= {str(leg["kind"]) for leg in legs}
     assert all(leg["cpu"] == 1.0 for leg in legs)
     assert "First run: strip" in (folder / "page.html").read_text()
-    assert len(list((folder / "run").glob("*.rst"))) <= 4  # the starter's, and those that may be needed
+    assert (
+        len(list((folder / "run").glob("*.rst"))) <= 4
+    )  # the starter's, and those that may be needed
     shown = run(*asked(folder, "--resume", "-q", "-f", "table")).stdout
     assert "switched" in shown
     assert "no level at td is matched" in shown
@@ -100,15 +130,22 @@ def test_a_run_is_rigid_in_its_flight_and_comes_to_its_end(whole: tuple[Path, di
     assert f"resumed: legs that are over: {len(legs)}, the last at {END}" in over.stderr
     assert json.loads(over.stdout)["windows"] == found["windows"]
     journal = (folder / "run" / "drive.ndjson").read_text()
-    switched = [one for one in json.loads(over.stdout)["windows"] if one["reason"] is None]
+    switched = [
+        one for one in json.loads(over.stdout)["windows"] if one["reason"] is None
+    ]
     written = read_windows(journal, "drive.ndjson")
-    assert np.array(written) == pytest.approx(np.array([(one["tr"], one["td"]) for one in switched]), abs=0.0021)
+    assert np.array(written) == pytest.approx(
+        np.array([(one["tr"], one["td"]) for one in switched]), abs=0.0021
+    )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", ["empty", "cut", "slow", "fail", "damaged"])
 def test_the_same_command_gives_the_same_run_whatever_befalls_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: tuple[Path, dict[str, object]], fault: str
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    whole: tuple[Path, dict[str, object]],
+    fault: str,
 ) -> None:
     """A disk that was full, a machine that is busy, a solver that fails once: its history is the same, bit by bit."""
     monkeypatch.setenv("D2RPICK_FAKE", fault)
@@ -119,24 +156,41 @@ def test_the_same_command_gives_the_same_run_whatever_befalls_it(
         assert "NEGATIVE VOLUME" in found.stderr
         monkeypatch.delenv("D2RPICK_FAKE")
         found = run(*asked(tmp_path, "--resume"))
-    if fault == "damaged":  # leg 4 fails on its restart, and only a second time tells that this is why
+    if (
+        fault == "damaged"
+    ):  # leg 4 fails on its restart, and only a second time tells that this is why
         assert "strip_0004.out: the solver failed" in found.stderr
         found = run(*asked(tmp_path, "--resume"))
-        assert "leg 4 failed again before its first state: the leg before it is computed again" in found.stderr
+        assert (
+            "leg 4 failed again before its first state: the leg before it is computed again"
+            in found.stderr
+        )
     if fault in ("empty", "cut"):
-        assert "leg 3: it left no whole restart or history, and is begun again" in found.stderr
+        assert (
+            "leg 3: it left no whole restart or history, and is begun again"
+            in found.stderr
+        )
     check(json.loads(found.stdout), tmp_path)
     assert histories(tmp_path) == histories(whole[0])
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("ended", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM], ids=["killed", "int", "term"])
+@pytest.mark.parametrize(
+    "ended",
+    [signal.SIGKILL, signal.SIGINT, signal.SIGTERM],
+    ids=["killed", "int", "term"],
+)
 def test_a_driver_that_is_ended_loses_nothing_but_its_leg(
     tmp_path: Path, ended: signal.Signals, whole: tuple[Path, dict[str, object]]
 ) -> None:
-    words, slow = [sys.executable, "-m", "d2rpick", *asked(tmp_path)], {**os.environ, "D2RPICK_FAKE": "slow"}
+    words, slow = (
+        [sys.executable, "-m", "d2rpick", *asked(tmp_path)],
+        {**os.environ, "D2RPICK_FAKE": "slow"},
+    )
     begun, lock = tmp_path / "run" / "stripT03", tmp_path / "run" / ".solver.lock"
-    with subprocess.Popen(words, cwd=ROOT, env=slow, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+    with subprocess.Popen(
+        words, cwd=ROOT, env=slow, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    ) as process:
         while not begun.exists():
             time.sleep(0.05)
         process.send_signal(ended)
@@ -151,9 +205,14 @@ def test_a_driver_that_is_ended_loses_nothing_but_its_leg(
 
 @pytest.mark.slow
 def test_a_solver_that_hangs_is_ended_with_its_driver(tmp_path: Path) -> None:
-    words, hangs = [sys.executable, "-m", "d2rpick", *asked(tmp_path)], {**os.environ, "D2RPICK_FAKE": "hang"}
+    words, hangs = (
+        [sys.executable, "-m", "d2rpick", *asked(tmp_path)],
+        {**os.environ, "D2RPICK_FAKE": "hang"},
+    )
     begun, lock = tmp_path / "run" / "strip_0002.out", tmp_path / "run" / ".solver.lock"
-    with subprocess.Popen(words, cwd=ROOT, env=hangs, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+    with subprocess.Popen(
+        words, cwd=ROOT, env=hangs, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    ) as process:
         while not begun.exists():
             time.sleep(0.05)
         process.send_signal(signal.SIGINT)
@@ -174,7 +233,10 @@ def test_a_run_goes_back_to_the_last_restart_that_is_whole(
     for path in (tmp_path / "run").glob("strip_00[0-9][1-9]_0001.rst"):
         path.write_bytes(b"")
     found = run(*asked(tmp_path, "--resume"))
-    assert "the restart of the last leg is not whole: the run goes back to 0" in found.stderr
+    assert (
+        "the restart of the last leg is not whole: the run goes back to 0"
+        in found.stderr
+    )
     check(json.loads(found.stdout), tmp_path)
     assert histories(tmp_path) == histories(whole[0])
 
@@ -187,11 +249,17 @@ def test_silence_is_measured_by_what_the_solver_writes(tmp_path: Path) -> None:
 
 
 def test_a_second_driver_is_kept_out(tmp_path: Path) -> None:
-    with engine.alone(tmp_path), pytest.raises(D2RPickError, match="another d2rpick drives"), engine.alone(tmp_path):
+    with (
+        engine.alone(tmp_path),
+        pytest.raises(D2RPickError, match="another d2rpick drives"),
+        engine.alone(tmp_path),
+    ):
         pass
 
 
-def test_a_leg_is_not_begun_on_a_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_leg_is_not_begun_on_a_full_disk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     import shutil
 
     (tmp_path / "strip_0001_0001.rst").write_bytes(bytes(1000))
@@ -206,7 +274,9 @@ def test_a_leg_is_not_begun_on_a_full_disk(tmp_path: Path, monkeypatch: pytest.M
 
 def test_commands_are_split_as_a_shell_does_and_given_to_none() -> None:
     deck = "a b; rm -rf x_0001.rad"
-    given = engine.Commands(engine="mpirun -np 2 'my engine' -i {deck} -nt {threads}", threads=4)
+    given = engine.Commands(
+        engine="mpirun -np 2 'my engine' -i {deck} -nt {threads}", threads=4
+    )
     assert given.words("engine", deck) == [
         "mpirun", "-np", "2", "my engine", "-i", deck, "-nt", "4",
     ]  # fmt: skip
@@ -215,7 +285,9 @@ def test_commands_are_split_as_a_shell_does_and_given_to_none() -> None:
             engine.Commands(engine=wrong).words("engine", deck)
 
 
-def test_a_restart_is_whole_that_begins_with_its_name_and_is_as_long_as_the_first(tmp_path: Path) -> None:
+def test_a_restart_is_whole_that_begins_with_its_name_and_is_as_long_as_the_first(
+    tmp_path: Path,
+) -> None:
     solver, size = engine.Solver(tmp_path, "strip"), 1000
     for number in (0, 1):
         name = f"strip_{number:04d}_0001.rst"
@@ -224,11 +296,19 @@ def test_a_restart_is_whole_that_begins_with_its_name_and_is_as_long_as_the_firs
     assert solver.whole(1)
     assert not solver.whole(2)
     own = (tmp_path / "strip_0001_0001.rst").read_bytes()
-    for wrong in (b"", own[:100], own[: size // 2], bytes(size), own.replace(b"0001_", b"0002_")):
+    for wrong in (
+        b"",
+        own[:100],
+        own[: size // 2],
+        bytes(size),
+        own.replace(b"0001_", b"0002_"),
+    ):
         (tmp_path / "strip_0001_0001.rst").write_bytes(wrong)
         assert not solver.whole(1)
     (tmp_path / "strip_0001_0001.rst").write_bytes(own)
-    put(tmp_path / "strip_0000_0002.rst", b"strip_0000_0002.rst".ljust(size))  # of two domains, one is missing
+    put(
+        tmp_path / "strip_0000_0002.rst", b"strip_0000_0002.rst".ljust(size)
+    )  # of two domains, one is missing
     assert not solver.whole(1)
 
 
@@ -241,7 +321,13 @@ def test_a_signal_that_ended_a_solver_is_told(tmp_path: Path) -> None:
 
 
 def test_of_a_listing_the_lines_with_the_error_are_told(tmp_path: Path) -> None:
-    lines = [" read", " ** ERROR IN INPUT", " LINE 12: NODE 7 IS NOT DEFINED", "", *(f" more {n}" for n in range(99))]
+    lines = [
+        " read",
+        " ** ERROR IN INPUT",
+        " LINE 12: NODE 7 IS NOT DEFINED",
+        "",
+        *(f" more {n}" for n in range(99)),
+    ]
     put(tmp_path / "strip_0000.out", "\n".join(lines).encode())
     told = engine.Solver(tmp_path, "strip").last_words(0)
     assert told.startswith("** ERROR IN INPUT | LINE 12: NODE 7 IS NOT DEFINED")
@@ -249,46 +335,79 @@ def test_of_a_listing_the_lines_with_the_error_are_told(tmp_path: Path) -> None:
 
 def test_a_disk_that_is_full_is_told_with_what_to_do(tmp_path: Path) -> None:
     driving = Driving(
-        asked(tmp_path)[1], tmp_path / "run", print, wait=WAIT, starter=command("starter"), engine=command("engine")
+        asked(tmp_path)[1],
+        tmp_path / "run",
+        print,
+        wait=WAIT,
+        starter=command("starter"),
+        engine=command("engine"),
     )
     for wrong, message in (
         (errno.ENOSPC, "run: No space left on device; make room, then --resume"),
         (errno.EIO, "Input"),
     ):
-        with pytest.raises((D2RPickError, OSError), match=message), driving.driver(resume=True):
+        with (
+            pytest.raises((D2RPickError, OSError), match=message),
+            driving.driver(resume=True),
+        ):
             raise OSError(wrong, os.strerror(wrong))
 
 
 def test_how_far_a_run_is_can_be_told_at_any_time(tmp_path: Path) -> None:
     with Driving(
-        asked(tmp_path)[1], tmp_path / "run", print, wait=WAIT, starter=command("starter"), engine=command("engine")
+        asked(tmp_path)[1],
+        tmp_path / "run",
+        print,
+        wait=WAIT,
+        starter=command("starter"),
+        engine=command("engine"),
     ).driver(resume=False) as driver:
         assert driver.progress(3.4) == "starting ... 3 s"
         driver.at = Order(RIGID, 2, 0.05, 0.2)
         assert driver.progress(9.0) == f"leg 2, rigid: 0.05 to 0.2 of {END:g}"
 
 
-IDLE, SWINGS = Seen(0.0, 0.02, flies=True, idle=True), Seen(0.05, 0.05, flies=True, tr=0.1, swing=0.015)
+IDLE, SWINGS = (
+    Seen(0.0, 0.02, flies=True, idle=True),
+    Seen(0.05, 0.05, flies=True, tr=0.1, swing=0.015),
+)
 WITHIN = Limits(1.0, 1e-3, 0.002, 0.01, 0.2)
 FLOWN = Leg(Order(LOAD, 1, 0.0, 0.1), SWINGS, 1000, 1.0)
 
 
 @pytest.mark.parametrize(("seen", "margin"), [(IDLE, 0.002), (SWINGS, 0.03 * 0.35)])
-def test_the_margin_is_the_least_one_where_nothing_vibrates(seen: Seen, margin: float) -> None:
+def test_the_margin_is_the_least_one_where_nothing_vibrates(
+    seen: Seen, margin: float
+) -> None:
     flown = Leg(Order(LOAD, 1, 0.0, 0.1), seen, 1000)
     probe = Leg(Order(PROBE, 2, 0.1, 1.0), Seen(contact=0.4), 100)
-    assert window_of([flown, probe], Limits(1.0, 1e-3, 0.002)).td == pytest.approx(0.4 - margin)
-    assert window_of([flown, probe], Limits(1.0, 1e-3, 0.002, 0.05)).td == pytest.approx(0.35)
+    assert window_of([flown, probe], Limits(1.0, 1e-3, 0.002)).td == pytest.approx(
+        0.4 - margin
+    )
+    assert window_of(
+        [flown, probe], Limits(1.0, 1e-3, 0.002, 0.05)
+    ).td == pytest.approx(0.35)
 
 
 def probes(*ends: float, contact: float) -> list[Leg]:
     starts = [0.1, *ends[:-1]]
-    orders = [Order(PROBE, number, *span) for number, span in enumerate(zip(starts, ends, strict=True), start=2)]
-    return [FLOWN, *(Leg(one, Seen(contact=contact if one.until > contact else None), 100, 0.1) for one in orders)]
+    orders = [
+        Order(PROBE, number, *span)
+        for number, span in enumerate(zip(starts, ends, strict=True), start=2)
+    ]
+    return [
+        FLOWN,
+        *(
+            Leg(one, Seen(contact=contact if one.until > contact else None), 100, 0.1)
+            for one in orders
+        ),
+    ]
 
 
 def test_a_run_goes_on_from_the_last_leg_of_a_probe_that_ended_before_td() -> None:
-    assert next_order(probes(0.2, 0.3, 0.45, contact=0.4), WITHIN) == Order(RIGID, 4, 0.3, 0.39)
+    assert next_order(probes(0.2, 0.3, 0.45, contact=0.4), WITHIN) == Order(
+        RIGID, 4, 0.3, 0.39
+    )
     legs = probes(0.2, 0.39, 0.45, contact=0.4)  # which ended at td
     after = next_order(legs, WITHIN)
     assert after
@@ -304,11 +423,19 @@ def test_a_probe_goes_on_from_its_own_restarts_to_the_end_of_the_run() -> None:
         legs.append(Leg(order, Seen(), 100, 0.1))
     assert legs[-1].order.until == WITHIN.end
     assert len(legs) < 12
-    assert [(one.tr, one.td, one.contact) for one in windows(legs, WITHIN)] == [(0.1, 1.0, None)]
+    assert [(one.tr, one.td, one.contact) for one in windows(legs, WITHIN)] == [
+        (0.1, 1.0, None)
+    ]
 
 
-def test_a_flight_that_is_left_out_is_deformable_from_where_the_parts_would_have_become_rigid() -> None:
-    for contact, reason in ((0.13, "less than 4%"), (0.09, "half swings"), (0.109, "begins before tr")):
+def test_a_flight_that_is_left_out_is_deformable_from_where_the_parts_would_have_become_rigid() -> (
+    None
+):
+    for contact, reason in (
+        (0.13, "less than 4%"),
+        (0.09, "half swings"),
+        (0.109, "begins before tr"),
+    ):
         legs = probes(0.2, contact=contact)
         (window,) = windows(legs, WITHIN)
         assert reason in str(window.reason)
@@ -321,7 +448,10 @@ def test_a_flight_that_is_left_out_is_deformable_from_where_the_parts_would_have
         assert following.kind == LOAD
 
 
-@given(wait=floats(1e-3, 0.3), shown=lists(tuples(floats(0.0, 1.0), booleans()), min_size=200, max_size=200))
+@given(
+    wait=floats(1e-3, 0.3),
+    shown=lists(tuples(floats(0.0, 1.0), booleans()), min_size=200, max_size=200),
+)
 def test_whatever_is_seen_the_run_comes_to_its_end_with_the_numbers_that_the_solver_has(
     wait: float, shown: list[tuple[float, bool]]
 ) -> None:
@@ -333,11 +463,19 @@ def test_whatever_is_seen_the_run_comes_to_its_end_with_the_numbers_that_the_sol
         assert order.until > order.start
         assert order.number <= 99
         free = share * order.until
-        contact = order.start + share * (order.until - order.start) if order.rigid and flies else None
+        contact = (
+            order.start + share * (order.until - order.start)
+            if order.rigid and flies
+            else None
+        )
         tr = order.start if flies else order.until
-        legs.append(Leg(order, Seen(free, wait, flies=flies, tr=tr, contact=contact), 100, 1.0))
+        legs.append(
+            Leg(order, Seen(free, wait, flies=flies, tr=tr, contact=contact), 100, 1.0)
+        )
         if order.kind == RIGID:
-            legs[-1] = legs[-1]._replace(seen=Seen())  # it flies the same way as the probe did
+            legs[-1] = legs[-1]._replace(
+                seen=Seen()
+            )  # it flies the same way as the probe did
 
 
 @pytest.mark.parametrize(
@@ -349,14 +487,39 @@ def test_whatever_is_seen_the_run_comes_to_its_end_with_the_numbers_that_the_sol
             [],
             "strip_0000.rad: no contact and no rigid wall, so nothing",
         ),
-        ("DEF       MASS\n         1", "DEF       MASS\n         7", [], "no momenta of part 1 in the time history"),
-        ("/TH/PART", "/TH/NODE", [], "strip_0000.rad: no momenta of part 1 in the time history; /TH/PART with DEF"),
+        (
+            "DEF       MASS\n         1",
+            "DEF       MASS\n         7",
+            [],
+            "no momenta of part 1 in the time history",
+        ),
+        (
+            "/TH/PART",
+            "/TH/NODE",
+            [],
+            "strip_0000.rad: no momenta of part 1 in the time history; /TH/PART with DEF",
+        ),
         ("DEF       MASS", "IE        MASS", [], "no momenta of part 1"),
-        ("", "", ["--wait", "0.2"], "--wait 0.2: a time from 0.012, 12 states of the history, to 0.11"),
+        (
+            "",
+            "",
+            ["--wait", "0.2"],
+            "--wait 0.2: a time from 0.012, 12 states of the history, to 0.11",
+        ),
         ("", "", ["--wait", "0.001"], "--wait 0.001: a time from 0.012"),
-        ("", "", ["--margin", "0.2"], "--margin 0.2: less than 0.11, half of the run, was expected"),
+        (
+            "",
+            "",
+            ["--margin", "0.2"],
+            "--margin 0.2: less than 0.11, half of the run, was expected",
+        ),
         ("", "", ["--part", "9"], "part 9"),
-        ("", "", ["--engine", "/no/such/engine {deck}"], "/no/such/engine: no such program; correct"),
+        (
+            "",
+            "",
+            ["--engine", "/no/such/engine {deck}"],
+            "/no/such/engine: no such program; correct",
+        ),
     ],
 )
 def test_what_a_run_lacks_is_told_before_anything_is_computed(
@@ -380,6 +543,11 @@ def test_a_command_that_is_corrected_is_not_one_that_has_begun(tmp_path: Path) -
     failed = run(*asked(tmp_path), "--starter", f"{broken} {{deck}}")
     assert "the starter failed" in failed.stderr
     with Driving(
-        asked(tmp_path)[1], tmp_path / "run", print, wait=WAIT, starter=command("starter"), engine=command("engine")
+        asked(tmp_path)[1],
+        tmp_path / "run",
+        print,
+        wait=WAIT,
+        starter=command("starter"),
+        engine=command("engine"),
     ).driver(resume=False) as driver:
         assert not driver.legs

@@ -15,7 +15,9 @@ REAL = 20
 ENGINE = "/RUN/box/1\n 0.4\n/VERS/2022\n/TFILE/4\n1e-5\n"
 CONTACT = "/INTER/TYPE7/6\nfloor\n" + wide(3, 1)
 TIED = "/INTER/TYPE2/9\ntied\n" + wide(3, 1)
-WALL = "/RWALL/PLANE/8\nground\n" + wide(0, 0, 0, 0) + 3 * wide(0.0, 0.0, 1.0, width=REAL)
+WALL = (
+    "/RWALL/PLANE/8\nground\n" + wide(0, 0, 0, 0) + 3 * wide(0.0, 0.0, 1.0, width=REAL)
+)
 GRAVITY = f"/GRAV/5\ndown\n{wide(0, 'Z', 0, 0, 0)[:-1]}{wide(1.0, -9.81, width=REAL)}"
 THROWN = f"/GRNOD/PART/1\nall\n{wide(1, 2)}/INIVEL/TRA/3\nthrown\n{wide(10.0, 0.0, 0.0, width=REAL)[:-1]}{wide(1)}"
 MASS, STIFFNESS = 5.0, 1e6
@@ -31,30 +33,59 @@ def radioss(folder: Path, more: str = CONTACT + THROWN + GRAVITY) -> str:
 
 def states(files: tuple[str, ...]) -> list[tuple[bool, int]]:
     """Whether each leg is rigid, and the sensor that ends it."""
-    return [(rigid, leg.sensor) for leg in read_run(files[0]).legs for _, rigid, _ in leg.switched]
+    return [
+        (rigid, leg.sensor)
+        for leg in read_run(files[0]).legs
+        for _, rigid, _ in leg.switched
+    ]
 
 
 def test_legs_end_by_sensors_of_flight_and_of_contact(tmp_path: Path) -> None:
-    found = d2.first(radioss(tmp_path / "ref", CONTACT + WALL + TIED + THROWN), tmp_path / "next", parts="1-2")
+    found = d2.first(
+        radioss(tmp_path / "ref", CONTACT + WALL + TIED + THROWN),
+        tmp_path / "next",
+        parts="1-2",
+    )
     assert found.wait == pytest.approx(PERIOD / 2, rel=1e-2)
     assert "springs" in found.reason
-    assert not any("stays active" in note for note in found.notes)  # it goes off: runs computed with OpenRadioss
+    assert not any(
+        "stays active" in note for note in found.notes
+    )  # it goes off: runs computed with OpenRadioss
     assert any("a momentum of 511 after it, for 365" in note for note in found.notes)
     starter = Path(found.files[0]).read_text()
     kinds = re.findall(r"/SENSOR/(\w+)/(\d+)", starter)
-    assert kinds == [("INTER", "1"), ("RWALL", "2"), ("OR", "3"), ("NOT", "4"), ("TIME", "5"), ("AND", "6")]
-    assert [line.split()[0] for line in re.findall(r".*NF.*", starter)] == ["6", "8"]  # not the tied one
+    assert kinds == [
+        ("INTER", "1"),
+        ("RWALL", "2"),
+        ("OR", "3"),
+        ("NOT", "4"),
+        ("TIME", "5"),
+        ("AND", "6"),
+    ]
+    assert [line.split()[0] for line in re.findall(r".*NF.*", starter)] == [
+        "6",
+        "8",
+    ]  # not the tied one
     assert states(found.files) == [*4 * [(False, 6), (True, 3)], (False, 0)]
     legs = [Path(name).read_text() for name in found.files[1:]]
     assert all(text.count("/RUN/box/") == 1 and "/TFILE" in text for text in legs)
-    assert ["/DTIX" in text for text in legs] == [rigid for rigid, _ in states(found.files)]
+    assert ["/DTIX" in text for text in legs] == [
+        rigid for rigid, _ in states(found.files)
+    ]
 
 
 def test_parts_at_rest_that_fall_are_rigid_from_the_start(tmp_path: Path) -> None:
-    found = d2.first(radioss(tmp_path / "ref", CONTACT + GRAVITY), tmp_path / "next", parts=(1, 2))
+    found = d2.first(
+        radioss(tmp_path / "ref", CONTACT + GRAVITY), tmp_path / "next", parts=(1, 2)
+    )
     assert [rigid for rigid, _ in states(found.files)] == 4 * [True, False]
     assert "at rest in free fall: rigid from 0" in found.notes[0]
-    later = d2.first(radioss(tmp_path / "ref", CONTACT + GRAVITY), tmp_path / "later", parts=(1, 2), after=0.1)
+    later = d2.first(
+        radioss(tmp_path / "ref", CONTACT + GRAVITY),
+        tmp_path / "later",
+        parts=(1, 2),
+        after=0.1,
+    )
     assert [rigid for rigid, _ in states(later.files)][:2] == [False, True]
 
 
@@ -71,7 +102,12 @@ def test_the_check_says_that_it_does_not_know_these_times(tmp_path: Path) -> Non
     [
         (THROWN, {}, "no contact and no rigid wall"),
         (CONTACT + "/CLOAD/4\npush\n", {}, "/CLOAD/4 pushes without a contact"),
-        (CONTACT + f"/BCS/1\nheld\n   111 000{wide(0, 7)[:20]}\n/GRNOD/NODE/7\nheld\n{wide(10)}", {}, "part 1 is held"),
+        (
+            CONTACT
+            + f"/BCS/1\nheld\n   111 000{wide(0, 7)[:20]}\n/GRNOD/NODE/7\nheld\n{wide(10)}",
+            {},
+            "part 1 is held",
+        ),
         (CONTACT, {"wait": 0.4 * PERIOD}, "below 0.00497, half of a period"),
         (CONTACT, {"parts": (1, 77)}, "part 77: no elements"),
         (CONTACT, {"parts": None}, "keeps no body off; name them with `parts`"),
@@ -81,25 +117,38 @@ def test_what_cannot_be_done_is_refused_in_one_line(
     tmp_path: Path, more: str, asked: dict[str, float], message: str
 ) -> None:
     with pytest.raises((d2.D2RPickError, ValueError), match=message) as refusal:
-        d2.first(radioss(tmp_path / "ref", more), tmp_path / "next", **{"parts": (1, 2), **asked})  # type: ignore[arg-type]
+        d2.first(
+            radioss(tmp_path / "ref", more),
+            tmp_path / "next",
+            **{"parts": (1, 2), **asked},  # type: ignore[arg-type]
+        )
     assert "\n" not in str(refusal.value)
     assert not (tmp_path / "next").exists()
 
 
 def test_a_deck_without_known_springs_asks_for_the_wait(tmp_path: Path) -> None:
     main = radioss(tmp_path / "ref")
-    Path(main).write_text(Path(main).read_text().replace("/PROP/SPRING/", "/PROP/SPR_GENE/"))
+    Path(main).write_text(
+        Path(main).read_text().replace("/PROP/SPRING/", "/PROP/SPR_GENE/")
+    )
     with pytest.raises(ValueError, match=r"`wait` is not given, .* does not tell it"):
         d2.first(main, tmp_path / "next", parts=(1, 2))
-    assert d2.first(main, tmp_path / "next", parts=(1, 2), wait=0.01).reason == "as given"
+    assert (
+        d2.first(main, tmp_path / "next", parts=(1, 2), wait=0.01).reason == "as given"
+    )
 
 
 def dyna(folder: Path, contact: str = "AUTOMATIC_SURFACE_TO_SURFACE_ID") -> str:
     """Two shells that share nodes, one apart from them, and a contact."""
-    nodes = "".join(f"{n:8d}{n % 3:16.1f}{n // 3:16.1f}{0.0:16.1f}\n" for n in range(1, 20))
+    nodes = "".join(
+        f"{n:8d}{n % 3:16.1f}{n // 3:16.1f}{0.0:16.1f}\n" for n in range(1, 20)
+    )
     rows = [(1, (3, 4, 7, 6)), (2, (4, 5, 8, 7)), (3, (12, 13, 16, 15))]
     parts = "".join(f"*PART\np\n{part:10d}{1:10d}{1:10d}\n" for part, _ in rows)
-    shells = "".join("".join(f"{one:8d}" for one in (part, part, *corners)) + "\n" for part, corners in rows)
+    shells = "".join(
+        "".join(f"{one:8d}" for one in (part, part, *corners)) + "\n"
+        for part, corners in rows
+    )
     rest = f"*CONTACT_{contact}\n{7:10d}floor\n" + 3 * (8 * f"{0:10d}" + "\n")
     text = f"*KEYWORD\n*CONTROL_TERMINATION\n 1.0\n{parts}*NODE\n{nodes}*ELEMENT_SHELL\n{shells}{rest}*END\n"
     folder.mkdir(exist_ok=True)
@@ -107,10 +156,16 @@ def dyna(folder: Path, contact: str = "AUTOMATIC_SURFACE_TO_SURFACE_ID") -> str:
 
 
 def test_ls_dyna_gets_a_pair_of_switches_with_contact_codes(tmp_path: Path) -> None:
-    found = d2.first(dyna(tmp_path / "ref"), tmp_path / "next", parts="1-3", wait=0.02, after=0.05)
+    found = d2.first(
+        dyna(tmp_path / "ref"), tmp_path / "next", parts="1-3", wait=0.02, after=0.05
+    )
     main, switches = found.files
     text = Path(switches).read_text()
-    heads = [text.splitlines()[at + 2].split() for at, line in enumerate(text.splitlines()) if line.startswith("*DEF")]
+    heads = [
+        text.splitlines()[at + 2].split()
+        for at, line in enumerate(text.splitlines())
+        if line.startswith("*DEF")
+    ]
     assert heads == [
         ["901", "2", "0.05", "0.0", "0.0002", "7", "902", "1"],
         ["902", "4", "0.0", "0.0", "0.02", "7", "901", "-1"],
@@ -120,23 +175,35 @@ def test_ls_dyna_gets_a_pair_of_switches_with_contact_codes(tmp_path: Path) -> N
     assert any("has no wait" in note for note in found.notes)
 
 
-@pytest.mark.parametrize("contact", ["AUTOMATIC_SINGLE_SURFACE_ID", "AUTOMATIC_GENERAL_ID"])
-def test_a_contact_that_triggers_nothing_is_refused(tmp_path: Path, contact: str) -> None:
+@pytest.mark.parametrize(
+    "contact", ["AUTOMATIC_SINGLE_SURFACE_ID", "AUTOMATIC_GENERAL_ID"]
+)
+def test_a_contact_that_triggers_nothing_is_refused(
+    tmp_path: Path, contact: str
+) -> None:
     with pytest.raises(d2.DeckError, match="0 contacts between surfaces"):
         d2.first(dyna(tmp_path / "ref", contact), tmp_path / "next", parts=1, wait=0.02)
 
 
-SHELL = "*SECTION_SHELL\n         1         2\n     0.002     0.002     0.002     0.002\n"
+SHELL = (
+    "*SECTION_SHELL\n         1         2\n     0.002     0.002     0.002     0.002\n"
+)
 CURVE = "".join(f"{time:20.1f}{1.0:20.1f}\n" for time in (0.0, 10.0))
 FALLS = f"*LOAD_BODY_Z\n         1       9.81\n*DEFINE_CURVE\n         1\n{CURVE}"
 
 
 def offsets(files: tuple[str, ...]) -> list[str]:
     text = Path(files[1]).read_text().splitlines()
-    return [text[at + 1].split()[-1] for at, line in enumerate(text) if line.startswith("$#    nrbf")]
+    return [
+        text[at + 1].split()[-1]
+        for at, line in enumerate(text)
+        if line.startswith("$#    nrbf")
+    ]
 
 
-def test_ls_dyna_switches_back_before_the_contact_where_its_keyword_has_an_offset(tmp_path: Path) -> None:
+def test_ls_dyna_switches_back_before_the_contact_where_its_keyword_has_an_offset(
+    tmp_path: Path,
+) -> None:
     deck = Path(dyna(tmp_path / "ref"))
     deck.write_text(deck.read_text().replace("*NODE", f"{SHELL}*NODE"))
     found = d2.first(deck, tmp_path / "next", parts="1-3", wait=0.02)
@@ -147,16 +214,24 @@ def test_ls_dyna_switches_back_before_the_contact_where_its_keyword_has_an_offse
     assert any("deformable in the contact" in note for note in found.notes)
 
 
-@pytest.mark.parametrize("more", ["*LOAD_NODE_POINT\n", "*AIRBAG_SIMPLE_AIRBAG_MODEL\n", "*LOAD_SEGMENT\n"])
-def test_loads_of_ls_dyna_that_push_without_a_contact_are_refused(tmp_path: Path, more: str) -> None:
+@pytest.mark.parametrize(
+    "more", ["*LOAD_NODE_POINT\n", "*AIRBAG_SIMPLE_AIRBAG_MODEL\n", "*LOAD_SEGMENT\n"]
+)
+def test_loads_of_ls_dyna_that_push_without_a_contact_are_refused(
+    tmp_path: Path, more: str
+) -> None:
     deck = Path(dyna(tmp_path / "ref"))
-    deck.write_text(deck.read_text().replace("*END", f"{FALLS}{more}{9 * f'{1:10d}'}\n*END"))
+    deck.write_text(
+        deck.read_text().replace("*END", f"{FALLS}{more}{9 * f'{1:10d}'}\n*END")
+    )
     with pytest.raises(d2.DeckError, match="pushes without a contact"):
         d2.first(deck, tmp_path / "next", parts=1, wait=0.02)
 
 
 @pytest.mark.parametrize("thrown", [True, False])
-def test_what_falls_from_rest_is_rigid_from_the_start_in_ls_dyna_too(tmp_path: Path, thrown: bool) -> None:
+def test_what_falls_from_rest_is_rigid_from_the_start_in_ls_dyna_too(
+    tmp_path: Path, thrown: bool
+) -> None:
     deck = Path(dyna(tmp_path / "ref"))
     velocity = "*INITIAL_VELOCITY_GENERATION\n         1         2\n" * thrown
     deck.write_text(deck.read_text().replace("*END", f"{FALLS}{velocity}*END"))

@@ -12,10 +12,15 @@ from d2rpick.histories.opening import open_run
 from d2rpick.running.looks import Looks
 from tests.command import ENERGY, ROOT
 
-LEGS = [gzip.decompress((ROOT / f"tests/data/drop2_w123_T0{leg}.gz").read_bytes()) for leg in (1, 2)]
+LEGS = [
+    gzip.decompress((ROOT / f"tests/data/drop2_w123_T0{leg}.gz").read_bytes())
+    for leg in (1, 2)
+]
 
 
-def test_only_new_states_are_read_of_files_that_grow_and_together_they_are_all(tmp_path: Path) -> None:
+def test_only_new_states_are_read_of_files_that_grow_and_together_they_are_all(
+    tmp_path: Path,
+) -> None:
     names, looks = [str(tmp_path / f"runT0{leg}") for leg in (1, 2)], Looks(Selection())
     times, momenta, energies = list[Samples](), list[Samples](), list[Samples]()
     for leg, data in enumerate(LEGS):
@@ -32,13 +37,20 @@ def test_only_new_states_are_read_of_files_that_grow_and_together_they_are_all(t
     assert len(times) >= 7
     whole = open_run(names).history(Selection())
     assert np.array_equal(np.concatenate(times), whole.time)
-    assert np.concatenate(energies) == pytest.approx(whole.energy, abs=1e-20)  # round-off is 0 beside a landing
+    assert np.concatenate(energies) == pytest.approx(
+        whole.energy, abs=1e-20
+    )  # round-off is 0 beside a landing
     assert np.array_equal(np.concatenate(momenta), whole.momenta[0].values)
 
 
 @pytest.mark.parametrize("changed", ["shorter", "other", "gone"])
-def test_files_that_were_written_anew_are_read_as_a_whole(tmp_path: Path, changed: str) -> None:
-    names, looks = [str(tmp_path / "runT01"), str(tmp_path / "runT02")], Looks(Selection())
+def test_files_that_were_written_anew_are_read_as_a_whole(
+    tmp_path: Path, changed: str
+) -> None:
+    names, looks = (
+        [str(tmp_path / "runT01"), str(tmp_path / "runT02")],
+        Looks(Selection()),
+    )
     for name, data in zip(names, LEGS, strict=True):
         Path(name).write_bytes(data)
     looks.new_states(names)
@@ -57,7 +69,9 @@ def test_files_that_were_written_anew_are_read_as_a_whole(tmp_path: Path, change
 def test_other_formats_are_read_as_a_whole_each_time() -> None:
     looks = Looks(Selection())
     sizes = [
-        (states.time.size, follows) for states, follows in (looks.new_states([ENERGY]) for _ in range(2)) if states
+        (states.time.size, follows)
+        for states, follows in (looks.new_states([ENERGY]) for _ in range(2))
+        if states
     ]
     assert len(sizes) == 2
     assert sizes[0] == sizes[1]

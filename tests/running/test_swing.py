@@ -41,14 +41,18 @@ def test_what_a_flight_shows_up_to_tr_is_about_the_error_at_td(tr: float) -> Non
 
 
 @pytest.mark.parametrize("swings", [0.0, 0.004])
-def test_of_two_parts_the_most_that_the_heavy_one_may_be_off_is_told(swings: float) -> None:
+def test_of_two_parts_the_most_that_the_heavy_one_may_be_off_is_told(
+    swings: float,
+) -> None:
     """They swing against each other at 25 Hz, fall, and do not turn; from an end of the swing it is twice as far."""
     time, masses = np.linspace(0.0, 0.06, 241), np.array([30.0, 10.0])
     values = np.zeros((time.size, 2, 3))
     values[:, :, 2] = np.outer(-9.81 * time - 1.0, masses)
     swing = 30.0 * swings * 50 * np.pi * np.sin(50 * np.pi * time)
     values[:, 0, 0], values[:, 1, 0] = swing, -swing
-    momenta = Momenta(time, values, (Part(1, "shell"), Part(2, "block")), EXACT, (0, 1), masses=masses)
+    momenta = Momenta(
+        time, values, (Part(1, "shell"), Part(2, "block")), EXACT, (0, 1), masses=masses
+    )
     found = sure(swing_in(table(time, np.zeros(time.size), momenta), 0.0, 0.06))
     assert found.name == "block"
     assert found.error == pytest.approx(2 * swings, abs=1e-5)

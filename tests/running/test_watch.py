@@ -12,7 +12,10 @@ from d2rpick.histories.names import Selection
 from d2rpick.running.watch import Event, Watch, follow
 from tests.command import ROOT
 
-LEGS = [gzip.decompress((ROOT / f"tests/data/drop2_w123_T0{leg}.gz").read_bytes()) for leg in (1, 2, 3)]
+LEGS = [
+    gzip.decompress((ROOT / f"tests/data/drop2_w123_T0{leg}.gz").read_bytes())
+    for leg in (1, 2, 3)
+]
 WHOLE = Selection()
 
 
@@ -33,7 +36,11 @@ def folder(tmp_path: Path) -> Path:
 def test_a_run_that_has_not_begun_says_so(folder: Path) -> None:
     for name in (str(folder), str(folder / "runT01"), str(folder / "*T01")):
         (state,) = follow([name], WHOLE, lasting=0.0)
-        assert (state.event, state.time, state.message) == ("state", None, "has not begun")
+        assert (state.event, state.time, state.message) == (
+            "state",
+            None,
+            "has not begun",
+        )
     (folder / "runT01").write_bytes(b"")
     assert lasting(folder)[-1].message == "has not begun"
     (folder / "runT01").write_bytes(LEGS[0][:200])
@@ -70,7 +77,9 @@ def test_a_restart_is_told_with_the_contact_that_it_takes_back(folder: Path) -> 
     assert again == before[-len(again) :]
 
 
-def test_silence_is_told_after_a_minute_and_then_when_it_has_doubled(folder: Path) -> None:
+def test_silence_is_told_after_a_minute_and_then_when_it_has_doubled(
+    folder: Path,
+) -> None:
     watch = Watch([str(folder)], WHOLE)
     (folder / "runT01").write_bytes(LEGS[0])
     assert "silent" not in told(watch)
@@ -89,12 +98,18 @@ def test_silence_is_told_after_a_minute_and_then_when_it_has_doubled(folder: Pat
         ("NORMAL TERMINATION\n USER BREAK", None),
     ],
 )
-def test_the_listing_says_how_a_run_has_ended(folder: Path, listing: str, event: str | None) -> None:
+def test_the_listing_says_how_a_run_has_ended(
+    folder: Path, listing: str, event: str | None
+) -> None:
     (folder / "runT01").write_bytes(LEGS[0])
     (folder / "run_0001.out").write_text(listing)
     events = [one.event for one in lasting(folder)]
-    assert [one for one in events if one in ("ended", "failed")] == [event] * (event is not None)
-    (folder / "run_0002.rad").write_text("/RUN/run/2\n1.0\n")  # a leg that is still to come
+    assert [one for one in events if one in ("ended", "failed")] == [event] * (
+        event is not None
+    )
+    (folder / "run_0002.rad").write_text(
+        "/RUN/run/2\n1.0\n"
+    )  # a leg that is still to come
     assert not {*(one.event for one in lasting(folder))} & {"ended"}
 
 
@@ -108,12 +123,17 @@ def test_looks_cost_one_percent_of_a_core(folder: Path) -> None:
             (folder / "run_0001.out").write_text("NORMAL TERMINATION")
             (folder / "runT01").write_bytes(LEGS[0][:-1])
 
-    assert [one.event for one in follow([str(folder)], WHOLE, rest=rest)][-2:] == ["ended", "state"]
+    assert [one.event for one in follow([str(folder)], WHOLE, rest=rest)][-2:] == [
+        "ended",
+        "state",
+    ]
     assert sum(rests) >= 50 * (time.process_time() - begun) / 2
     assert min(rests) >= 0.5
 
 
-def test_what_cannot_be_read_and_is_not_written_to_any_more_is_an_error(folder: Path) -> None:
+def test_what_cannot_be_read_and_is_not_written_to_any_more_is_an_error(
+    folder: Path,
+) -> None:
     (folder / "runT01").write_bytes(LEGS[0][:200])
     os.utime(folder / "runT01", (1e9, 1e9))
     with pytest.raises(D2RPickError, match="runT01"):

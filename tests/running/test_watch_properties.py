@@ -26,15 +26,24 @@ def made(gravity: float = 9.81) -> History:
     impulse = np.concatenate([[0.0], np.cumsum((force[1:] + force[:-1]) / 2 * STEP)])
     momentum = np.zeros((time.size, 1, 3))
     momentum[:, 0, 2] = -20.0 - 2.0 * gravity * time + impulse
-    swing = np.where(time > PUSHES[0][0], np.sin(2 * np.pi * (time - PUSHES[0][0]) / PERIOD), 0.0)
+    swing = np.where(
+        time > PUSHES[0][0], np.sin(2 * np.pi * (time - PUSHES[0][0]) / PERIOD), 0.0
+    )
     energy = 50.0 * swing**2
     kinetic = momentum[:, 0, 2] ** 2 / 4
     whole = Momenta(time, momentum, None, EXACT, (0,), masses=np.array([2.0]))
-    balance = Balance(time, energy, kinetic, sliding=np.concatenate([[0.0], np.cumsum(force[1:] ** 2) * 1e-6]))
+    balance = Balance(
+        time,
+        energy,
+        kinetic,
+        sliding=np.concatenate([[0.0], np.cumsum(force[1:] ** 2) * 1e-6]),
+    )
     return table(time, energy, whole, balance=balance)
 
 
-def told(history: History, wait: float | None = None) -> list[tuple[str, float | None, float | None]]:
+def told(
+    history: History, wait: float | None = None
+) -> list[tuple[str, float | None, float | None]]:
     return [one[:3] for one in events_of(*seen_in(history, wait))]
 
 
@@ -47,20 +56,28 @@ def test_a_gap_between_two_pushes_is_no_flight() -> None:
     assert first.time == 0.0
     assert abs(sure(last.time) - PUSHES[1][1]) <= 3 * STEP
     assert 0.05 <= sure(last.wait) <= 0.07
-    contacts = [one.time for one in found if one.event == "contact" and one.time is not None]
+    contacts = [
+        one.time for one in found if one.event == "contact" and one.time is not None
+    ]
     assert np.allclose(contacts, [PUSHES[0][0], PUSHES[2][0]], atol=3 * STEP)
 
 
 @settings(max_examples=12)
 @given(st.integers(20, int(END / STEP) - 1), st.sampled_from([None, 0.06]))
-def test_the_events_of_a_run_so_far_are_the_first_of_all(state: int, wait: float | None) -> None:
+def test_the_events_of_a_run_so_far_are_the_first_of_all(
+    state: int, wait: float | None
+) -> None:
     whole, now = told(made(), wait), float(made().time[state])
-    assert told(until(made(), now), wait) == [one for one in whole if one[2] is not None and one[2] <= now]
+    assert told(until(made(), now), wait) == [
+        one for one in whole if one[2] is not None and one[2] <= now
+    ]
 
 
 @settings(max_examples=12)
 @given(st.integers(0, int(END / STEP) - 1))
-def test_a_switch_is_advised_where_the_energy_is_high_and_nothing_acts(state: int) -> None:
+def test_a_switch_is_advised_where_the_energy_is_high_and_nothing_acts(
+    state: int,
+) -> None:
     history = until(made(), float(made().time[state])) if state > 20 else made()
     for one in events_of(*seen_in(history)):
         if one.event == "switch" and one.tr is not None and one.tr > PUSHES[1][1]:

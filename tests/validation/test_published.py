@@ -19,7 +19,10 @@ from validation.published.values import MISPRINTS, integrated, table
 
 SOLVER = str(ROOT / "sample_data" / "oscillator_solver.csv")
 RUN = str(ROOT / "sample_data" / "oscillator_solver_6_80.csv")
-ALL = {exhibit.name: exhibit for exhibit in (*(make() for _, make in exhibits.exhibits_of({})), saving.exhibit())}
+ALL = {
+    exhibit.name: exhibit
+    for exhibit in (*(make() for _, make in exhibits.exhibits_of({})), saving.exhibit())
+}
 
 
 def test_the_oscillator_is_that_of_the_paper() -> None:
@@ -32,7 +35,11 @@ def test_every_number_of_the_paper_and_every_reference_value_is_met() -> None:
     assert all(row.agrees for row in rows)
     assert all((row.published is None) != (row.reference is None) for row in rows)
     (read_off,) = [row for row in rows if row.published is not None]
-    assert (read_off.published, round(read_off.here, 3), round(read_off.difference, 3)) == (13.0, 12.885, -0.115)
+    assert (
+        read_off.published,
+        round(read_off.here, 3),
+        round(read_off.difference, 3),
+    ) == (13.0, 12.885, -0.115)
     assert sum("40 digits" in row.source for row in rows) >= 20
 
 
@@ -48,48 +55,83 @@ def test_a_wrong_number_does_not_agree() -> None:
 
 
 def test_the_better_pair_has_no_residual() -> None:
-    assert values.pair_at_peak() == pytest.approx((paper.BETTER_TR, paper.BETTER_TD), rel=1e-12)
+    assert values.pair_at_peak() == pytest.approx(
+        (paper.BETTER_TR, paper.BETTER_TD), rel=1e-12
+    )
     assert values.residual(values.pair_at_peak()) < 1e-12
     assert values.residual(values.PUBLISHED) == pytest.approx(0.963, abs=1e-3)
 
 
 @pytest.mark.parametrize("known", [paper.SWITCHED_6_80, paper.SWITCHED_13_64])
-def test_integration_gives_the_states_that_were_computed_with_40_digits(known: tuple[tuple[float, ...], ...]) -> None:
+def test_integration_gives_the_states_that_were_computed_with_40_digits(
+    known: tuple[tuple[float, ...], ...],
+) -> None:
     tr, td = (0.006, 0.08) if known is paper.SWITCHED_6_80 else (0.013, 0.064)
     rows = np.array([row for row in known if row[0] not in (tr, td)])
     found = integrated(Replay(paper.OSCILLATOR, paper.START, 0.0, tr, td), rows[:, 0])
-    np.testing.assert_allclose(np.stack(found, axis=1), rows[:, 1:5], rtol=1e-9, atol=1e-11)
+    np.testing.assert_allclose(
+        np.stack(found, axis=1), rows[:, 1:5], rtol=1e-9, atol=1e-11
+    )
 
 
 @pytest.mark.parametrize("alpha", [0.0, 7.0, 900.0])
-def test_integration_and_closed_form_agree_for_any_damping_and_start(alpha: float) -> None:
+def test_integration_and_closed_form_agree_for_any_damping_and_start(
+    alpha: float,
+) -> None:
     oscillator = Oscillator(stiffness=3e5, mass=20.0, frame_mass=50.0, alpha=alpha)
     replay = Replay(oscillator, State.of(0.01, -0.02, 1.0, -3.0), 0.0, 0.02, 0.05)
     time = np.linspace(0.0, 0.1, 77)
-    np.testing.assert_allclose(integrated(replay, time)[:2], replay.motion(time)[:2], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(
+        integrated(replay, time)[:2], replay.motion(time)[:2], rtol=0, atol=1e-9
+    )
 
 
 def test_integration_of_times_before_the_switch_only() -> None:
     replay = Replay(paper.OSCILLATOR, paper.START, 0.0, 0.05, 0.06)
     time = np.array([0.0, 0.01])
-    np.testing.assert_allclose(integrated(replay, time).z, replay.reference(time).z, atol=1e-11)
+    np.testing.assert_allclose(
+        integrated(replay, time).z, replay.reference(time).z, atol=1e-11
+    )
 
 
-def test_the_figures_are_those_of_the_paper_and_their_columns_hold_all_they_show() -> None:
-    assert [exhibit.figure for exhibit in ALL.values()] == ["3", "4", "5", "6a-d", "7a", "7b", "section 5"]
+def test_the_figures_are_those_of_the_paper_and_their_columns_hold_all_they_show() -> (
+    None
+):
+    assert [exhibit.figure for exhibit in ALL.values()] == [
+        "3",
+        "4",
+        "5",
+        "6a-d",
+        "7a",
+        "7b",
+        "section 5",
+    ]
     for exhibit in ALL.values():
         assert len({values.shape for values in exhibit.columns.values()}) <= 1
         assert exhibit.paper
         assert exhibit.found
-        drawn = {curve.column for row in exhibit.panels for panel in row for curve in panel.curves}
-        drawn |= {curve.x for row in exhibit.panels for panel in row for curve in panel.curves if curve.x}
+        drawn = {
+            curve.column
+            for row in exhibit.panels
+            for panel in row
+            for curve in panel.curves
+        }
+        drawn |= {
+            curve.x
+            for row in exhibit.panels
+            for panel in row
+            for curve in panel.curves
+            if curve.x
+        }
         assert drawn <= {*exhibit.columns}
 
 
 def test_velocities_and_displacements_meet_those_integrated_numerically() -> None:
     columns = ALL["motion"].columns
     for name, unit in (("z", "m"), ("y", "m"), ("vz", "mps"), ("vy", "mps")):
-        away = np.abs(columns["time_ms"] - 6.0) > 1e-6  # at tr itself the states before and after the switch
+        away = (
+            np.abs(columns["time_ms"] - 6.0) > 1e-6
+        )  # at tr itself the states before and after the switch
         error = columns[f"{name}_other_{unit}"] - columns[f"{name}_closed_{unit}"]
         assert np.abs(error[away]).max() < 1e-7
 
@@ -98,16 +140,23 @@ def test_the_crossings_of_the_level_are_all_marked() -> None:
     (panel, near), *_ = ALL["level"].panels
     assert panel.levels[0][1] == pytest.approx(paper.ENERGY_TD)
     times = [time for time, _ in panel.points]
-    assert times == pytest.approx([*(time for time, _ in paper.CROSSINGS), 64.0], abs=1e-6)
+    assert times == pytest.approx(
+        [*(time for time, _ in paper.CROSSINGS), 64.0], abs=1e-6
+    )
     assert [time for _, time in near.marks] == pytest.approx([12.8852793630525, 13.0])
 
 
-def test_after_td_the_better_pair_continues_the_motion_and_the_published_one_does_not() -> None:
+def test_after_td_the_better_pair_continues_the_motion_and_the_published_one_does_not() -> (
+    None
+):
     columns = ALL["after-td"].columns
     after = columns["time_ms"] > 1e3 * paper.BETTER_TD
     wanted = columns["r_free_m"][after]
     np.testing.assert_allclose(columns["r_better_m"][after], wanted, atol=1e-12)
-    assert np.abs(columns["r_published_m"][after] - wanted).max() > 0.5 * np.abs(wanted).max()
+    assert (
+        np.abs(columns["r_published_m"][after] - wanted).max()
+        > 0.5 * np.abs(wanted).max()
+    )
     assert ALL["after-td"].agrees is False
     assert "92 %" in ALL["after-td"].found
 
@@ -116,28 +165,54 @@ def test_the_saving_is_predicted_beside_what_was_measured() -> None:
     for run_ in saving.RUNS:
         assert run_.by_cost == pytest.approx(run_.measured, abs=0.025)
     assert all(run_.by_count - run_.measured > 0.02 for run_ in saving.RUNS[:3])
-    assert sorted(saving.RUNS, key=lambda run_: run_.by_cost) == sorted(saving.RUNS, key=lambda run_: run_.measured)
+    assert sorted(saving.RUNS, key=lambda run_: run_.by_cost) == sorted(
+        saving.RUNS, key=lambda run_: run_.measured
+    )
 
 
 @pytest.mark.slow
 def test_the_figures_of_the_box_say_what_a_coarse_box_does() -> None:
     coarse = Parameters(mesh=4)
     every = tuple(box.variants_of(coarse))
-    some = (every[0], every[2], every[6], every[-1])  # two that act after td, two before
+    some = (
+        every[0],
+        every[2],
+        every[6],
+        every[-1],
+    )  # two that act after td, two before
     assert [one.before for one in some] == [False, False, True, True]
-    made = {exhibit.name: exhibit for exhibit in (make() for _, make in box.exhibits_of(coarse)[1:-1])}
+    made = {
+        exhibit.name: exhibit
+        for exhibit in (make() for _, make in box.exhibits_of(coarse)[1:-1])
+    }
     made["variants"] = box.exhibit_of(box.tried(some))
-    assert [exhibit.figure for exhibit in made.values()] == ["2a, b", "2c", "8", "section 4"]
+    assert [exhibit.figure for exhibit in made.values()] == [
+        "2a, b",
+        "2c",
+        "8",
+        "section 4",
+    ]
     assert made["early"].agrees
-    tr = next(name for name in made["revised"].columns if name.startswith("droll") and "70" not in name)
+    tr = next(
+        name
+        for name in made["revised"].columns
+        if name.startswith("droll") and "70" not in name
+    )
     at_td = np.searchsorted(made["revised"].columns["time_ms"], 370.0)
-    assert abs(made["revised"].columns[tr][at_td]) < abs(made["revised"].columns["droll_70_deg"][at_td])
+    assert abs(made["revised"].columns[tr][at_td]) < abs(
+        made["revised"].columns["droll_70_deg"][at_td]
+    )
     variants = made["variants"].columns
-    assert np.ptp(variants["own_tr_ms"][:2]) < 1e-9  # what acts after td leaves tr alone
+    assert (
+        np.ptp(variants["own_tr_ms"][:2]) < 1e-9
+    )  # what acts after td leaves tr alone
     assert np.ptp(variants["own_tr_ms"][2:]) > 0.1
     assert np.ptp(variants["common_tr_ms"]) == 0
     assert made["variants"].agrees
-    assert f"tr = {variants['common_tr_ms'][0]:.1f} ms is still acceptable in all 4" in made["variants"].found
+    assert (
+        f"tr = {variants['common_tr_ms'][0]:.1f} ms is still acceptable in all 4"
+        in made["variants"].found
+    )
     for exhibit in made.values():
         figure = draw_exhibit(exhibit)
         assert len(figure.axes) == sum(map(len, exhibit.panels))
@@ -146,22 +221,37 @@ def test_the_figures_of_the_box_say_what_a_coarse_box_does() -> None:
 @pytest.mark.slow
 def test_the_command_writes_figures_and_tables(tmp_path: Path) -> None:
     place, page = tmp_path / "new" / "paper", tmp_path / "paper.html"
-    sections = ("--section", "2", "--section", "3", "--section", "5", "--report", str(page))
+    sections = (
+        "--section",
+        "2",
+        "--section",
+        "3",
+        "--section",
+        "5",
+        "--report",
+        str(page),
+    )
     result = run("reproduce", "--output-dir", str(place), *sections, "--solver", RUN)
     assert result.exit_code == 0, result.stderr
     names = {path.name for path in place.iterdir()}
     drawn = ("masses", "response", "elements", "motion", "saving")
-    expected = {f"{name}.{form}" for name in drawn for form in ("svg", "png", "csv")} - {"masses.csv", "elements.csv"}
+    expected = {
+        f"{name}.{form}" for name in drawn for form in ("svg", "png", "csv")
+    } - {"masses.csv", "elements.csv"}
     assert names == expected | {"README.md", "table.csv"}
     assert all(misprint in unwrapped(result.stdout) for misprint in MISPRINTS)
     index = (place / "README.md").read_text("utf-8")
     assert all(f"{name}.svg" in index for name in drawn)
     assert page.read_text("utf-8").count("<figure>") == len(drawn)
     columns = np.genfromtxt(place / "response.csv", delimiter=",", names=True)
-    np.testing.assert_array_equal(columns["y_13_64_m"], ALL["response"].columns["y_13_64_m"])
+    np.testing.assert_array_equal(
+        columns["y_13_64_m"], ALL["response"].columns["y_13_64_m"]
+    )
 
 
-def test_without_the_repository_a_line_says_what_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_repository_a_line_says_what_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setitem(sys.modules, "validation.published", None)
     assert "reproduce needs the folder validation of the repository" in refused(
         "reproduce", "--output-dir", str(tmp_path / "paper")
@@ -169,16 +259,29 @@ def test_without_the_repository_a_line_says_what_is_missing(tmp_path: Path, monk
     assert not (tmp_path / "paper").exists()
 
 
-@pytest.mark.parametrize("form", ["table", *(pytest.param(one, marks=pytest.mark.slow) for one in PLAIN[1:])])
+@pytest.mark.parametrize(
+    "form", ["table", *(pytest.param(one, marks=pytest.mark.slow) for one in PLAIN[1:])]
+)
 def test_every_form_is_written(form: str, tmp_path: Path) -> None:
-    written = run("reproduce", "--section", "5", "--output-dir", str(tmp_path), "-f", form, env={"COLUMNS": "80"})
+    written = run(
+        "reproduce",
+        "--section",
+        "5",
+        "--output-dir",
+        str(tmp_path),
+        "-f",
+        form,
+        env={"COLUMNS": "80"},
+    )
     assert written.exit_code == 0, written.stderr
     assert written.stdout.strip()
     assert form != "table" or max(map(len, written.stdout.splitlines())) <= 80
 
 
 @pytest.mark.slow
-def test_its_files_are_the_same_every_time_and_replaced_only_when_told(tmp_path: Path) -> None:
+def test_its_files_are_the_same_every_time_and_replaced_only_when_told(
+    tmp_path: Path,
+) -> None:
     whole = ("reproduce", "--output-dir", str(tmp_path), "--section", "5")
     first = answer(*whole)
     check_by_schema(first)
@@ -190,10 +293,14 @@ def test_its_files_are_the_same_every_time_and_replaced_only_when_told(tmp_path:
     assert {name.rpartition("/")[2] for name in first["files"]} == {*before}
 
 
-def test_a_folder_that_cannot_be_made_is_an_error_that_says_what_to_do(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_made_is_an_error_that_says_what_to_do(
+    tmp_path: Path,
+) -> None:
     (tmp_path / "file").write_text("mine")
     for place in (tmp_path / "file", tmp_path / "file" / "paper"):
-        assert "the folder cannot be created" in refused("reproduce", "--output-dir", str(place))
+        assert "the folder cannot be created" in refused(
+            "reproduce", "--output-dir", str(place)
+        )
 
 
 def test_all_states_that_were_computed_with_40_digits_are_in_the_table() -> None:
@@ -205,19 +312,35 @@ def test_all_states_that_were_computed_with_40_digits_are_in_the_table() -> None
 
 def test_a_solver_s_table_without_its_columns_is_refused(tmp_path: Path) -> None:
     assert "reference_m" in refused(
-        "reproduce", "--output-dir", str(tmp_path / "paper"), "--section", "3", "--solver", ENERGY
+        "reproduce",
+        "--output-dir",
+        str(tmp_path / "paper"),
+        "--section",
+        "3",
+        "--solver",
+        ENERGY,
     )
 
 
 def test_the_samples_of_the_solver_are_near_the_closed_form() -> None:
-    tables = {kind: named_columns(name) for kind, name in (("pairs", SOLVER), ("run", RUN))}
-    made = {exhibit.name: exhibit for exhibit in (make() for _, make in exhibits.exhibits_of(tables))}
+    tables = {
+        kind: named_columns(name) for kind, name in (("pairs", SOLVER), ("run", RUN))
+    }
+    made = {
+        exhibit.name: exhibit
+        for exhibit in (make() for _, make in exhibits.exhibits_of(tables))
+    }
     pairs, motion = made["solver"].columns, made["motion"].columns
     scale = np.abs(pairs["reference_solver_m"]).max()
     for name in ("published", "better"):
-        assert np.abs(pairs[f"{name}_solver_m"] - pairs[f"{name}_m"]).max() < 0.004 * scale
+        assert (
+            np.abs(pairs[f"{name}_solver_m"] - pairs[f"{name}_m"]).max() < 0.004 * scale
+        )
     for name in ("z", "y"):
-        assert np.abs(motion[f"{name}_other_m"] - motion[f"{name}_closed_m"]).max() < 1e-4 * 0.053
+        assert (
+            np.abs(motion[f"{name}_other_m"] - motion[f"{name}_closed_m"]).max()
+            < 1e-4 * 0.053
+        )
     assert made["motion"].agrees
 
 

@@ -17,7 +17,9 @@ TD = 0.068753
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_a_deck_is_a_starter_deck_with_the_main_node_of_its_rigid_body(name: str) -> None:
+def test_a_deck_is_a_starter_deck_with_the_main_node_of_its_rigid_body(
+    name: str,
+) -> None:
     deck = MODELS[name].deck().decode()
     assert deck.startswith("#RADIOSS STARTER")
     assert re.search(rf"/RBODY/1\n.*\n *{MODELS[name].main} ", deck)
@@ -30,10 +32,16 @@ def test_a_deck_is_a_starter_deck_with_the_main_node_of_its_rigid_body(name: str
         ([], ["0.15"], [False]),
         ([(0.01, 0.05)], ["0.01", "0.05", "0.15"], [False, True, False]),
         ([(0.0, 0.05)], ["0.05", "0.15"], [True, False]),
-        ([(0.01, 0.05), (0.07, 0.08)], ["0.01", "0.05", "0.07", "0.08", "0.15"], [False, True, False, True, False]),
+        (
+            [(0.01, 0.05), (0.07, 0.08)],
+            ["0.01", "0.05", "0.07", "0.08", "0.15"],
+            [False, True, False, True, False],
+        ),
     ],
 )
-def test_the_legs_follow_the_windows(windows: list[tuple[float, float]], ends: list[str], rigid: list[bool]) -> None:
+def test_the_legs_follow_the_windows(
+    windows: list[tuple[float, float]], ends: list[str], rigid: list[bool]
+) -> None:
     legs = list(MODELS["OSC"].legs(windows))
     assert [leg.splitlines()[1] for leg in legs] == ends
     assert ["/DTIX" in leg for leg in legs] == rigid
@@ -41,7 +49,9 @@ def test_the_legs_follow_the_windows(windows: list[tuple[float, float]], ends: l
     assert ["/INIV" in leg for leg in legs] == [True] + [False] * (len(legs) - 1)
 
 
-def test_a_run_that_is_its_own_reference_has_no_deviation_and_a_late_landing_is_seen() -> None:
+def test_a_run_that_is_its_own_reference_has_no_deviation_and_a_late_landing_is_seen() -> (
+    None
+):
     time = np.linspace(0, 1, 1001)
     reference = Run(time, 1 + np.sin(30 * time) ** 2, np.maximum(time - 0.8, 0.0))
     found = compare(reference, reference, 0.5)
@@ -50,18 +60,26 @@ def test_a_run_that_is_its_own_reference_has_no_deviation_and_a_late_landing_is_
     assert found.landing == pytest.approx(0.801, abs=1e-3)
     falling = reference._replace(internal=np.where(time < 0.81, 1e-18, 1.0))
     assert compare(falling, falling, 0.5).deviation is None
-    late = compare(reference, reference._replace(contact=np.maximum(time - 0.81, 0.0)), 0.5)
+    late = compare(
+        reference, reference._replace(contact=np.maximum(time - 0.81, 0.0)), 0.5
+    )
     assert late.shifts == pytest.approx([0.01], abs=1e-3)
 
 
 @pytest.mark.parametrize("name", FIGURES)
-def test_every_figure_is_drawn_from_the_results_and_shown_in_the_docs(name: str) -> None:
+def test_every_figure_is_drawn_from_the_results_and_shown_in_the_docs(
+    name: str,
+) -> None:
     assert all(axes.lines or axes.patches for axes in FIGURES[name]().axes)
-    assert f"validation/{name}.png" in (ROOT / "docs" / "validation.md").read_text("utf-8")
+    assert f"validation/{name}.png" in (ROOT / "docs" / "validation.md").read_text(
+        "utf-8"
+    )
     assert (ROOT / "docs" / "validation" / f"{name}.png").is_file()
 
 
-@pytest.mark.skipif("OPENRADIOSS_PATH" not in os.environ, reason="OPENRADIOSS_PATH names no solver")
+@pytest.mark.skipif(
+    "OPENRADIOSS_PATH" not in os.environ, reason="OPENRADIOSS_PATH names no solver"
+)
 def test_the_solver_confirms_the_better_pair_of_the_oscillator(tmp_path: Path) -> None:
     solver = Path(os.environ["OPENRADIOSS_PATH"])
     reference, switched = (
@@ -74,19 +92,31 @@ def test_the_solver_confirms_the_better_pair_of_the_oscillator(tmp_path: Path) -
     assert found.mean_ratio == pytest.approx(1.0, abs=0.02)
 
 
-def test_the_landings_of_plans_that_the_docs_sum_up_are_those_of_the_results_and_after_td() -> None:
+def test_the_landings_of_plans_that_the_docs_sum_up_are_those_of_the_results_and_after_td() -> (
+    None
+):
     rows = table("drop_plans")
     docs = (ROOT / "docs" / "validation.md").read_text("utf-8")
     assert np.all(rows["td_s"] < rows["landing_s"])
     assert np.all(rows["tr_s"] < rows["td_s"])
     number = r"\**([-+]?[\d.]+)\**"
     listed = re.findall(
-        rf"^\| `(DROP\d)` \| (\d) \| {' [|] '.join([f'{number} to {number}'] * 3)} \|", docs, re.MULTILINE
+        rf"^\| `(DROP\d)` \| (\d) \| {' [|] '.join([f'{number} to {number}'] * 3)} \|",
+        docs,
+        re.MULTILINE,
     )
     assert [box for box, *_ in listed] == sorted({*rows["model"]})
     for box, windows, *ranges in listed:
         of_box = rows[rows["model"] == box]
         assert int(windows) == len(of_box)
-        columns = [of_box["margin_s"], *(of_box["landing_s"] - of_box[name] for name in ("landing_planned_s", "td_s"))]
-        wanted = [1e3 * limit for column in columns for limit in (column.min(), column.max())]
+        columns = [
+            of_box["margin_s"],
+            *(
+                of_box["landing_s"] - of_box[name]
+                for name in ("landing_planned_s", "td_s")
+            ),
+        ]
+        wanted = [
+            1e3 * limit for column in columns for limit in (column.min(), column.max())
+        ]
         assert [float(limit) for limit in ranges] == pytest.approx(wanted, abs=0.051)

@@ -17,9 +17,19 @@ from validation import vibration
 from validation.figures import RESULTS, absorbing_parts, table
 from validation.frame_deck import PARTS, Landing, mesh_frame, write_deck
 from validation.landing import Course, compare_landings
-from validation.nodes import Motion, Nodes, compare_vibration, read_nodes, remove_rigid_motion, vibration_energy
+from validation.nodes import (
+    Motion,
+    Nodes,
+    compare_vibration,
+    read_nodes,
+    remove_rigid_motion,
+    vibration_energy,
+)
 
-NODES = Nodes(np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3], [1, 1, 1]]), np.array([1.0, 2, 3, 4, 5]))
+NODES = Nodes(
+    np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3], [1, 1, 1]]),
+    np.array([1.0, 2, 3, 4, 5]),
+)
 TIMES = np.linspace(0.0, 1.0, 7)
 VECTORS = arrays(float, 3, elements=st.floats(-5, 5, allow_nan=False))
 SWITCHED = table("vibration")[~np.isnan(table("vibration")["tr_s"])]
@@ -31,14 +41,22 @@ DOCS = (ROOT / "docs" / "validation.md").read_text("utf-8")
 def moving(velocities: np.ndarray) -> Motion:
     """Nodes at their places with constant velocities."""
     return Motion(
-        TIMES, *(np.broadcast_to(values, (TIMES.size, *values.shape)) for values in (NODES.places, velocities))
+        TIMES,
+        *(
+            np.broadcast_to(values, (TIMES.size, *values.shape))
+            for values in (NODES.places, velocities)
+        ),
     )
 
 
 @given(VECTORS, VECTORS)
-def test_a_rigid_motion_has_no_vibration(translation: np.ndarray, spin: np.ndarray) -> None:
+def test_a_rigid_motion_has_no_vibration(
+    translation: np.ndarray, spin: np.ndarray
+) -> None:
     velocities = translation + np.cross(spin, NODES.places)
-    np.testing.assert_allclose(remove_rigid_motion(moving(velocities), NODES), 0.0, atol=1e-12)
+    np.testing.assert_allclose(
+        remove_rigid_motion(moving(velocities), NODES), 0.0, atol=1e-12
+    )
 
 
 @given(arrays(float, (5, 3), elements=st.floats(-5, 5)), VECTORS, VECTORS)
@@ -46,39 +64,66 @@ def test_what_is_left_has_no_momentum_and_does_not_depend_on_the_rigid_motion(
     velocities: np.ndarray, translation: np.ndarray, spin: np.ndarray
 ) -> None:
     left = remove_rigid_motion(moving(velocities), NODES)
-    np.testing.assert_allclose(np.einsum("n,tnx->tx", NODES.masses, left), 0.0, atol=1e-10)
+    np.testing.assert_allclose(
+        np.einsum("n,tnx->tx", NODES.masses, left), 0.0, atol=1e-10
+    )
     angular = np.einsum("n,tnx->tx", NODES.masses, np.cross(NODES.places, left))
     np.testing.assert_allclose(angular, 0.0, atol=1e-10)
     faster = moving(velocities + translation + np.cross(spin, NODES.places))
     np.testing.assert_allclose(remove_rigid_motion(faster, NODES), left, atol=1e-10)
 
 
-@pytest.mark.parametrize(("factor", "residual", "correlation"), [(1.0, 0.0, 1.0), (-1.0, 2.0, -1.0), (0.5, 0.5, 1.0)])
-def test_a_scaled_vibration_has_the_residual_of_its_factor(factor: float, residual: float, correlation: float) -> None:
+@pytest.mark.parametrize(
+    ("factor", "residual", "correlation"),
+    [(1.0, 0.0, 1.0), (-1.0, 2.0, -1.0), (0.5, 0.5, 1.0)],
+)
+def test_a_scaled_vibration_has_the_residual_of_its_factor(
+    factor: float, residual: float, correlation: float
+) -> None:
     velocities = np.random.default_rng(47).normal(size=(5, 3))
-    found = compare_vibration(moving(velocities), moving(factor * velocities + (1.0, 2.0, 3.0)), NODES)
+    found = compare_vibration(
+        moving(velocities), moving(factor * velocities + (1.0, 2.0, 3.0)), NODES
+    )
     assert found == pytest.approx((residual, correlation), abs=1e-12)
 
 
-def test_the_vibration_energy_is_twice_the_kinetic_energy_without_the_rigid_motion() -> None:
+def test_the_vibration_energy_is_twice_the_kinetic_energy_without_the_rigid_motion() -> (
+    None
+):
     stretching = np.zeros((5, 3))
-    stretching[1], stretching[0] = (1.0, 0.0, 0.0), (-2.0, 0.0, 0.0)  # on one line, with no momentum
-    assert vibration_energy(moving(stretching + np.array([0.0, 0.0, 7.0])), NODES) == pytest.approx(1 * 4 + 2 * 1)
+    stretching[1], stretching[0] = (
+        (1.0, 0.0, 0.0),
+        (-2.0, 0.0, 0.0),
+    )  # on one line, with no momentum
+    assert vibration_energy(
+        moving(stretching + np.array([0.0, 0.0, 7.0])), NODES
+    ) == pytest.approx(1 * 4 + 2 * 1)
 
 
-def test_a_landing_compared_with_itself_differs_in_nothing_and_one_with_more_energy_does() -> None:
+def test_a_landing_compared_with_itself_differs_in_nothing_and_one_with_more_energy_does() -> (
+    None
+):
     energies = np.linspace([0.0, 0.0], [10.0, 20.0], 50)
     course = Course(0.1, energies, np.zeros(2), np.array([0.0, 0.0, 3.0]), NODES.places)
     same = compare_landings(course, course, ["parts"], NODES)
     assert same[1:] == pytest.approx((0.0, 0.0, 0.0, 0.0), abs=1e-5)
-    assert all(difference[:3] == (0.0, 0.0, 0.0) for difference in same.energies.values())
-    harder = course._replace(landing=0.2, energies=1.1 * energies, impulse=2 * course.impulse, places=NODES.places + 1)
+    assert all(
+        difference[:3] == (0.0, 0.0, 0.0) for difference in same.energies.values()
+    )
+    harder = course._replace(
+        landing=0.2,
+        energies=1.1 * energies,
+        impulse=2 * course.impulse,
+        places=NODES.places + 1,
+    )
     found = compare_landings(course, harder, ["parts"], NODES)
     assert found[1:] == pytest.approx((0.1, 1.0, 3**0.5, 0.0), abs=1e-5)
     assert found.energies["parts"] == pytest.approx((0.058, 0.1, 0.09, 10.0), abs=1e-3)
 
 
-def test_the_frame_is_read_with_the_mass_of_its_cards_and_all_its_nodes(tmp_path: Path) -> None:
+def test_the_frame_is_read_with_the_mass_of_its_cards_and_all_its_nodes(
+    tmp_path: Path,
+) -> None:
     deck = tmp_path / "FRAME_0000.rad"
     deck.write_text(write_deck(Landing(2.5, 0.1)))
     inventory = read_inventory(str(deck))
@@ -91,15 +136,23 @@ def test_the_frame_is_read_with_the_mass_of_its_cards_and_all_its_nodes(tmp_path
     assert nodes.masses.sum() == pytest.approx(beams + plates + feet, rel=1e-6)
     assert (nodes.masses > 0).all()
     ground = inventory.coordinates[inventory.nodes_by_part[5]]
-    assert nodes.places[:, 2].min() - ground[:, 2].max() == pytest.approx(2.5 * 0.1 + 1e-3)
+    assert nodes.places[:, 2].min() - ground[:, 2].max() == pytest.approx(
+        2.5 * 0.1 + 1e-3
+    )
 
 
-def test_the_rollover_is_switched_whole_and_writes_all_its_nodes(tmp_path: Path) -> None:
+def test_the_rollover_is_switched_whole_and_writes_all_its_nodes(
+    tmp_path: Path,
+) -> None:
     deck = tmp_path / "ROLL_0000.rad"
     deck.write_bytes(vibration.CASES["ROLL"].model.deck())
     plain = tmp_path / "plain" / "ROLL_0000.rad"
     plain.parent.mkdir()
-    plain.write_bytes(gzip.decompress((ROOT / "validation" / "decks" / "ROLL_0000.rad.gz").read_bytes()))
+    plain.write_bytes(
+        gzip.decompress(
+            (ROOT / "validation" / "decks" / "ROLL_0000.rad.gz").read_bytes()
+        )
+    )
     whole, box = (read_inventory(str(path)) for path in (deck, plain))
     assert [body for body in box.ready if body] == [{1}, {3}]
     assert [body for body in whole.ready if body] == [{1, 2}, {3}]
@@ -107,7 +160,9 @@ def test_the_rollover_is_switched_whole_and_writes_all_its_nodes(tmp_path: Path)
     np.testing.assert_array_equal(np.sort(whole.watched), own)
 
 
-@pytest.mark.parametrize(("name", "group", "mass"), [("CAR", 4, 856.32075), ("ROLL", 2, 409.77001)])
+@pytest.mark.parametrize(
+    ("name", "group", "mass"), [("CAR", 4, 856.32075), ("ROLL", 2, 409.77001)]
+)
 def test_the_nodes_have_the_mass_that_the_solver_gives_the_switched_parts(
     tmp_path: Path, name: str, group: int, mass: float
 ) -> None:
@@ -133,12 +188,19 @@ def test_every_residual_of_the_nodes_is_near_the_predicted_one() -> None:
     assert off[TOTALS["case"] == "ROLL"].max() < 0.045
 
 
-@pytest.mark.parametrize(("case", "best"), [("FRAME", 0.3), pytest.param("ROLL", 0.65, marks=pytest.mark.slow)])
-def test_the_histories_of_the_references_give_the_residuals_of_the_results(case: str, best: float) -> None:
+@pytest.mark.parametrize(
+    ("case", "best"),
+    [("FRAME", 0.3), pytest.param("ROLL", 0.65, marks=pytest.mark.slow)],
+)
+def test_the_histories_of_the_references_give_the_residuals_of_the_results(
+    case: str, best: float
+) -> None:
     reference = d2rpick.read(RESULTS / f"{case.lower()}_reference.csv")
     rows = TOTALS[TOTALS["case"] == case]
     for row in (rows[0], rows[-1]):
-        verdict = d2rpick.verify(reference, tr=float(row["tr_s"]), td=float(row["td_s"])).to_dict()
+        verdict = d2rpick.verify(
+            reference, tr=float(row["tr_s"]), td=float(row["td_s"])
+        ).to_dict()
         assert verdict["basis"] == "modal"
         assert verdict["residual"] == pytest.approx(row["R_predicted"], abs=0.02)
     chosen = d2rpick.suggest(reference).recommended
@@ -147,7 +209,9 @@ def test_the_histories_of_the_references_give_the_residuals_of_the_results(case:
     assert chosen.residual < best
 
 
-def test_energies_after_the_landing_differ_with_the_root_of_the_worth_as_the_docs_say() -> None:
+def test_energies_after_the_landing_differ_with_the_root_of_the_worth_as_the_docs_say() -> (
+    None
+):
     root = np.sqrt(TOTALS["worth"])
     assert (TOTALS["rms"] <= 0.31 * root).all()
     assert (np.abs(TOTALS["peak"]) <= 0.52 * root).all()
@@ -155,22 +219,42 @@ def test_energies_after_the_landing_differ_with_the_root_of_the_worth_as_the_doc
     assert (parts["rms"] <= 1.6 * np.sqrt(parts["worth"])).all()
     for limit, rms, peak in ((0.01, 0.0205, 0.04), (0.05, 0.0605, 0.1005)):
         below = TOTALS[TOTALS["worth"] < limit]
-        assert (below["rms"].max() < rms, np.abs(below["peak"]).max() < peak) == (True, True)
+        assert (below["rms"].max() < rms, np.abs(below["peak"]).max() < peak) == (
+            True,
+            True,
+        )
     known = TOTALS[~np.isnan(TOTALS["R_predicted"])]
     assert (known["R_nodes"] <= known["R_high"]).all()
 
 
 def test_the_docs_show_what_differs_after_the_landing_by_the_worth() -> None:
     number = r"([\d.]+) to ([\d.]+)"
-    rows = re.findall(rf"^\| {number} % \| (\d) \| {' [|] '.join([number] * 5)} \|$", DOCS, re.MULTILINE)
+    rows = re.findall(
+        rf"^\| {number} % \| (\d) \| {' [|] '.join([number] * 5)} \|$",
+        DOCS,
+        re.MULTILINE,
+    )
     assert len(rows) == 5
     for low, high, count, *ranges in rows:
-        inside = (100 * TOTALS["worth"] >= float(low)) & (100 * TOTALS["worth"] < float(high))
+        inside = (100 * TOTALS["worth"] >= float(low)) & (
+            100 * TOTALS["worth"] < float(high)
+        )
         totals = TOTALS[inside]
         assert int(count) == len(totals)
-        worst = [SWITCHED["rms"][PARTS_OF_LANDING & (SWITCHED["worth"] == worth)].max() for worth in totals["worth"]]
-        columns = [totals["rms"], np.abs(totals["peak"]), np.array(worst), totals["impulse"], 10 * totals["place_m"]]
-        wanted = [100 * limit for column in columns for limit in (column.min(), column.max())]
+        worst = [
+            SWITCHED["rms"][PARTS_OF_LANDING & (SWITCHED["worth"] == worth)].max()
+            for worth in totals["worth"]
+        ]
+        columns = [
+            totals["rms"],
+            np.abs(totals["peak"]),
+            np.array(worst),
+            totals["impulse"],
+            10 * totals["place_m"],
+        ]
+        wanted = [
+            100 * limit for column in columns for limit in (column.min(), column.max())
+        ]
         assert [float(limit) for limit in ranges] == pytest.approx(wanted, abs=0.051)
 
 
@@ -181,9 +265,13 @@ def test_the_docs_show_the_residuals_of_the_results() -> None:
     assert len(rows) == 7
     for case, *texts in rows:
         tr, td, *values = map(float, texts)
-        near = (np.abs(1e3 * TOTALS["tr_s"] - tr) < 1e-3) & (np.abs(1e3 * TOTALS["td_s"] - td) < 1e-3)
+        near = (np.abs(1e3 * TOTALS["tr_s"] - tr) < 1e-3) & (
+            np.abs(1e3 * TOTALS["td_s"] - td) < 1e-3
+        )
         (row,) = TOTALS[(TOTALS["case"] == case) & near]
-        assert values == pytest.approx([row[name] for name in ("R_predicted", "R_nodes", "correlation")], abs=6e-3)
+        assert values == pytest.approx(
+            [row[name] for name in ("R_predicted", "R_nodes", "correlation")], abs=6e-3
+        )
 
 
 def test_the_mean_energies_of_the_frame_lie_in_the_announced_interval() -> None:
@@ -192,5 +280,8 @@ def test_the_mean_energies_of_the_frame_lie_in_the_announced_interval() -> None:
     )
     assert inside[np.char.startswith(TOTALS["case"], "FRAME")].all()
     box = TOTALS[TOTALS["case"] == "ROLL"]
-    too_narrow = np.maximum(box["mean_energy_low"] - box["mean_energy"], box["mean_energy"] - box["mean_energy_high"])
+    too_narrow = np.maximum(
+        box["mean_energy_low"] - box["mean_energy"],
+        box["mean_energy"] - box["mean_energy_high"],
+    )
     assert too_narrow.max() < 0.0035

@@ -21,7 +21,9 @@ class LinearStructure(NamedTuple):
     def draw(cls, seed: int, count: int) -> LinearStructure:
         """Draw modes of their own damping."""
         random = np.random.default_rng(seed)
-        rate = 2 * np.pi * np.cumprod(np.append(1.0, random.uniform(1.2, 1.7, count - 1)))
+        rate = (
+            2 * np.pi * np.cumprod(np.append(1.0, random.uniform(1.2, 1.7, count - 1)))
+        )
         return cls(
             np.exp(random.uniform(-1.5, 0.0, count)),
             random.uniform(0.0, 0.02, count) * rate,
@@ -32,15 +34,24 @@ class LinearStructure(NamedTuple):
     def deformations(self, time: Samples | float) -> Samples:
         """Deformation of each mode, of the shape of ``time`` with an axis for modes before it."""
         reach = np.asarray(time)[np.newaxis]
-        decay = self.amplitude[:, np.newaxis] * np.exp(-self.damping[:, np.newaxis] * reach)
-        return np.asarray(decay * np.cos(self.rate[:, np.newaxis] * reach + self.phase[:, np.newaxis]))
+        decay = self.amplitude[:, np.newaxis] * np.exp(
+            -self.damping[:, np.newaxis] * reach
+        )
+        return np.asarray(
+            decay * np.cos(self.rate[:, np.newaxis] * reach + self.phase[:, np.newaxis])
+        )
 
     def kinetic_energies(self, time: Samples | float) -> Samples:
         """Kinetic energy of each mode, of the shape of `deformations`."""
         reach = np.asarray(time)[np.newaxis]
         angle = self.rate[:, np.newaxis] * reach + self.phase[:, np.newaxis]
-        decay = self.amplitude[:, np.newaxis] * np.exp(-self.damping[:, np.newaxis] * reach)
-        speed = decay * (self.rate[:, np.newaxis] * np.sin(angle) + self.damping[:, np.newaxis] * np.cos(angle))
+        decay = self.amplitude[:, np.newaxis] * np.exp(
+            -self.damping[:, np.newaxis] * reach
+        )
+        speed = decay * (
+            self.rate[:, np.newaxis] * np.sin(angle)
+            + self.damping[:, np.newaxis] * np.cos(angle)
+        )
         undamped = np.hypot(self.rate, self.damping)[:, np.newaxis]
         return np.asarray((speed / undamped) ** 2)
 

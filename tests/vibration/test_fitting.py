@@ -36,10 +36,16 @@ def test_a_vibration_is_structure_and_white_noise_is_none() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scatter", [0.0, 0.05, 0.3])
-def test_a_part_of_the_samples_refuses_only_what_all_of_them_refuse(scatter: float) -> None:
+def test_a_part_of_the_samples_refuses_only_what_all_of_them_refuse(
+    scatter: float,
+) -> None:
     one = np.exp(-S) * np.sin(20 * S) ** 2 + scatter * noise(S.size) / 4
     two = one + 0.7 * np.exp(-S) * np.cos(33 * S) ** 2
-    many = two + 0.6 * np.exp(-S) * np.sin(57 * S) ** 2 + 0.5 * np.exp(-S) * np.sin(91 * S) ** 2
+    many = (
+        two
+        + 0.6 * np.exp(-S) * np.sin(57 * S) ** 2
+        + 0.5 * np.exp(-S) * np.sin(91 * S) ** 2
+    )
     for energy in (one, two, many):
         quick, full = identify(S, energy, quick=True), identify(S, energy)
         assert quick.describes_record == full.describes_record
@@ -48,11 +54,20 @@ def test_a_part_of_the_samples_refuses_only_what_all_of_them_refuse(scatter: flo
 
 
 @pytest.mark.parametrize("scatter", [0.0, 0.1, 0.3])
-@pytest.mark.parametrize(("preload", "plastic"), [(0.0, 0.0), (0.0, 2.0), (0.7, 0.3), (4.0, 0.0)])
-def test_no_single_oscillator_is_hopeless_and_five_modes_are(preload: float, plastic: float, scatter: float) -> None:
+@pytest.mark.parametrize(
+    ("preload", "plastic"), [(0.0, 0.0), (0.0, 2.0), (0.7, 0.3), (4.0, 0.0)]
+)
+def test_no_single_oscillator_is_hopeless_and_five_modes_are(
+    preload: float, plastic: float, scatter: float
+) -> None:
     def gives_up(energy: np.ndarray) -> bool:
-        noisy = energy / np.ptp(energy) + scatter * float(np.std(energy / np.ptp(energy))) * noise(S.size)
-        return fit_few(Pencil.of(S, noisy).rates(), S, noisy, WITH_PRELOAD, HOPELESS) is None
+        noisy = energy / np.ptp(energy) + scatter * float(
+            np.std(energy / np.ptp(energy))
+        ) * noise(S.size)
+        return (
+            fit_few(Pencil.of(S, noisy).rates(), S, noisy, WITH_PRELOAD, HOPELESS)
+            is None
+        )
 
     assert not any(
         gives_up(plastic + (preload + np.exp(-S / 2) * np.sin(rate * S + phase)) ** 2)
@@ -60,20 +75,32 @@ def test_no_single_oscillator_is_hopeless_and_five_modes_are(preload: float, pla
         for phase in (0.0, 2.0)
     )
     rates = 2 * np.pi * np.array([15.5, 28.5, 46.5, 69.5, 106.0])
-    assert gives_up(np.sum(np.sin(rates[:, np.newaxis] * S + np.arange(5)[:, np.newaxis]) ** 2, axis=0))
+    assert gives_up(
+        np.sum(
+            np.sin(rates[:, np.newaxis] * S + np.arange(5)[:, np.newaxis]) ** 2, axis=0
+        )
+    )
 
 
 def test_a_fit_that_leaves_another_mode_fails_early() -> None:
     one = np.exp(-S) * np.sin(20 * S) ** 2
-    for share, follows in ((0.0, True), (0.05, False), (0.1, False)):  # of the last four hundred samples show enough
+    for share, follows in (
+        (0.0, True),
+        (0.05, False),
+        (0.1, False),
+    ):  # of the last four hundred samples show enough
         two = one + share * np.exp(-S) * np.sin(33 * S) ** 2
         poles = Pencil.of(S, two).rates()
         few = fit_few(poles, S, two, VIBRATION, HOPELESS)
         assert (fit(few, S, two, VIBRATION, HOPELESS) is not None) == follows
-        assert fit(few, S[:1500], two[:1500], VIBRATION) is not None  # asked for its misfit, none is held back
+        assert (
+            fit(few, S[:1500], two[:1500], VIBRATION) is not None
+        )  # asked for its misfit, none is held back
 
 
-def test_a_fit_that_leaves_far_too_much_is_not_brought_to_its_best_for_all_samples() -> None:
+def test_a_fit_that_leaves_far_too_much_is_not_brought_to_its_best_for_all_samples() -> (
+    None
+):
     asked = []
 
     def model(parameters: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -81,7 +108,10 @@ def test_a_fit_that_leaves_far_too_much_is_not_brought_to_its_best_for_all_sampl
         return energy_and_jacobian(parameters, s, VIBRATION)
 
     start = np.array([20.0, 1.0, 0.7, 0.7, 0.0, 0.0])
-    for energy, all_of_them in ((noise(S.size), False), (energy_and_jacobian(start, S, VIBRATION)[0], True)):
+    for energy, all_of_them in (
+        (noise(S.size), False),
+        (energy_and_jacobian(start, S, VIBRATION)[0], True),
+    ):
         asked.clear()
         fit_all(start, model, S, energy, np.inf, slice(1))
         assert (sum(asked) > 10 * S.size / 8 and max(asked) > 2048) == all_of_them

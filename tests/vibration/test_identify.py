@@ -32,33 +32,66 @@ def refused(time: Samples, energy: Samples) -> str:
 
 
 def parameters(mode: Mode) -> Samples:
-    return np.array([mode.omega, mode.alpha, mode.cosine, mode.sine, mode.energy_plastic, mode.preload])
+    return np.array(
+        [
+            mode.omega,
+            mode.alpha,
+            mode.cosine,
+            mode.sine,
+            mode.energy_plastic,
+            mode.preload,
+        ]
+    )
 
 
 def random_record(seed: int, second: float = 0.0) -> tuple[Samples, Samples, Mode]:
     """Valid record of 2-20 periods; ``second`` adds a mode with that share of the first one's energy."""
     rng = np.random.default_rng(seed)
-    periods, density = np.exp(rng.uniform(np.log(2), np.log(20))), np.exp(rng.uniform(np.log(12), np.log(60)))
+    periods, density = (
+        np.exp(rng.uniform(np.log(2), np.log(20))),
+        np.exp(rng.uniform(np.log(12), np.log(60))),
+    )
     omega = np.exp(rng.uniform(-3, 8))
     span, size = periods * 2 * np.pi / omega, int(2 * periods * density) + 1
     alpha = min(rng.choice([0.0, rng.uniform(0, 0.3)]) * omega, 12 / span)
-    start, swing, phase = rng.uniform(0, 2) * span, np.exp(rng.uniform(-5, 5)), rng.uniform(0, 2 * np.pi)
+    start, swing, phase = (
+        rng.uniform(0, 2) * span,
+        np.exp(rng.uniform(-5, 5)),
+        rng.uniform(0, 2 * np.pi),
+    )
     plastic = rng.choice([0.0, rng.uniform(0.05, 0.5)]) * swing**2 * (second == 0)
     preload = rng.choice([0.0, rng.uniform(0.05, 0.5)]) * swing * (second == 0)
     time = start + np.linspace(0, span, size)
-    time[1:-1] += rng.choice([0.0, 0.2]) * rng.uniform(-1, 1, size - 2) * span / (size - 1)
-    mode = Mode(omega, alpha, swing * np.cos(phase), swing * np.sin(phase), start, plastic, preload)
+    time[1:-1] += (
+        rng.choice([0.0, 0.2]) * rng.uniform(-1, 1, size - 2) * span / (size - 1)
+    )
+    mode = Mode(
+        omega,
+        alpha,
+        swing * np.cos(phase),
+        swing * np.sin(phase),
+        start,
+        plastic,
+        preload,
+    )
     energy = mode.energy(time)
     if second:
-        other, turn = omega * np.exp(rng.uniform(np.log(0.25), np.log(4))), rng.uniform(0, 2 * np.pi)
+        other, turn = (
+            omega * np.exp(rng.uniform(np.log(0.25), np.log(4))),
+            rng.uniform(0, 2 * np.pi),
+        )
         root = swing * second**0.5
-        energy = energy + Mode(other, alpha, root * np.cos(turn), root * np.sin(turn), start).energy(time)
+        energy = energy + Mode(
+            other, alpha, root * np.cos(turn), root * np.sin(turn), start
+        ).energy(time)
     return time, noisy(energy, rng.choice([0.0, rng.uniform(0, 0.02)]), seed), mode
 
 
 def test_a_clean_record_gives_all_parameters() -> None:
     found, mode = accepted(TIME, ENERGY)
-    np.testing.assert_allclose(np.abs(parameters(mode)), np.abs(parameters(MODE)), rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(
+        np.abs(parameters(mode)), np.abs(parameters(MODE)), rtol=1e-10, atol=1e-10
+    )
     assert (found.start, found.end) == (0.0, 0.15)
     assert found.misfit == pytest.approx(0.0, abs=1e-12)
 
@@ -73,8 +106,13 @@ def test_a_clean_record_gives_all_parameters() -> None:
     ],
     ids=["clean", "6 digits", "1 % noise"],
 )
-def test_95_percent_of_the_seeds_find_omega_within_the_bound(record: Callable[[int], Samples], bound: float) -> None:
-    errors = [abs(accepted(TIME, record(seed))[1].omega / MODE.omega - 1) for seed in range(40)]
+def test_95_percent_of_the_seeds_find_omega_within_the_bound(
+    record: Callable[[int], Samples], bound: float
+) -> None:
+    errors = [
+        abs(accepted(TIME, record(seed))[1].omega / MODE.omega - 1)
+        for seed in range(40)
+    ]
     assert np.percentile(errors, 95) < bound
 
 
@@ -83,10 +121,14 @@ def test_least_squares_of_scipy_from_the_truth_ends_at_the_same_mode(seed: int) 
     energy = noisy(ENERGY, 0.01, seed)
     found, mode = accepted(TIME, energy)
     truth = parameters(MODE)[:4]
-    best = least_squares(lambda p: vibration(p).energy(TIME) - energy, truth, x_scale=[1, 1, 0.1, 0.1])
+    best = least_squares(
+        lambda p: vibration(p).energy(TIME) - energy, truth, x_scale=[1, 1, 0.1, 0.1]
+    )
     sign = np.sign(mode.sine * best.x[3])  # q and -q make the same energy
     ours = parameters(mode)[:4] * [1, 1, sign, sign]
-    np.testing.assert_allclose(ours, best.x, atol=1e-3 * np.sqrt(np.diag(found.covariance)).max(), rtol=1e-5)
+    np.testing.assert_allclose(
+        ours, best.x, atol=1e-3 * np.sqrt(np.diag(found.covariance)).max(), rtol=1e-5
+    )
     assert found.rms**2 * TIME.size <= 2 * best.cost * (1 + 1e-9)
 
 
@@ -106,9 +148,13 @@ def test_two_modes_are_taken_for_one_in_at_most_5_percent() -> None:
 
 
 @given(
-    st.floats(-1e3, 1e3), st.floats(-6, 6).map(lambda power: 10**power), st.floats(-6, 6).map(lambda power: 10**power)
+    st.floats(-1e3, 1e3),
+    st.floats(-6, 6).map(lambda power: 10**power),
+    st.floats(-6, 6).map(lambda power: 10**power),
 )
-def test_shifting_and_scaling_the_record_shifts_and_scales_the_mode(shift: float, slower: float, larger: float) -> None:
+def test_shifting_and_scaling_the_record_shifts_and_scales_the_mode(
+    shift: float, slower: float, larger: float
+) -> None:
     time = (TIME[:600] + shift / 1e3) * slower
     found, mode = accepted(time, larger * ENERGY[:600])
     assert mode.omega * slower == pytest.approx(MODE.omega, rel=1e-8)
@@ -133,7 +179,15 @@ def test_jittered_times_are_used_as_they_are() -> None:
 
 def test_plastic_work_and_preload_are_told_from_each_other() -> None:
     time = np.linspace(0.0, 2.0, 801)
-    truth = Mode(omega=20.0, alpha=1.5, cosine=0.4, sine=2.0, origin=0.0, energy_plastic=0.7, preload=0.6)
+    truth = Mode(
+        omega=20.0,
+        alpha=1.5,
+        cosine=0.4,
+        sine=2.0,
+        origin=0.0,
+        energy_plastic=0.7,
+        preload=0.6,
+    )
     _, mode = accepted(time, truth.energy(time))
     np.testing.assert_allclose(parameters(mode), parameters(truth), rtol=1e-8)
 
@@ -171,16 +225,27 @@ RAMP = np.linspace(0.0, 1.0, 201)
         (np.zeros(201), "constant, 0"),
         (np.where(np.arange(201) % 2, 1.0, -1.0), "does not oscillate"),
         (RAMP, "vibration periods, fewer than"),
-        ((RAMP * np.exp(-5 * RAMP)) ** 2, "vibration periods, fewer than"),  # critically damped
-        ((np.exp(-3 * RAMP) - np.exp(-9 * RAMP)) ** 2, "deviates systematically"),  # overdamped
+        (
+            (RAMP * np.exp(-5 * RAMP)) ** 2,
+            "vibration periods, fewer than",
+        ),  # critically damped
+        (
+            (np.exp(-3 * RAMP) - np.exp(-9 * RAMP)) ** 2,
+            "deviates systematically",
+        ),  # overdamped
         (np.sin(20 * RAMP) ** 2 + np.sin(31 * RAMP) ** 2, "more than 40%"),
-        (np.sin(20 * RAMP) ** 2 + 0.2 * np.sin(31 * RAMP) ** 2, "deviates systematically"),
+        (
+            np.sin(20 * RAMP) ** 2 + 0.2 * np.sin(31 * RAMP) ** 2,
+            "deviates systematically",
+        ),
         (np.exp(2 * RAMP) * np.sin(20 * RAMP) ** 2, "grows"),
         (np.sin(20 * RAMP) ** 2 - 805, "plastic energy would be -8.1e+02"),
         (np.random.default_rng(0).standard_normal(201), "more than 40%"),
     ],
 )
-def test_what_no_oscillator_describes_is_refused_with_the_reason(energy: Samples, reason: str) -> None:
+def test_what_no_oscillator_describes_is_refused_with_the_reason(
+    energy: Samples, reason: str
+) -> None:
     assert reason in refused(np.linspace(0.0, 1.0, energy.size), energy)
 
 
@@ -206,7 +271,9 @@ def test_a_gap_that_could_hide_periods_counts_as_coarse_sampling() -> None:
 @pytest.mark.parametrize("scale", [1e-310, 1e-200, 1e150])
 def test_no_unit_system_is_too_small_or_too_large(scale: float) -> None:
     time = np.linspace(0.0, 2.0, 401)
-    assert accepted(time, scale * np.sin(10 * time) ** 2)[1].omega == pytest.approx(10.0, rel=1e-9)
+    assert accepted(time, scale * np.sin(10 * time) ** 2)[1].omega == pytest.approx(
+        10.0, rel=1e-9
+    )
 
 
 @pytest.mark.parametrize(
@@ -225,12 +292,19 @@ def test_oscillators_of_a_real_solver(name: str, omega: float, alpha: float) -> 
     assert (mode.energy_plastic, mode.preload) == (0.0, 0.0)
 
 
-@pytest.mark.parametrize(("name", "end_of_load"), [("load_L1_ref.csv.gz", 0.0197), ("load_L3_ref.csv.gz", 0.0235)])
-def test_a_real_load_is_refused_and_the_flight_after_it_accepted(name: str, end_of_load: float) -> None:
+@pytest.mark.parametrize(
+    ("name", "end_of_load"),
+    [("load_L1_ref.csv.gz", 0.0197), ("load_L3_ref.csv.gz", 0.0235)],
+)
+def test_a_real_load_is_refused_and_the_flight_after_it_accepted(
+    name: str, end_of_load: float
+) -> None:
     time, energy = columns(stored(name), "IE_J")
     assert "more than" in refused(time, energy)
     flight = time >= end_of_load
-    assert accepted(time[flight], energy[flight])[0].misfit == pytest.approx(0.0, abs=1e-3)
+    assert accepted(time[flight], energy[flight])[0].misfit == pytest.approx(
+        0.0, abs=1e-3
+    )
 
 
 def test_a_real_rollover_is_refused() -> None:
@@ -246,15 +320,21 @@ def test_a_real_chain_of_two_modes_is_refused(channel: str) -> None:
 
 def test_a_parameter_that_changes_next_to_nothing_leaves_no_overflow() -> None:
     jacobian = np.stack([np.ones(30), np.linspace(0, 1, 30), np.full(30, 1e-155)])
-    assert np.all(np.isfinite(covariance(jacobian @ jacobian.T, np.linspace(-1, 1, 30))))
+    assert np.all(
+        np.isfinite(covariance(jacobian @ jacobian.T, np.linspace(-1, 1, 30)))
+    )
 
 
-def about_a_preload(time: Samples, omega: float, phase: float) -> tuple[Samples, Samples]:
+def about_a_preload(
+    time: Samples, omega: float, phase: float
+) -> tuple[Samples, Samples]:
     """Deformation about a preload that it never passes zero with, and its velocity over omega."""
     return 1 + 0.2 * np.cos(omega * time + phase), -0.2 * np.sin(omega * time + phase)
 
 
-def test_a_preload_that_hardly_shows_is_a_vibration_of_half_the_rate_with_room_for_it() -> None:
+def test_a_preload_that_hardly_shows_is_a_vibration_of_half_the_rate_with_room_for_it() -> (
+    None
+):
     time = np.arange(0.0, 6.7, 1 / 40)
     found, mode = accepted(time, about_a_preload(time, 2 * np.pi, 3.4484)[0] ** 2)
     assert mode.omega == pytest.approx(np.pi, rel=1e-2)
@@ -262,8 +342,12 @@ def test_a_preload_that_hardly_shows_is_a_vibration_of_half_the_rate_with_room_f
     assert found.hidden_share >= 0.03
 
 
-def test_what_has_too_few_samples_is_not_taken_for_a_vibration_of_half_its_rate() -> None:
+def test_what_has_too_few_samples_is_not_taken_for_a_vibration_of_half_its_rate() -> (
+    None
+):
     """The refused fit of a fast vibration about a preload, aliased, was accepted without a look at its samples."""
     for rate in np.linspace(4.1, 4.6, 6).tolist():
         time = np.arange(0.0, 6.0, 1 / rate)
-        assert not identify(time, about_a_preload(time, 2 * np.pi * (1 + rate), 1.0)[0] ** 2).describes_record
+        assert not identify(
+            time, about_a_preload(time, 2 * np.pi * (1 + rate), 1.0)[0] ** 2
+        ).describes_record

@@ -15,11 +15,15 @@ TIME = np.linspace(0.0, 8.0, 1201)
 
 @settings(max_examples=20, deadline=None)
 @given(st.integers(0, 10**6), st.integers(1, 6))
-def test_each_mode_has_a_line_at_twice_its_rate_and_decay(seed: int, count: int) -> None:
+def test_each_mode_has_a_line_at_twice_its_rate_and_decay(
+    seed: int, count: int
+) -> None:
     structure = LinearStructure.draw(seed, count)
     found = sure(predict(even_grid(TIME, structure.elastic_energy(TIME))))
     lines = found.spectrum.lines
-    for rate, damping, amplitude in zip(structure.rate, structure.damping, structure.amplitude, strict=True):
+    for rate, damping, amplitude in zip(
+        structure.rate, structure.damping, structure.amplitude, strict=True
+    ):
         nearest = int(np.argmin(np.abs(lines.poles - (-2 * damping + 2j * rate))))
         assert lines.poles[nearest].imag == pytest.approx(2 * rate, rel=1e-3)
         assert abs(lines.weights[nearest]) == pytest.approx(amplitude**2 / 2, rel=0.02)
@@ -45,7 +49,9 @@ def test_a_growing_pole_is_held_level_and_a_fast_decay_is_no_line() -> None:
     assert found.lines.poles.real[0] == pytest.approx(0.2 / grid.span)
 
 
-@pytest.mark.parametrize("energy", [np.zeros(TIME.size), np.ones(10)], ids=["nothing", "short"])
+@pytest.mark.parametrize(
+    "energy", [np.zeros(TIME.size), np.ones(10)], ids=["nothing", "short"]
+)
 def test_an_energy_without_a_swing_has_no_lines(energy: np.ndarray) -> None:
     assert predict(even_grid(TIME[: energy.size], energy)) is None
 
@@ -55,11 +61,17 @@ def test_uneven_states_show_the_same_lines() -> None:
     random = np.random.default_rng(1)
     time = np.sort(random.uniform(0.0, 8.0, 1500))
     found = sure(predict(even_grid(time, structure.elastic_energy(time))))
-    strongest = np.sort(found.spectrum.lines.poles.imag[np.argsort(-np.abs(found.spectrum.lines.weights))[:2]])
+    strongest = np.sort(
+        found.spectrum.lines.poles.imag[
+            np.argsort(-np.abs(found.spectrum.lines.weights))[:2]
+        ]
+    )
     np.testing.assert_allclose(strongest, 2 * structure.rate, rtol=1e-3)
 
 
 def test_the_first_part_does_not_predict_what_a_later_push_does() -> None:
     structure, pushed = LinearStructure.draw(5, 2), LinearStructure.draw(6, 2)
-    energy = np.where(TIME < 6.5, structure.elastic_energy(TIME), 3 * pushed.elastic_energy(TIME))
+    energy = np.where(
+        TIME < 6.5, structure.elastic_energy(TIME), 3 * pushed.elastic_energy(TIME)
+    )
     assert sure(predict(even_grid(TIME, energy))).missed > 0.3

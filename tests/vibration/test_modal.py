@@ -28,7 +28,9 @@ def residuals(vibration: ModalVibration, tr: Samples, td: Samples) -> Samples:
 
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10**6), st.integers(1, 6), st.sampled_from([0.0, 3.0]))
-def test_the_residual_of_any_pair_is_that_of_the_motion(seed: int, count: int, static: float) -> None:
+def test_the_residual_of_any_pair_is_that_of_the_motion(
+    seed: int, count: int, static: float
+) -> None:
     structure = LinearStructure.draw(seed, count)
     found = sure(identify_modal(TIME, structure.elastic_energy(TIME) + static))
     assert found.signed, found.doubts
@@ -40,11 +42,17 @@ def test_the_residual_of_any_pair_is_that_of_the_motion(seed: int, count: int, s
 
 @settings(max_examples=10, deadline=None)
 @given(st.integers(0, 10**6), st.integers(2, 4), st.sampled_from([0.01, 0.02]))
-def test_noise_widens_the_band_and_the_truth_stays_in_it(seed: int, count: int, noise: float) -> None:
+def test_noise_widens_the_band_and_the_truth_stays_in_it(
+    seed: int, count: int, noise: float
+) -> None:
     structure = LinearStructure.draw(seed, count)
     energy = structure.elastic_energy(TIME)
-    scatter = noise * np.ptp(energy) * np.random.default_rng(seed).standard_normal(TIME.size)
-    clean, noisy = (sure(identify_modal(TIME, one)) for one in (energy, energy + scatter))
+    scatter = (
+        noise * np.ptp(energy) * np.random.default_rng(seed).standard_normal(TIME.size)
+    )
+    clean, noisy = (
+        sure(identify_modal(TIME, one)) for one in (energy, energy + scatter)
+    )
     true = structure.residual(*PAIRS)
     _, low, high = noisy.residual_band(residuals(noisy, *PAIRS), *PAIRS)
     assert np.mean((true > low - 1e-3) & (true < high + 1e-3)) > 0.9
@@ -56,8 +64,17 @@ def test_noise_widens_the_band_and_the_truth_stays_in_it(seed: int, count: int, 
 def test_the_kinetic_energy_says_the_same(seed: int, count: int) -> None:
     structure = LinearStructure.draw(seed, count)
     internal = sure(identify_modal(TIME, structure.elastic_energy(TIME)))
-    kinetic = sure(identify_modal(TIME, structure.kinetic_energy(TIME) + 40.0 * np.ones(TIME.size), kinetic=True))
-    assert np.sqrt(np.mean((residuals(kinetic, *PAIRS) - structure.residual(*PAIRS)) ** 2)) < 0.02
+    kinetic = sure(
+        identify_modal(
+            TIME,
+            structure.kinetic_energy(TIME) + 40.0 * np.ones(TIME.size),
+            kinetic=True,
+        )
+    )
+    assert (
+        np.sqrt(np.mean((residuals(kinetic, *PAIRS) - structure.residual(*PAIRS)) ** 2))
+        < 0.02
+    )
     both = sure(confirm(internal, kinetic))
     assert both.second is kinetic.reading
     assert np.all(both.half_width(*PAIRS) >= internal.half_width(*PAIRS))
@@ -66,13 +83,18 @@ def test_the_kinetic_energy_says_the_same(seed: int, count: int) -> None:
 def test_the_kinetic_energy_decides_where_the_internal_one_is_refused() -> None:
     structure = LinearStructure.draw(4, 3)
     kinetic = sure(identify_modal(TIME, structure.kinetic_energy(TIME), kinetic=True))
-    flowing = 40.0 + 0.5 * np.cumsum(np.random.default_rng(1).standard_normal(TIME.size)) / 5
+    flowing = (
+        40.0 + 0.5 * np.cumsum(np.random.default_rng(1).standard_normal(TIME.size)) / 5
+    )
     drifting = sure(identify_modal(TIME, structure.elastic_energy(TIME) + flowing))
     assert not drifting.signed
     assert confirm(drifting, None) is drifting
     calm = replace(drifting, doubts=drifting.doubts._replace(beyond=0.0))
     assert confirm(calm, kinetic) is kinetic
-    assert confirm(replace(calm, doubts=calm.doubts._replace(beyond=0.5)), kinetic) is not kinetic
+    assert (
+        confirm(replace(calm, doubts=calm.doubts._replace(beyond=0.5)), kinetic)
+        is not kinetic
+    )
     lacking = sure(identify_modal(TIME, 0.2 * structure.elastic_energy(TIME)))
     lacking = replace(lacking, doubts=calm.doubts)
     assert confirm(lacking, kinetic) is lacking  # it holds less than what vibrates
@@ -86,7 +108,10 @@ def test_a_stretch_by_spin_is_no_mode(stretch: float) -> None:
     about[0] += stretch * structure.amplitude[0]
     found = sure(identify_modal(TIME, np.sum(about**2, axis=0)))
     assert not found.reading.is_mode.all()
-    assert np.sqrt(np.mean((residuals(found, *PAIRS) - structure.residual(*PAIRS)) ** 2)) < 0.03
+    assert (
+        np.sqrt(np.mean((residuals(found, *PAIRS) - structure.residual(*PAIRS)) ** 2))
+        < 0.03
+    )
 
 
 def rubbed() -> Samples:
@@ -101,9 +126,15 @@ def rubbed() -> Samples:
 
 
 @pytest.mark.parametrize(("third", "is_harmonic"), [(0.2, True), (30.0, False)])
-def test_a_locked_line_is_a_harmonic_only_below_what_it_belongs_to(third: float, is_harmonic: bool) -> None:
+def test_a_locked_line_is_a_harmonic_only_below_what_it_belongs_to(
+    third: float, is_harmonic: bool
+) -> None:
     """Modes at twice and three times the rate of a weak one may begin in step with it."""
-    energy = np.cos(8 * TIME) ** 2 + 0.3 * np.cos(16 * TIME) ** 2 + third * np.cos(24 * TIME) ** 2
+    energy = (
+        np.cos(8 * TIME) ** 2
+        + 0.3 * np.cos(16 * TIME) ** 2
+        + third * np.cos(24 * TIME) ** 2
+    )
     found = sure(identify_modal(TIME, energy))
     assert (found.doubts.refusal is not None) == is_harmonic
 
@@ -112,7 +143,10 @@ def test_a_locked_line_is_a_harmonic_only_below_what_it_belongs_to(third: float,
     ("energy", "reason"),
     [
         (rubbed()[::3], "predict|lines"),
-        (np.cumsum(np.random.default_rng(2).standard_normal(1500)), "predict|lines|mean"),
+        (
+            np.cumsum(np.random.default_rng(2).standard_normal(1500)),
+            "predict|lines|mean",
+        ),
         (np.cos(np.arange(400) * 1.42) ** 2, "states per period"),
     ],
     ids=["friction", "random walk", "coarse"],
@@ -123,7 +157,11 @@ def test_what_is_no_linear_structure_is_refused(energy: Samples, reason: str) ->
     assert any(word in refusal for word in reason.split("|")), refusal
 
 
-@pytest.mark.parametrize("energy", [np.full(500, 3.0), 2.0 - np.linspace(0, 1, 500)], ids=["still", "no swing"])
+@pytest.mark.parametrize(
+    "energy",
+    [np.full(500, 3.0), 2.0 - np.linspace(0, 1, 500)],
+    ids=["still", "no swing"],
+)
 def test_without_lines_there_are_no_modes(energy: Samples) -> None:
     found = identify_modal(np.linspace(0.0, 1.0, energy.size), energy)
     assert found is None or not found.signed
@@ -136,7 +174,10 @@ def test_nothing_above_single_precision_is_no_vibration() -> None:
 
 
 STRUCTURE = LinearStructure.draw(21, 5)
-LOADED = of(np.where(TIME < 1.0, 60.0 * (1.0 - TIME), 0.0) + STRUCTURE.elastic_energy(TIME), TIME)
+LOADED = of(
+    np.where(TIME < 1.0, 60.0 * (1.0 - TIME), 0.0) + STRUCTURE.elastic_energy(TIME),
+    TIME,
+)
 
 
 def true_residual(tr: float, td: float) -> float:
@@ -158,24 +199,37 @@ def test_the_pair_that_is_recommended_is_the_best_there_is(td: float) -> None:
     assert sure(verdict.quality).grade == sure(answer.quality).grade
 
 
-def test_no_pair_worse_than_no_vibration_is_accepted_while_a_better_one_is_there() -> None:
+def test_no_pair_worse_than_no_vibration_is_accepted_while_a_better_one_is_there() -> (
+    None
+):
     answer = suggest(LOADED, 7.7, Settings(after=1.0))
     assert min(sure(one.residual) for one in answer.candidates) < 1
-    assert all(sure(one.residual) <= 1.01 for one in answer.candidates if one.acceptable)
-    worst = max(np.linspace(1.1, 6.0, 500).tolist(), key=lambda tr: true_residual(tr, 7.7))
+    assert all(
+        sure(one.residual) <= 1.01 for one in answer.candidates if one.acceptable
+    )
+    worst = max(
+        np.linspace(1.1, 6.0, 500).tolist(), key=lambda tr: true_residual(tr, 7.7)
+    )
     verdict = verify(LOADED, worst, 7.7, Settings(after=1.0))
     assert not verdict.verified
-    assert any("which a release without any vibration has" in reason for reason in verdict.reasons)
+    assert any(
+        "which a release without any vibration has" in reason
+        for reason in verdict.reasons
+    )
 
 
 def test_if_nothing_keeps_the_vibration_the_least_deformed_time_is_offered() -> None:
     """At a td where nearly all energy is kinetic, no tr is better than a release without any vibration."""
     tds = np.linspace(4.0, 8.5, 600)
-    share = STRUCTURE.kinetic_energy(tds) / (STRUCTURE.kinetic_energy(tds) + STRUCTURE.elastic_energy(tds))
+    share = STRUCTURE.kinetic_energy(tds) / (
+        STRUCTURE.kinetic_energy(tds) + STRUCTURE.elastic_energy(tds)
+    )
     td = float(tds[np.argmax(share)])
     situation = suggest(LOADED, td, Settings(after=1.0)).situation
     vibration = situation.vibration
-    raised = replace(vibration, compared=sure(vibration.compared)._replace(first=float(td - 0.4)))
+    raised = replace(
+        vibration, compared=sure(vibration.compared)._replace(first=float(td - 0.4))
+    )
     for one in (vibration, raised):
         if one.keeps_nothing:
             moments = one.moments(0.2)
@@ -190,7 +244,12 @@ def test_td_is_chosen_where_the_residual_is_least() -> None:
     answer = suggest_in_window(LOADED, (4.0, 8.8), Settings(after=1.0))
     best = sure(answer.recommended)
     assert best.rigid_time > 0.4 * (8.8 - 1.0)
-    assert true_residual(best.tr, best.td) == pytest.approx(sure(best.residual), abs=0.02)
+    assert true_residual(best.tr, best.td) == pytest.approx(
+        sure(best.residual), abs=0.02
+    )
     for td in (5.0, 6.3, 7.7, 8.6):
         other = suggest(LOADED, td, Settings(after=1.0)).recommended
-        assert sure(best.residual) <= sure(sure(other).residual) + 0.02 or sure(other).rigid_time < 3.9
+        assert (
+            sure(best.residual) <= sure(sure(other).residual) + 0.02
+            or sure(other).rigid_time < 3.9
+        )

@@ -25,17 +25,26 @@ from tests.records import energy_of, noisy, printed, replayed_residual, table
 TIME = np.linspace(0, 6, 1200)
 # A second mode this near to a first, or so small beside it, is neither found nor missed.
 _LEAST_APART, _LEAST_SHARE = 2 * np.pi / TIME[-1], 0.05
-PAIRS = np.array([(tr, td) for tr, td in product(np.linspace(0.2, 4.0, 15), (4.3, 4.9, 5.5))]).T
+PAIRS = np.array(
+    [(tr, td) for tr, td in product(np.linspace(0.2, 4.0, 15), (4.3, 4.9, 5.5))]
+).T
 
 
-def random_modes(rng: np.random.Generator, count: int, most_damping: float = 0.5) -> list[Mode]:
+def random_modes(
+    rng: np.random.Generator, count: int, most_damping: float = 0.5
+) -> list[Mode]:
     """Modes with a damping each, the slowest with period 1, the others up to four times as fast."""
     while True:
         rates = 2 * np.pi * np.sort(1 + np.append(0.0, rng.uniform(0.2, 3, count - 1)))
         alpha = rng.uniform(0, most_damping, count)
-        modes = [Mode(*map(float, (*row, *rng.normal(size=2), 0.0))) for row in zip(rates, alpha, strict=True)]
+        modes = [
+            Mode(*map(float, (*row, *rng.normal(size=2), 0.0)))
+            for row in zip(rates, alpha, strict=True)
+        ]
         energies = [float(mode.vibration_energy(0.0)) for mode in modes]
-        if np.diff(rates).min() > _LEAST_APART and min(energies) > _LEAST_SHARE * max(energies):
+        if np.diff(rates).min() > _LEAST_APART and min(energies) > _LEAST_SHARE * max(
+            energies
+        ):
             return modes
 
 
@@ -49,13 +58,21 @@ def residuals_of(found: ModalVibration, tr: Samples, td: Samples) -> Samples:
 
 
 @pytest.mark.parametrize("count", [2, 3, 5, 8])
-@pytest.mark.parametrize(("noise", "median", "worst"), [(0.0, 1e-4, 1e-3), (0.01, 0.01, 0.1)])
-def test_the_residual_is_predicted_from_the_total_energy(count: int, noise: float, median: float, worst: float) -> None:
+@pytest.mark.parametrize(
+    ("noise", "median", "worst"), [(0.0, 1e-4, 1e-3), (0.01, 0.01, 0.1)]
+)
+def test_the_residual_is_predicted_from_the_total_energy(
+    count: int, noise: float, median: float, worst: float
+) -> None:
     rng = np.random.default_rng(20261)
     errors: list[float] = []
     for seed in range(6):
         modes = random_modes(rng, count)
-        found = sure(identify_modal(TIME, noisy(printed(energy_of(modes, TIME)), noise, seed=seed)))
+        found = sure(
+            identify_modal(
+                TIME, noisy(printed(energy_of(modes, TIME)), noise, seed=seed)
+            )
+        )
         assert found.signed
         true, told = replayed_residual(modes, *PAIRS), residuals_of(found, *PAIRS)
         errors.append(float(np.sqrt(np.mean((told - true) ** 2))))
@@ -66,18 +83,26 @@ def test_the_residual_is_predicted_from_the_total_energy(count: int, noise: floa
 
 
 @given(st.integers(2, 6), st.integers(0, 10**6))
-def test_rates_damping_and_energies_of_the_modes_are_found(count: int, seed: int) -> None:
+def test_rates_damping_and_energies_of_the_modes_are_found(
+    count: int, seed: int
+) -> None:
     modes = random_modes(np.random.default_rng(seed), count, most_damping=0.3)
     found = sure(identify_modal(TIME, energy_of(modes, TIME)))
     td = 4.0
     largest = sum(float(mode.vibration_energy(td)) for mode in modes)
-    at_td = [mode for mode in found.modes_at(td) if mode.vibration_energy_td > 1e-3 * largest]
-    expected = [mode for mode in modes if float(mode.vibration_energy(td)) > 2e-3 * largest]
+    at_td = [
+        mode for mode in found.modes_at(td) if mode.vibration_energy_td > 1e-3 * largest
+    ]
+    expected = [
+        mode for mode in modes if float(mode.vibration_energy(td)) > 2e-3 * largest
+    ]
     for mode in expected:
         nearest = min(at_td, key=lambda one: abs(one.omega - mode.omega))
         assert nearest.omega == pytest.approx(mode.omega, rel=1e-4)
         assert nearest.alpha == pytest.approx(mode.alpha, abs=1e-2)
-        assert nearest.vibration_energy_td == pytest.approx(float(mode.vibration_energy(td)), rel=0.01)
+        assert nearest.vibration_energy_td == pytest.approx(
+            float(mode.vibration_energy(td)), rel=0.01
+        )
 
 
 @pytest.mark.parametrize("states", [300, 1200, 60_000])
@@ -96,10 +121,17 @@ def test_the_modes_are_known_up_to_both_ends_of_their_window(states: int) -> Non
 def test_elastic_and_kinetic_energy_are_those_of_the_modes() -> None:
     found = sure(identify_modal(TIME, energy_of(TWO, TIME)))
     inside = TIME[50:-50:7]
-    elastic, kinetic = energy_of(TWO, inside), sum(mode.kinetic_energy(inside) for mode in TWO)
+    elastic, kinetic = (
+        energy_of(TWO, inside),
+        sum(mode.kinetic_energy(inside) for mode in TWO),
+    )
     largest = float(elastic.max())
-    np.testing.assert_allclose(found.elastic_energy(inside), elastic, atol=1e-6 * largest)
-    np.testing.assert_allclose(found.kinetic_energy(inside), kinetic, atol=1e-4 * largest)
+    np.testing.assert_allclose(
+        found.elastic_energy(inside), elastic, atol=1e-6 * largest
+    )
+    np.testing.assert_allclose(
+        found.kinetic_energy(inside), kinetic, atol=1e-4 * largest
+    )
     whole = sum(mode.vibration_energy_td for mode in found.modes_at(3.0))
     assert whole == pytest.approx(float(found.vibration_energy(3.0)), rel=1e-3)
 
@@ -108,7 +140,9 @@ def test_the_residual_of_several_modes_is_that_of_its_measures() -> None:
     tr, td = np.array([0.4, 1.3, 2.2]), 4.1
     found = sure(identify_modal(TIME, energy_of(TWO, TIME)))
     kinetic = kinetic_share(found, td)
-    expected = [residual(float(error), kinetic) for error in lock_in_error(found, tr, td)]
+    expected = [
+        residual(float(error), kinetic) for error in lock_in_error(found, tr, td)
+    ]
     np.testing.assert_allclose(replayed_residual(TWO, tr, td), expected, atol=1e-4)
 
 
@@ -116,7 +150,10 @@ def test_the_residual_of_several_modes_is_that_of_its_measures() -> None:
 def test_several_modes_are_no_oscillator(count: int) -> None:
     rng = np.random.default_rng(count)
     rates = 2 * np.pi * np.sort(rng.uniform(1, 4, count))
-    found = identify(TIME, energy_of([Mode(rate, 0.2, 1.0, 0.3, 0.0) for rate in rates.tolist()], TIME))
+    found = identify(
+        TIME,
+        energy_of([Mode(rate, 0.2, 1.0, 0.3, 0.0) for rate in rates.tolist()], TIME),
+    )
     assert not found.describes_record
     assert found.reason
 
@@ -135,7 +172,12 @@ def test_the_energy_of_one_part_in_which_modes_mix_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("time", "energy"), [(TIME[:20], energy_of(TWO, TIME[:20])), (TIME, np.ones(TIME.size)), (TIME, np.exp(-TIME))]
+    ("time", "energy"),
+    [
+        (TIME[:20], energy_of(TWO, TIME[:20])),
+        (TIME, np.ones(TIME.size)),
+        (TIME, np.exp(-TIME)),
+    ],
 )
 def test_records_without_lines_have_no_modes(time: Samples, energy: Samples) -> None:
     found = identify_modal(time, energy)
@@ -151,17 +193,23 @@ def test_several_modes_are_chosen_by_and_replayed() -> None:
     situation = answer.situation
     assert situation.basis == "modal"
     assert not sure(situation.evidence.fit).describes_record
-    rates = [mode.omega for mode in sure(situation.vibration.modal).modes_at(situation.td)]
+    rates = [
+        mode.omega for mode in sure(situation.vibration.modal).modes_at(situation.td)
+    ]
     assert rates == pytest.approx([mode.omega for mode in TWO], rel=1e-5)
     assert {c.kind for c in answer.candidates} == {"match"}
     tr = np.array([c.tr for c in answer.candidates])
     expected = replayed_residual(TWO, tr, situation.td)
-    assert [c.residual for c in answer.candidates] == pytest.approx(expected.tolist(), abs=0.03)
+    assert [c.residual for c in answer.candidates] == pytest.approx(
+        expected.tolist(), abs=0.03
+    )
     assert all(c.rigid_time > 0 for c in answer.candidates)
 
 
 @pytest.mark.parametrize("share", [0.003, 0.01])
-def test_modes_decide_where_an_oscillator_leaves_a_further_mode_over(share: float) -> None:
+def test_modes_decide_where_an_oscillator_leaves_a_further_mode_over(
+    share: float,
+) -> None:
     """The oscillator alone stated a residual of zero at any peak of the energy, while the other mode stood opposed."""
     main, root = Mode(2 * np.pi, 0.2, 0.3, 0.9, 0.0), float(np.sqrt(share))
     modes = [main, Mode(2 * np.pi * 2.3, 0.2, 0.5 * root, 0.8 * root, 0.0)]
@@ -172,7 +220,11 @@ def test_modes_decide_where_an_oscillator_leaves_a_further_mode_over(share: floa
     answer = suggest(history, 5.3, Settings(after=0.0))
     for candidate in answer.candidates:
         true = float(replayed_residual(modes, np.array([candidate.tr]), 5.3)[0])
-        assert sure(candidate.residual_low) - 0.01 <= true <= sure(candidate.residual_high) + 0.01
+        assert (
+            sure(candidate.residual_low) - 0.01
+            <= true
+            <= sure(candidate.residual_high) + 0.01
+        )
 
 
 def test_given_the_end_of_the_load_modes_tell_the_end_of_the_flight() -> None:
@@ -189,7 +241,9 @@ def test_the_total_energy_of_the_chain_tells_its_two_modes() -> None:
     modes = sure(situation.vibration.modal).modes_at(situation.td)
     largest = max(mode.vibration_energy_td for mode in modes)
     strong = [mode for mode in modes if mode.vibration_energy_td > 0.01 * largest]
-    assert sorted(2 * np.pi / mode.omega for mode in strong) == pytest.approx([0.0285, 0.0491], abs=1e-4)
+    assert sorted(2 * np.pi / mode.omega for mode in strong) == pytest.approx(
+        [0.0285, 0.0491], abs=1e-4
+    )
     assert [mode.alpha for mode in strong] == pytest.approx([5.0, 5.0], rel=0.01)
     assert situation.kinetic_share == pytest.approx(0.00065, abs=1e-3)
     errors = []

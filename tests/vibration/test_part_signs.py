@@ -32,13 +32,22 @@ NAMES = ("IE_spring1_J", "IE_spring2_J")
 
 def two_springs(time: np.ndarray) -> np.ndarray:
     """Signed deformations of two parts in which two modes mix, shape (n, 2)."""
-    slow, fast = np.exp(-0.1 * time) * np.sin(5 * time), np.exp(-0.1 * time) * np.cos(8.3 * time)
+    slow, fast = (
+        np.exp(-0.1 * time) * np.sin(5 * time),
+        np.exp(-0.1 * time) * np.cos(8.3 * time),
+    )
     return np.stack([slow + 0.7 * fast, 0.8 * slow - 0.9 * fast], axis=1)
 
 
 def deformations(parts: SignedParts, t: np.ndarray) -> np.ndarray:
     """Signed deformations of whole parts, shape (k, n)."""
-    return np.array([one.model.deformation(t) for one in parts.motions if isinstance(one.model, Waves)])
+    return np.array(
+        [
+            one.model.deformation(t)
+            for one in parts.motions
+            if isinstance(one.model, Waves)
+        ]
+    )
 
 
 def of(deformation: np.ndarray, time: np.ndarray) -> History:
@@ -66,14 +75,22 @@ def test_signs_are_followed_through_every_zero(samples_per_period: int) -> None:
     found = SignedParts(time, printed(true.ravel() ** 2).reshape(true.shape), NAMES)
     assert found.names == NAMES
     known = (time > found.comparable_since(10.8)) & (time < 10.8)
-    for own, expected in zip(deformations(found, time[known]), true.T[:, known], strict=True):
+    for own, expected in zip(
+        deformations(found, time[known]), true.T[:, known], strict=True
+    ):
         wrong = np.sign(own) != np.sign(expected) * np.sign(own @ expected)
         # a sample next to a zero may be taken for one on its other side
         assert np.all(np.abs(expected[wrong]) < 0.1)
     assert np.mean(known) > 0.85
 
 
-@given(st.floats(0.3, 3), st.floats(0, 3), st.floats(0, 0.3), st.sampled_from([20, 60]), st.floats(0, 6))
+@given(
+    st.floats(0.3, 3),
+    st.floats(0, 3),
+    st.floats(0, 0.3),
+    st.sampled_from([20, 60]),
+    st.floats(0, 6),
+)
 def test_one_spring_is_compared_as_its_oscillator_tells(
     rate: float, phase: float, damping: float, per_period: int, tr: float
 ) -> None:
@@ -100,11 +117,19 @@ def test_one_spring_is_compared_as_its_oscillator_tells(
     ],
     ids=["plastic work", "preload", "half a preload", "constant"],
 )
-def test_a_part_that_does_not_swing_about_zero_has_no_sign(make: object, reason: str) -> None:
+def test_a_part_that_does_not_swing_about_zero_has_no_sign(
+    make: object, reason: str
+) -> None:
     time = np.arange(0, 12, 0.02)
-    found = SignedParts(time, np.stack([two_springs(time)[:, 0] ** 2, make(time)], axis=1), ["good", "bad"])  # type: ignore[operator]
+    found = SignedParts(
+        time,
+        np.stack([two_springs(time)[:, 0] ** 2, make(time)], axis=1),  # type: ignore[operator]
+        ["good", "bad"],
+    )
     assert found.names == ("good",)
-    assert [(part.name, reason in sure(part.reason)) for part in found.unsigned] == [("bad", True)]
+    assert [(part.name, reason in sure(part.reason)) for part in found.unsigned] == [
+        ("bad", True)
+    ]
     assert not found.signed
 
 
@@ -115,7 +140,11 @@ def test_a_part_without_sign_and_almost_no_energy_is_left_out_and_named() -> Non
     assert answer.situation.basis == "parts"
     assert "part-without-sign" in {caution.code for caution in answer.cautions}
     best = answer.candidates[0]
-    assert [(one.name, one.sign_match, one.share) for one in best.parts][-1] == ("part 3", None, None)
+    assert [(one.name, one.sign_match, one.share) for one in best.parts][-1] == (
+        "part 3",
+        None,
+        None,
+    )
 
 
 def test_where_a_sign_may_turn_or_not_nothing_is_compared_across_it() -> None:
@@ -146,10 +175,17 @@ def test_the_residual_of_switched_runs_is_predicted(estimated: bool) -> None:
         situation = seen(td)
         assert situation.basis == "parts"
         if estimated:
-            situation = replace(situation, evidence=situation.evidence._replace(fit=None, span=None))
+            situation = replace(
+                situation, evidence=situation.evidence._replace(fit=None, span=None)
+            )
             assert situation.vibration.estimated
-        runs = [run for run in some if abs(run["td_s"] - td) < 1e-3]  # a step of the solver late
-        errors += [abs(predicted(situation.at(run["td_s"]), run["tr_s"]) - run["R_sim"]) for run in runs]
+        runs = [
+            run for run in some if abs(run["td_s"] - td) < 1e-3
+        ]  # a step of the solver late
+        errors += [
+            abs(predicted(situation.at(run["td_s"]), run["tr_s"]) - run["R_sim"])
+            for run in runs
+        ]
     assert len(errors) == len(some)
     assert max(errors) < 0.025  # what is reached
 
@@ -158,14 +194,29 @@ def test_parts_that_vibrate_no_more_than_a_solver_errs_have_no_residual() -> Non
     situation = seen(chain.TD_LATE)
     parts = sure(situation.evidence.parts)
     started = Waves(
-        np.array([-300 + 900j]), np.array([101 * np.sqrt(parts.vibration_energy(chain.TD_LATE))]), parts.time[0]
+        np.array([-300 + 900j]),
+        np.array([101 * np.sqrt(parts.vibration_energy(chain.TD_LATE))]),
+        parts.time[0],
     )
     sunk = copy(parts)
     sunk.motions = (*parts.motions, PartMotion(started, np.zeros(0), 0.0))
-    situation = replace(situation, evidence=situation.evidence._replace(fit=None, span=None, models={"parts": sunk}))
-    assert (situation.basis, situation.kinetic_share, situation.vibration.doubts) == ("energy", None, (SUNK,))
+    situation = replace(
+        situation,
+        evidence=situation.evidence._replace(
+            fit=None, span=None, models={"parts": sunk}
+        ),
+    )
+    assert (situation.basis, situation.kinetic_share, situation.vibration.doubts) == (
+        "energy",
+        None,
+        (SUNK,),
+    )
     (candidate,) = judge(situation, [0.18])
-    assert (candidate.acceptable, candidate.residual, candidate.sign_match) == (False, None, None)
+    assert (candidate.acceptable, candidate.residual, candidate.sign_match) == (
+        False,
+        None,
+        None,
+    )
     assert "the level at td is below the noise of the record" in candidate.notes
     assert "is below the error of a solver" in (situation.vibration.reasons or "")
     assert situation.at(chain.TD_PEAK).basis == "parts"
@@ -174,7 +225,9 @@ def test_parts_that_vibrate_no_more_than_a_solver_errs_have_no_residual() -> Non
 def test_the_signs_of_both_springs_are_right_in_every_switched_run() -> None:
     parts = sure(seen(chain.TD_LATE).evidence.parts)
     for run in chain.scan():
-        product = np.prod(deformations(parts, np.array([run["tr_s"], run["td_s"]])), axis=1)
+        product = np.prod(
+            deformations(parts, np.array([run["tr_s"], run["td_s"]])), axis=1
+        )
         assert (product > 0).tolist() == [run["sign1"] > 0, run["sign2"] > 0]
 
 
@@ -184,8 +237,12 @@ def read_t01() -> History:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("source", ["csv", "T01"])
-def test_the_closest_match_is_recommended_although_the_total_energy_is_off(source: str) -> None:
-    answer = suggest(chain.history() if source == "csv" else read_t01(), chain.TD_PEAK, PLAIN)
+def test_the_closest_match_is_recommended_although_the_total_energy_is_off(
+    source: str,
+) -> None:
+    answer = suggest(
+        chain.history() if source == "csv" else read_t01(), chain.TD_PEAK, PLAIN
+    )
     assert sure(answer.recommended).tr == pytest.approx(0.08084, abs=1e-4)
     best = answer.candidates[0]
     assert (best.kind, best.sign_match, best.recommended) == ("match", True, True)
@@ -198,7 +255,9 @@ def test_the_closest_match_is_recommended_although_the_total_energy_is_off(sourc
 @pytest.mark.slow
 @pytest.mark.parametrize("source", ["csv", "T01"])
 def test_the_recommended_run_is_among_the_best_of_the_scan(source: str) -> None:
-    answer = suggest(chain.history() if source == "csv" else read_t01(), chain.TD_LATE, PLAIN)
+    answer = suggest(
+        chain.history() if source == "csv" else read_t01(), chain.TD_LATE, PLAIN
+    )
     tr = sure(answer.recommended).tr
     runs = [run for run in chain.scan() if run["td_s"] > 0.2]
     nearest = min(runs, key=lambda run: abs(run["tr_s"] - tr))
@@ -211,9 +270,14 @@ def test_the_parts_that_contribute_most_are_named() -> None:
     shares = [part.share for part in candidate.parts]
     assert sum(share or 0 for share in shares) == pytest.approx(1)
     assert shares == sorted(shares, key=lambda share: -(share or 0))
-    assert any(note.startswith(f"mismatch of {candidate.parts[0].name}") for note in candidate.notes)
+    assert any(
+        note.startswith(f"mismatch of {candidate.parts[0].name}")
+        for note in candidate.notes
+    )
     still = 1 - sure(situation.kinetic_share)
-    assert candidate.lock_in_error == pytest.approx(np.sqrt(still) * sure(candidate.part_mismatch))
+    assert candidate.lock_in_error == pytest.approx(
+        np.sqrt(still) * sure(candidate.part_mismatch)
+    )
 
 
 def test_the_rollover_has_no_signs_and_says_why() -> None:
@@ -223,8 +287,12 @@ def test_the_rollover_has_no_signs_and_says_why() -> None:
     assert answer.situation.basis == "modal"
     best = answer.candidates[0]
     assert (best.sign_match, best.part_mismatch, best.parts) == (True, None, ())
-    reason = replace(answer.situation.vibration, compared=None, unknown="").reasons or ""
-    assert reason.count("box, step: the energy does not return to zero") == 1  # said once for both
+    reason = (
+        replace(answer.situation.vibration, compared=None, unknown="").reasons or ""
+    )
+    assert (
+        reason.count("box, step: the energy does not return to zero") == 1
+    )  # said once for both
 
 
 def test_several_energies_are_carried_but_for_those_that_are_always_zero() -> None:
@@ -236,13 +304,22 @@ def test_several_energies_are_carried_but_for_those_that_are_always_zero() -> No
     np.testing.assert_array_equal(sure(table.part_energies).sum(axis=1), table.energy)
 
 
-def test_between_the_states_the_model_tells_the_deformation_and_what_is_kinetic() -> None:
+def test_between_the_states_the_model_tells_the_deformation_and_what_is_kinetic() -> (
+    None
+):
     time = np.linspace(0, 6, 201)
     found = SignedParts(time, two_springs(time) ** 2, NAMES)
     at = np.array([0.123, 1.0, 1.9876, 4.321])
-    assert np.abs(deformations(found, at)) == pytest.approx(np.abs(two_springs(at).T), abs=1e-4)
-    slow, fast = np.exp(-0.2 * at) * np.cos(5 * at) ** 2, np.exp(-0.2 * at) * np.sin(8.3 * at) ** 2
-    assert found.kinetic_energy(at) == pytest.approx(1.64 * slow + 1.3 * fast, abs=0.1)  # but for the damping
+    assert np.abs(deformations(found, at)) == pytest.approx(
+        np.abs(two_springs(at).T), abs=1e-4
+    )
+    slow, fast = (
+        np.exp(-0.2 * at) * np.cos(5 * at) ** 2,
+        np.exp(-0.2 * at) * np.sin(8.3 * at) ** 2,
+    )
+    assert found.kinetic_energy(at) == pytest.approx(
+        1.64 * slow + 1.3 * fast, abs=0.1
+    )  # but for the damping
 
 
 SPAN = np.arange(0, 0.4, 4e-4)
@@ -252,7 +329,12 @@ TWO_PARTS = ("A", "B")
 def planes(share: float) -> Motion:
     """A bends in two planes, of which the second has that share of its energy; B has one mode."""
     forms = np.array([np.diag([1 - share, share, 0.0]), np.diag([0.0, 0.0, 0.5])])
-    return Motion(7.7, 2 * np.pi * np.array([29.2, 70.1, 48.76]), np.array([2.95, 4.64, -0.82]), forms)
+    return Motion(
+        7.7,
+        2 * np.pi * np.array([29.2, 70.1, 48.76]),
+        np.array([2.95, 4.64, -0.82]),
+        forms,
+    )
 
 
 def grouped() -> Motion:
@@ -269,13 +351,23 @@ def grouped() -> Motion:
 
 def written(motion: Motion, noise: float = 0.0) -> History:
     energies = motion.energies(SPAN)
-    return history(SPAN, np.maximum(np.stack([noisy(row, noise, seed=2) for row in energies.T], axis=1), 0.0))
+    return history(
+        SPAN,
+        np.maximum(
+            np.stack([noisy(row, noise, seed=2) for row in energies.T], axis=1), 0.0
+        ),
+    )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("share", "noise", "basis"),
-    [(0.003, 0.0, "parts"), (0.03, 0.0, "modal"), (0.03, 2e-3, "modal"), (0.45, 2e-3, "modal")],
+    [
+        (0.003, 0.0, "parts"),
+        (0.03, 0.0, "modal"),
+        (0.03, 2e-3, "modal"),
+        (0.45, 2e-3, "modal"),
+    ],
 )
 def test_of_a_part_that_bends_in_two_planes_the_residual_is_in_its_range(
     share: float, noise: float, basis: str
@@ -285,7 +377,11 @@ def test_of_a_part_that_bends_in_two_planes_the_residual_is_in_its_range(
     answer = suggest(written(truth, noise), td, Settings(after=0.0))
     assert answer.situation.basis == basis
     for one in answer.candidates[:6]:
-        assert sure(one.residual_low) - 0.05 <= truth.residual(one.tr, td) <= sure(one.residual_high) + 0.05
+        assert (
+            sure(one.residual_low) - 0.05
+            <= truth.residual(one.tr, td)
+            <= sure(one.residual_high) + 0.05
+        )
 
 
 def test_minima_that_stay_above_zero_prove_no_sign() -> None:
@@ -299,9 +395,14 @@ def test_minima_that_stay_above_zero_prove_no_sign() -> None:
 def test_what_a_second_plane_may_hold_unseen_widens_the_residual() -> None:
     small = SignedParts(SPAN, planes(5e-4).energies(SPAN), TWO_PARTS)
     assert small.names == TWO_PARTS
-    assert all(isinstance(motion.model, Waves) for motion in small.motions)  # taken for one plane
+    assert all(
+        isinstance(motion.model, Waves) for motion in small.motions
+    )  # taken for one plane
     tr, td = np.array([0.05, 0.1]), 0.2072
-    told = np.sqrt(np.sum((small.amplitudes(tr).T - small.amplitudes(td)) ** 2, axis=1) + small.kinetic_energy(td))
+    told = np.sqrt(
+        np.sum((small.amplitudes(tr).T - small.amplitudes(td)) ** 2, axis=1)
+        + small.kinetic_energy(td)
+    )
     told /= np.sqrt(small.vibration_energy(td))
     high = small.residual_bound(told, tr, td)
     truth = [planes(5e-4).residual(one, td) for one in tr]
@@ -326,5 +427,7 @@ def test_what_crosses_between_modes_in_the_parts_is_no_part_of_the_error() -> No
     assert parts.names == TWO_PARTS
     td = 0.31
     for tr in (0.05, 0.1, 0.2):
-        found = np.hypot(lock_in_error(parts, tr, td), np.sqrt(kinetic_share(parts, td)))
+        found = np.hypot(
+            lock_in_error(parts, tr, td), np.sqrt(kinetic_share(parts, td))
+        )
         assert found == pytest.approx(truth.residual(tr, td), abs=1e-3)

@@ -11,11 +11,27 @@ from d2rpick.choice.situation import examine
 from d2rpick.histories.history import History
 from d2rpick.vibration.identify import identify, judge_given
 from d2rpick.vibration.modes import Mode
-from d2rpick.vibration.span import Fits, Span, described_span, hidden_share, residual_bound, span_of
+from d2rpick.vibration.span import (
+    Fits,
+    Span,
+    described_span,
+    hidden_share,
+    residual_bound,
+    span_of,
+)
 from tests import paper
 from tests.benchmarks.identification import small_second_modes
 from tests.energies import sure
-from tests.records import ENERGY, MODE, TIME, energy_of, noisy, printed, replayed_residual, table
+from tests.records import (
+    ENERGY,
+    MODE,
+    TIME,
+    energy_of,
+    noisy,
+    printed,
+    replayed_residual,
+    table,
+)
 
 
 def of(energy: np.ndarray) -> History:
@@ -25,20 +41,29 @@ def of(energy: np.ndarray) -> History:
 def by_convolution(energy: np.ndarray, anchor: float) -> tuple[float, float]:
     """Where means over a twenty-fifth of a period leave the paper's mode by more than 1 % of its energy."""
     width = round(2 * np.pi / MODE.omega / 25 / 1e-4)
-    gone = np.abs(np.convolve(energy - ENERGY, np.ones(width) / width, mode="same")) > 0.01 * MODE.vibration_energy(
-        TIME
-    )
+    gone = np.abs(
+        np.convolve(energy - ENERGY, np.ones(width) / width, mode="same")
+    ) > 0.01 * MODE.vibration_energy(TIME)
     at = int(np.searchsorted(TIME, anchor))
-    left, right = np.flatnonzero(gone[:at])[-1] + 1 + width // 2, at + np.flatnonzero(gone[at:])[0] - 1 - width // 2
+    left, right = (
+        np.flatnonzero(gone[:at])[-1] + 1 + width // 2,
+        at + np.flatnonzero(gone[at:])[0] - 1 - width // 2,
+    )
     return float(TIME[left]), float(TIME[right])
 
 
 @pytest.mark.parametrize("anchor", [0.06, 0.08, 0.1])
 @pytest.mark.parametrize("size", [1e-2, 1.0, 1e300])
-def test_a_span_ends_where_running_means_leave_the_fit(size: float, anchor: float) -> None:
-    energy = ENERGY + size * MODE.vibration_energy(TIME) * ((TIME < 0.0311) | (TIME > 0.1234))
+def test_a_span_ends_where_running_means_leave_the_fit(
+    size: float, anchor: float
+) -> None:
+    energy = ENERGY + size * MODE.vibration_energy(TIME) * (
+        (TIME < 0.0311) | (TIME > 0.1234)
+    )
     fit = judge_given(MODE, TIME, ENERGY)
-    assert span_of(of(energy), anchor, fit, Span(0.0, 0.15)) == by_convolution(energy, anchor)
+    assert span_of(of(energy), anchor, fit, Span(0.0, 0.15)) == by_convolution(
+        energy, anchor
+    )
 
 
 def test_a_refusal_on_a_few_samples_names_the_misfit_of_all() -> None:
@@ -48,15 +73,22 @@ def test_a_refusal_on_a_few_samples_names_the_misfit_of_all() -> None:
     assert span is None
     before = TIME <= 0.1
     assert fit.reason == identify(TIME[before], energy[before]).reason
-    for found in (identify(TIME, energy, quick=True), judge_given(MODE, TIME, energy, quick=True)):
+    for found in (
+        identify(TIME, energy, quick=True),
+        judge_given(MODE, TIME, energy, quick=True),
+    ):
         assert (found.mode, found.describes_record) == (None, False)
         assert found.reason
 
 
-def test_an_energy_that_only_rises_takes_no_memory_for_periods_beyond_the_record() -> None:
+def test_an_energy_that_only_rises_takes_no_memory_for_periods_beyond_the_record() -> (
+    None
+):
     energy = (8192e3 + np.arange(2000.0)).astype(np.float32).astype(np.float64)
     tracemalloc.start()
-    span, fit = described_span(table(np.arange(2000.0), energy), 1000.0, Span(0.0, 1999.0))
+    span, fit = described_span(
+        table(np.arange(2000.0), energy), 1000.0, Span(0.0, 1999.0)
+    )
     most = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert (span, fit.describes_record) == (None, False)
@@ -75,7 +107,9 @@ def test_what_is_accepted_is_the_same_when_refusals_are_quick(noise: float) -> N
 def test_a_window_is_fitted_once_by_each_fitter_and_demand() -> None:
     fits, calls = Fits(), []
 
-    def counting(time: np.ndarray, energy: np.ndarray, *, quick: bool = False) -> object:
+    def counting(
+        time: np.ndarray, energy: np.ndarray, *, quick: bool = False
+    ) -> object:
         calls.append((time.size, quick))
         return identify(time, energy, quick=quick)
 
@@ -92,7 +126,9 @@ def test_a_window_is_fitted_once_by_each_fitter_and_demand() -> None:
 def test_what_was_fitted_before_changes_no_answer() -> None:
     fits = Fits()
     for td in (0.05, paper.TD, 0.1):
-        anew, again = (examine(paper.history(), td, Settings(), known) for known in (None, fits))
+        anew, again = (
+            examine(paper.history(), td, Settings(), known) for known in (None, fits)
+        )
         assert again.evidence.span == anew.evidence.span
         assert sure(again.evidence.fit).mode == sure(anew.evidence.fit).mode
 
@@ -104,13 +140,17 @@ TIMES = np.arange(0, 7, 1 / 40)
 def beside(share: float, rate: float = 2.3) -> tuple[Mode, Mode]:
     """The main mode and one with that share of its energy."""
     root = float(np.sqrt(share * MAIN.vibration_energy(0.0)))
-    return MAIN, Mode(rate * 2 * np.pi, 0.2, root * np.cos(1.0), root * np.sin(1.0) * 0.97, 0.0)
+    return MAIN, Mode(
+        rate * 2 * np.pi, 0.2, root * np.cos(1.0), root * np.sin(1.0) * 0.97, 0.0
+    )
 
 
 @pytest.mark.parametrize("rate", [0.6, 1.8, 3.1])
 @pytest.mark.parametrize("noise", [0.0, 1e-3])
 @pytest.mark.parametrize("share", [0.003, 0.01])
-def test_the_share_of_a_small_second_mode_is_estimated(share: float, noise: float, rate: float) -> None:
+def test_the_share_of_a_small_second_mode_is_estimated(
+    share: float, noise: float, rate: float
+) -> None:
     energy = noisy(energy_of(beside(share, rate), TIMES), noise, seed=1)
     one = identify(TIMES, energy)
     assert one.mode is not None  # its rest is too small to refuse it
@@ -120,9 +160,13 @@ def test_the_share_of_a_small_second_mode_is_estimated(share: float, noise: floa
 
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("noise", [1e-4, 0.03])
-def test_white_noise_hides_a_second_mode_of_its_own_size(noise: float, seed: int) -> None:
+def test_white_noise_hides_a_second_mode_of_its_own_size(
+    noise: float, seed: int
+) -> None:
     energy = noisy(MAIN.energy(TIMES), noise, seed)
-    assert 0 < hidden_share(TIMES, energy, sure(identify(TIMES, energy).mode)) < 3 * noise
+    assert (
+        0 < hidden_share(TIMES, energy, sure(identify(TIMES, energy).mode)) < 3 * noise
+    )
 
 
 def test_a_clean_or_printed_record_hides_nothing() -> None:

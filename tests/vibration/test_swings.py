@@ -28,7 +28,12 @@ TIME: Samples = np.linspace(0.0, 30.0, 1201)
 def stiffening(by: float, alpha: float) -> tuple[Samples, Samples]:
     """Deformation of x'' + alpha x' + x + by x^3 = 0 from x = 1, and its energy."""
     found = solve_ivp(
-        lambda _, x: (x[1], -alpha * x[1] - x[0] - by * x[0] ** 3), TIME[[0, -1]], (1.0, 0.0), "DOP853", TIME, rtol=1e-9
+        lambda _, x: (x[1], -alpha * x[1] - x[0] - by * x[0] ** 3),
+        TIME[[0, -1]],
+        (1.0, 0.0),
+        "DOP853",
+        TIME,
+        rtol=1e-9,
     )
     x = found.y[0]
     return x, x**2 + by * x**4 / 2
@@ -36,8 +41,12 @@ def stiffening(by: float, alpha: float) -> tuple[Samples, Samples]:
 
 @pytest.mark.parametrize("by", [0.0, 0.3, 3.0])
 @pytest.mark.parametrize("alpha", [0.0, 0.05])
-@pytest.mark.parametrize("lifted", [0.0 * TIME, 40.0 + 0.0 * TIME, 0.02 * TIME, -0.02 * TIME])
-def test_every_minimum_on_the_floor_is_a_passage_through_zero(by: float, alpha: float, lifted: Samples) -> None:
+@pytest.mark.parametrize(
+    "lifted", [0.0 * TIME, 40.0 + 0.0 * TIME, 0.02 * TIME, -0.02 * TIME]
+)
+def test_every_minimum_on_the_floor_is_a_passage_through_zero(
+    by: float, alpha: float, lifted: Samples
+) -> None:
     x, energy = stiffening(by, alpha)
     found = sure(count_swings(TIME, energy + lifted))
     counted = found.amplitudes(TIME)[0]
@@ -54,7 +63,9 @@ def test_every_minimum_on_the_floor_is_a_passage_through_zero(by: float, alpha: 
 @example(3.498, 2.347, 0.125)
 @example(3.509, 2.151, 0.036)
 @given(st.floats(1.3, 4.0), st.floats(0.0, 3.0), st.floats(0.003, 1.0))
-def test_what_another_mode_may_cost_is_told_or_nothing_is_counted(rate: float, phase: float, share: float) -> None:
+def test_what_another_mode_may_cost_is_told_or_nothing_is_counted(
+    rate: float, phase: float, share: float
+) -> None:
     """The residual with both modes known is not above the highest that counting tells."""
     both = np.stack([np.sin(TIME), np.sqrt(share) * np.sin(rate * TIME + phase)])
     found = count_swings(TIME, np.sum(both**2, axis=0))
@@ -63,13 +74,17 @@ def test_what_another_mode_may_cost_is_told_or_nothing_is_counted(rate: float, p
     td = np.pi / 2 + 8 * np.pi
     tr = td - 2 * np.pi * np.arange(1.0, 4.0)
     tr = tr[tr > found.comparable_since(td)]
-    hidden = np.abs(np.sin(rate * tr + phase) - np.sin(rate * td + phase)) * np.sqrt(share / (1 + share))
+    hidden = np.abs(np.sin(rate * tr + phase) - np.sin(rate * td + phase)) * np.sqrt(
+        share / (1 + share)
+    )
     assert (hidden <= 3 * np.sqrt(found.unseen(tr, td)) + 0.2).all()
 
 
 @pytest.mark.parametrize("preload", [0.1, 0.3, -0.3])
 def test_a_preload_that_makes_swings_uneven_is_no_beat(preload: float) -> None:
-    found = sure(count_swings(TIME, (np.exp(-0.02 * TIME) * np.sin(TIME) + preload) ** 2))
+    found = sure(
+        count_swings(TIME, (np.exp(-0.02 * TIME) * np.sin(TIME) + preload) ** 2)
+    )
     assert np.ptp(np.diff(found.bottoms)) > 0.3
 
 
@@ -89,19 +104,28 @@ def test_the_pair_of_a_spring_that_stiffens_has_the_sign_of_td(lifted: Samples) 
     for td in (20.0, 27.5):
         answer = suggest(record, td, Settings(after=2.0))
         assert answer.situation.basis == "swings"
-        assert ("basis", "swings of the energy, counted") in heading(answer.situation)  # no word of parts
+        assert ("basis", "swings of the energy, counted") in heading(
+            answer.situation
+        )  # no word of parts
         at_tr, at_td = np.interp([sure(answer.chosen).tr, td], TIME, x)
         assert at_tr == pytest.approx(at_td, abs=0.2 * np.abs(x[td < TIME]).max())
-        assert not any(one.acceptable and np.interp(one.tr, TIME, x) * at_td < -1e-3 for one in answer.candidates)
+        assert not any(
+            one.acceptable and np.interp(one.tr, TIME, x) * at_td < -1e-3
+            for one in answer.candidates
+        )
 
 
-def test_swings_are_looked_for_in_a_flight_alone_and_where_an_oscillator_is_doubtful() -> None:
+def test_swings_are_looked_for_in_a_flight_alone_and_where_an_oscillator_is_doubtful() -> (
+    None
+):
     record, memory = table(TIME, stiffening(1.0, 0.02)[1]), Memory()
     around, flight, settled = Span(0.0, 30.0), Span(2.0, 28.0), Span(1.0, 28.0)
     together = Together(record, Flight())
 
     def find(flight: Span | None, *, doubtful: bool) -> Mapping[str, Any]:
-        return find_models(record, around, flight, settled, lambda: doubtful, memory, together)
+        return find_models(
+            record, around, flight, settled, lambda: doubtful, memory, together
+        )
 
     assert not find(None, doubtful=True)
     assert not find(flight, doubtful=False)
@@ -111,7 +135,8 @@ def test_swings_are_looked_for_in_a_flight_alone_and_where_an_oscillator_is_doub
 
 
 @pytest.mark.parametrize(
-    ("hidden", "unseen", "basis"), [(0.1, 0.05, "swings"), (0.1, 0.2, "oscillator"), (0.0, -1.0, "oscillator")]
+    ("hidden", "unseen", "basis"),
+    [(0.1, 0.05, "swings"), (0.1, 0.2, "oscillator"), (0.0, -1.0, "oscillator")],
 )
 def test_counted_swings_are_relied_on_where_they_leave_less_than_the_oscillator(
     hidden: float, unseen: float, basis: str

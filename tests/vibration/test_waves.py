@@ -7,27 +7,43 @@ from hypothesis import given, strategies as st
 from d2rpick.vibration.waves import Waves, fit_waves
 from tests.energies import sure
 
-MADE = Waves(np.array([-0.1 + 5j, -0.1 + 8j, -0.1 + 13j]), np.array([1 + 0.3j, -0.6j, 0.2]), 0.0)
+MADE = Waves(
+    np.array([-0.1 + 5j, -0.1 + 8j, -0.1 + 13j]), np.array([1 + 0.3j, -0.6j, 0.2]), 0.0
+)
 TIME = np.linspace(0, 9, 700)
 
 
-@given(st.floats(3, 6), st.floats(1.2, 2.5), st.floats(0, 0.4), st.floats(0, 6.3), st.booleans())
-def test_waves_are_found_again(rate: float, ratio: float, damping: float, phase: float, even: bool) -> None:
+@given(
+    st.floats(3, 6),
+    st.floats(1.2, 2.5),
+    st.floats(0, 0.4),
+    st.floats(0, 6.3),
+    st.booleans(),
+)
+def test_waves_are_found_again(
+    rate: float, ratio: float, damping: float, phase: float, even: bool
+) -> None:
     rates = -damping + 1j * rate * np.array([1.0, ratio, 1.6 * ratio])
     made = Waves(rates, np.exp(1j * phase * np.arange(3)), 0.0)
     time = TIME if even else TIME + 0.001 * np.sin(40 * TIME)
     found = sure(fit_waves(time, made.deformation(time)))
     room = (1e-6 if even else 0.02) * made.vibration_energy(time)
     assert np.all(np.abs(found.energy(time) - made.energy(time)) < room + 1e-9)
-    assert np.all(np.abs(found.kinetic_energy(time) - made.kinetic_energy(time)) < 2 * room + 1e-9)
+    assert np.all(
+        np.abs(found.kinetic_energy(time) - made.kinetic_energy(time)) < 2 * room + 1e-9
+    )
 
 
 def test_one_wave_is_an_oscillator() -> None:
     one = Waves(MADE.rates[:1], MADE.weights[:1], 0.0)
     velocity = np.gradient(one.deformation(TIME), TIME, edge_order=2)
-    assert one.kinetic_energy(TIME) == pytest.approx((velocity / abs(one.rates[0])) ** 2, abs=2e-3)
+    assert one.kinetic_energy(TIME) == pytest.approx(
+        (velocity / abs(one.rates[0])) ** 2, abs=2e-3
+    )
     assert one.alpha == pytest.approx(0.2)
-    assert one.vibration_energy(0.3) == pytest.approx(one.energy(0.3) + one.kinetic_energy(0.3))
+    assert one.vibration_energy(0.3) == pytest.approx(
+        one.energy(0.3) + one.kinetic_energy(0.3)
+    )
 
 
 def test_the_fewest_waves_that_do_are_taken() -> None:

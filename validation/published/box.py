@@ -91,8 +91,14 @@ def _early(base: Parameters) -> Exhibit:
 
 def _energies(base: Parameters) -> Exhibit:
     reference = _run(base)
-    errors = {tr: _roll_error(reference, _run(base, RigidWindow(tr, TD))) for tr in (_LITTLE, _MUCH)}
-    energy = {tr: float(np.interp(tr, reference.time, reference.internal_energy[:, BOX])) for tr in (*errors, TD)}
+    errors = {
+        tr: _roll_error(reference, _run(base, RigidWindow(tr, TD)))
+        for tr in (_LITTLE, _MUCH)
+    }
+    energy = {
+        tr: float(np.interp(tr, reference.time, reference.internal_energy[:, BOX]))
+        for tr in (*errors, TD)
+    }
     return _compared(
         "energies", "Too little and too much energy", "2c", 1, base, (_LITTLE, _MUCH),
         "Too little energy locked in gives less roll, too much gives more roll.",
@@ -108,7 +114,10 @@ def _revised(base: Parameters) -> Exhibit:
     reference = _run(base)
     tr = _own(reference, TD)
     assert tr is not None
-    errors = [_roll_error(reference, _run(base, RigidWindow(time, TD))) for time in (_REVISED, tr)]
+    errors = [
+        _roll_error(reference, _run(base, RigidWindow(time, TD)))
+        for time in (_REVISED, tr)
+    ]
     return _compared(
         "revised", "The revised pair", "8", 4, base, (_REVISED, tr),
         "With tr = 70 and td = 370 ms, the ground at about 380 ms, height and roll agree closely.",
@@ -144,12 +153,27 @@ def _compared(
     marks = (("td", 1e3 * TD),)
     panels = (
         (
-            Panel(f"box every {every:.0f} ms", "z [m]", shapes=tuple(shapes), xlabel="x [m]"),
+            Panel(
+                f"box every {every:.0f} ms",
+                "z [m]",
+                shapes=tuple(shapes),
+                xlabel="x [m]",
+            ),
             Panel("roll", "roll [degrees]", tuple(rolls), marks=marks),
         ),
         (
-            Panel("roll less that of the reference", "difference [degrees]", tuple(differences), marks=marks),
-            Panel("height less that of the reference", "difference [mm]", tuple(heights), marks=marks),
+            Panel(
+                "roll less that of the reference",
+                "difference [degrees]",
+                tuple(differences),
+                marks=marks,
+            ),
+            Panel(
+                "height less that of the reference",
+                "difference [mm]",
+                tuple(heights),
+                marks=marks,
+            ),
         ),
     )
     return Exhibit(name, title, section, figure, paper, found, agrees, columns, panels)
@@ -158,15 +182,36 @@ def _compared(
 def variants_of(base: Parameters) -> Iterator[Variant]:
     """Changes that act after td, then changes that act before."""
     yield Variant("base", base, before=False)
-    yield Variant("ground stiffness / 2", replace(base, ground_stiffness=base.ground_stiffness / 2), before=False)
-    yield Variant("ground stiffness x 2", replace(base, ground_stiffness=base.ground_stiffness * 2), before=False)
-    yield Variant("ground 10 mm lower", replace(base, ground=base.ground + 0.01), before=False)
-    yield Variant("roof 30 % weaker", replace(base, roof_strength=0.7), before=False)  # yields in the landing alone
-    yield Variant("roof twice as strong", replace(base, roof_strength=2.0), before=False)
-    for name, share in (("stiffness", 0.15), ("stiffness", 0.2), ("yield_strain", 0.15), ("speed", 0.01)):
+    yield Variant(
+        "ground stiffness / 2",
+        replace(base, ground_stiffness=base.ground_stiffness / 2),
+        before=False,
+    )
+    yield Variant(
+        "ground stiffness x 2",
+        replace(base, ground_stiffness=base.ground_stiffness * 2),
+        before=False,
+    )
+    yield Variant(
+        "ground 10 mm lower", replace(base, ground=base.ground + 0.01), before=False
+    )
+    yield Variant(
+        "roof 30 % weaker", replace(base, roof_strength=0.7), before=False
+    )  # yields in the landing alone
+    yield Variant(
+        "roof twice as strong", replace(base, roof_strength=2.0), before=False
+    )
+    for name, share in (
+        ("stiffness", 0.15),
+        ("stiffness", 0.2),
+        ("yield_strain", 0.15),
+        ("speed", 0.01),
+    ):
         for sign in (-1, 1):
             changed = replace(base, **{name: getattr(base, name) * (1 + sign * share)})
-            yield Variant(f"{name.replace('_', ' ')} {sign * share:+.0%}", changed, before=True)
+            yield Variant(
+                f"{name.replace('_', ' ')} {sign * share:+.0%}", changed, before=True
+            )
     yield Variant("damping 1 1/s", replace(base, damping=1.0), before=True)
 
 
@@ -177,15 +222,26 @@ def tried(variants: Sequence[Variant]) -> Trial:
     """
     landings = [_run(one.parameters).landed or _END for one in variants]
     td = round(min(landings) - _BEFORE_LANDING, 3)
-    rows = [row_of(one.name, suggest(history_of(_run(one.parameters)), td, Settings())) for one in variants]
+    rows = [
+        row_of(one.name, suggest(history_of(_run(one.parameters)), td, Settings()))
+        for one in variants
+    ]
     common = common_tr(rows)
     assert common.tr is not None
     window = RigidWindow(common.tr, td)
     known = zip(variants, rows, common.errors, strict=True)
     runs = tuple(_at(one, row, error or 0.0, window) for one, row, error in known)
-    named = [row for row in rows if row.source in ("base", "stiffness -15%", "stiffness +15%")]
+    named = [
+        row
+        for row in rows
+        if row.source in ("base", "stiffness -15%", "stiffness +15%")
+    ]
     alone = common_tr(named)
-    three = None if alone.tr is None else (alone.tr, max(error or 0.0 for error in alone.errors))
+    three = (
+        None
+        if alone.tr is None
+        else (alone.tr, max(error or 0.0 for error in alone.errors))
+    )
     return Trial(window, bool(common.keeps_tolerance), runs, three)
 
 
@@ -223,13 +279,30 @@ def exhibit_of(trial: Trial) -> Exhibit:
 def _of_variants(window: RigidWindow) -> tuple[tuple[Panel, ...], ...]:
     dots, common = {"style": "dots", "x": "run"}, 1e3 * window.tr
     level = (f"common tr = {common:.1f} ms, td = {1e3 * window.td:g} ms", common)
-    rigid = (Curve("own tr", "rigid_own", **dots), Curve("common tr", "rigid_common", **dots))
-    errors = (Curve("at td", "roll_error_deg", **dots), Curve("after the landing", "end_error_deg", **dots))
+    rigid = (
+        Curve("own tr", "rigid_own", **dots),
+        Curve("common tr", "rigid_common", **dots),
+    )
+    errors = (
+        Curve("at td", "roll_error_deg", **dots),
+        Curve("after the landing", "end_error_deg", **dots),
+    )
     energy = (Curve("level error", "level_error", **dots),)
     return (
         (
-            Panel("tr of each run", "tr [ms]", (Curve("own tr", "own_tr_ms", **dots),), levels=(level,), xlabel="run"),
-            Panel("what is saved at most", "rigid fraction of the run [-]", rigid, xlabel="run"),
+            Panel(
+                "tr of each run",
+                "tr [ms]",
+                (Curve("own tr", "own_tr_ms", **dots),),
+                levels=(level,),
+                xlabel="run",
+            ),
+            Panel(
+                "what is saved at most",
+                "rigid fraction of the run [-]",
+                rigid,
+                xlabel="run",
+            ),
         ),
         (
             Panel("at the common tr", "level error [-]", energy, xlabel="run"),
@@ -240,20 +313,34 @@ def _of_variants(window: RigidWindow) -> tuple[tuple[Panel, ...], ...]:
 
 def _alone_after(trial: Trial) -> bool:
     """Whether what acts after td leaves tr where it is, to a state of the record."""
-    times = [one.row.tr for one in trial.runs if one.row.tr is not None and not one.variant.before]
-    return max(times) - min(times) < float(_run(trial.runs[0].variant.parameters).time[1])
+    times = [
+        one.row.tr
+        for one in trial.runs
+        if one.row.tr is not None and not one.variant.before
+    ]
+    return max(times) - min(times) < float(
+        _run(trial.runs[0].variant.parameters).time[1]
+    )
 
 
 def _told(trial: Trial) -> str:
     """Say how far the paper's statement holds, and where it fails."""
     rows, window = trial.runs, trial.window
     known = [(one, 1e3 * one.row.tr) for one in rows if one.row.tr is not None]
-    after, before = ([tr for one, tr in known if one.variant.before is flag] for flag in (False, True))
+    after, before = (
+        [tr for one, tr in known if one.variant.before is flag]
+        for flag in (False, True)
+    )
     loads = [1e3 * (_run(one.variant.parameters).released or 0.0) for one in rows]
     worst = max(rows, key=lambda one: one.level_error)
-    given_up, rigid = 1e3 * window.tr - min(tr for _, tr in known), 1e3 * (window.td - window.tr)
+    given_up, rigid = (
+        1e3 * window.tr - min(tr for _, tr in known),
+        1e3 * (window.td - window.tr),
+    )
     roll = max(abs(one.roll_error) for one in rows)
-    names = "; ".join(f"{place} {one.variant.name}" for place, one in enumerate(rows, start=1))
+    names = "; ".join(
+        f"{place} {one.variant.name}" for place, one in enumerate(rows, start=1)
+    )
     fails = "" if trial.kept else (
         "It fails for all of them at once: no tr lies within the timing tolerance of each run, so that no error grows "
         "by more than 0.05. "
@@ -278,7 +365,9 @@ def _of_stiffness(trial: Trial, own: Mapping[str, float]) -> str:
     """Say what the stiffness alone does, where its variants were run."""
     if trial.stiffness is None or "stiffness +15%" not in own:
         return ""
-    times = ", ".join(f"{own[name]:.1f}" for name in ("stiffness -15%", "base", "stiffness +15%"))
+    times = ", ".join(
+        f"{own[name]:.1f}" for name in ("stiffness -15%", "base", "stiffness +15%")
+    )
     tr, error = trial.stiffness
     return (
         f"With the stiffness 15 % lower, as it is, and 15 % higher it is {times} ms: no crossing is common, yet "
@@ -312,7 +401,13 @@ def _outlines(record: Record) -> Plane:
 
 
 # Section of the paper and what makes each figure, some seconds with the default box.
-_FIGURES: Final = ((1, _setting), (1, _early), (1, _energies), (4, _revised), (4, _variants))
+_FIGURES: Final = (
+    (1, _setting),
+    (1, _early),
+    (1, _energies),
+    (4, _revised),
+    (4, _variants),
+)
 
 
 def exhibits_of(parameters: Parameters) -> list[tuple[int, Callable[[], Exhibit]]]:

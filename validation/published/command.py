@@ -29,7 +29,13 @@ if TYPE_CHECKING:
 PICTURES = ("svg", "png")
 
 
-def reproduce(output_dir: str, section: Sequence[str], solver: Sequence[str], tables: Tables, output: Output) -> None:
+def reproduce(
+    output_dir: str,
+    section: Sequence[str],
+    solver: Sequence[str],
+    tables: Tables,
+    output: Output,
+) -> None:
     """Write the figures and tables of these sections, of all without any, and the answer.
 
     ``tables``: the columns of a solver's table beside its times, by what it is.
@@ -40,18 +46,30 @@ def reproduce(output_dir: str, section: Sequence[str], solver: Sequence[str], ta
     answer = reproduction.Reproduction(table(), list(_exhibits(section, curves)))
     files = _write(output, place, answer)
     if output.report:
-        output.write(output.report, reproduction.as_page(answer, options.repeat()).encode())
+        output.write(
+            output.report, reproduction.as_page(answer, options.repeat()).encode()
+        )
     answer = answer._replace(files=files)
-    output.result(written_by(reproduction, output.output_format, answer, output.shown()))
+    output.result(
+        written_by(reproduction, output.output_format, answer, output.shown())
+    )
     output.notes([f"{len(files)} files in {output_dir}"], ())
     output.finish(objection=not all(row.agrees for row in answer.rows))
 
 
-def _exhibits(sections: Sequence[str], solver: Mapping[str, Mapping[str, Samples]]) -> Iterator[Exhibit]:
+def _exhibits(
+    sections: Sequence[str], solver: Mapping[str, Mapping[str, Samples]]
+) -> Iterator[Exhibit]:
     """Give the figures of these sections, of all without any, in the order of the paper."""
-    makers = [*box.exhibits_of(Parameters()), *exhibits.exhibits_of(solver), (5, saving.exhibit)]
+    makers = [
+        *box.exhibits_of(Parameters()),
+        *exhibits.exhibits_of(solver),
+        (5, saving.exhibit),
+    ]
     makers.sort(key=lambda one: one[0])
-    return (make() for section, make in makers if not sections or str(section) in sections)
+    return (
+        make() for section, make in makers if not sections or str(section) in sections
+    )
 
 
 def _solver(names: Sequence[str], tables: Tables) -> dict[str, dict[str, Samples]]:
@@ -59,11 +77,20 @@ def _solver(names: Sequence[str], tables: Tables) -> dict[str, dict[str, Samples
     found = {}
     for name in names:
         (database,) = open_run([name], Selection(energy=("2",))).databases
-        kinds = [kind for kind, columns in tables.items() if {*columns} <= {*database.channels}]
+        kinds = [
+            kind
+            for kind, columns in tables.items()
+            if {*columns} <= {*database.channels}
+        ]
         if not kinds:
             known = " or ".join(", ".join(columns) for columns in tables.values())
-            raise FormatError(f"{name}: the columns are {', '.join(database.channels)}; {known} were expected")
-        columns = {column: database.channel(database.find(column)) for column in tables[kinds[0]]}
+            raise FormatError(
+                f"{name}: the columns are {', '.join(database.channels)}; {known} were expected"
+            )
+        columns = {
+            column: database.channel(database.find(column))
+            for column in tables[kinds[0]]
+        }
         found[kinds[0]] = {"time_s": database.time, **columns}
     return found
 
@@ -74,17 +101,25 @@ def _made(folder: str) -> Path:
     try:
         place.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise D2RPickError(f"{folder}: the folder cannot be created ({error.strerror}); choose another one") from error
+        raise D2RPickError(
+            f"{folder}: the folder cannot be created ({error.strerror}); choose another one"
+        ) from error
     return place
 
 
 def _write(output: Output, place: Path, answer: Reproduction) -> list[str]:
     """Write all files, or none where one may not be written; give their names."""
-    index, values = reproduction.as_markdown(answer, Shown(), pictures=True), reproduction.as_csv(answer, Shown())
+    index, values = (
+        reproduction.as_markdown(answer, Shown(), pictures=True),
+        reproduction.as_csv(answer, Shown()),
+    )
     contents = {"README.md": f"{index}\n".encode(), "table.csv": f"{values}\n".encode()}
     for one in answer.exhibits:
         figure = draw_exhibit(one)
-        contents |= {f"{one.name}.{form}": figures.render(figure, f"x.{form}") for form in PICTURES}
+        contents |= {
+            f"{one.name}.{form}": figures.render(figure, f"x.{form}")
+            for form in PICTURES
+        }
         if one.columns:
             contents[f"{one.name}.csv"] = csv_table.write(dict(one.columns))
     named = {str(place / name): content for name, content in contents.items()}

@@ -10,7 +10,14 @@ from matplotlib.patches import FancyArrowPatch, Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from d2rpick.models.box_model import Parameters, build
-from d2rpick.report.figures import FLIGHT, GOOD, REFERENCE, SWITCHED, finish, make_logarithmic
+from d2rpick.report.figures import (
+    FLIGHT,
+    GOOD,
+    REFERENCE,
+    SWITCHED,
+    finish,
+    make_logarithmic,
+)
 from d2rpick.report.figures_models import draw_sled
 from d2rpick.report.view import BELOW_LEVEL, LOGARITHMIC
 
@@ -40,9 +47,13 @@ def draw_exhibit(exhibit: Exhibit) -> Figure:
         axes.set_aspect("equal")
         return figure
     rows, columns = len(exhibit.panels), len(exhibit.panels[0])
-    figure = Figure(figsize=(9 if columns == 1 else 5.2 * columns, 3.4 * rows), layout="constrained")
+    figure = Figure(
+        figsize=(9 if columns == 1 else 5.2 * columns, 3.4 * rows), layout="constrained"
+    )
     grid = figure.subplots(rows, columns, squeeze=False)
-    for axes, panel in zip(grid.flat, (panel for row in exhibit.panels for panel in row), strict=True):
+    for axes, panel in zip(
+        grid.flat, (panel for row in exhibit.panels for panel in row), strict=True
+    ):
         _draw_panel(axes, panel, exhibit.columns)
     return figure
 
@@ -50,14 +61,29 @@ def draw_exhibit(exhibit: Exhibit) -> Figure:
 def _draw_panel(axes: Axes, panel: Panel, columns: Mapping[str, Samples]) -> None:
     drawn = dict.fromkeys(_STYLES, 0)
     for curve in panel.curves:
-        x, y = columns[curve.x] if curve.x else next(iter(columns.values())), columns[curve.column]
-        shown = slice(None, None, max(1, x.size // _DOTS) if curve.style == "dots" and not panel.span else 1)
+        x, y = (
+            columns[curve.x] if curve.x else next(iter(columns.values())),
+            columns[curve.column],
+        )
+        shown = slice(
+            None,
+            None,
+            max(1, x.size // _DOTS) if curve.style == "dots" and not panel.span else 1,
+        )
         label = curve.label or "_"
-        axes.plot(x[shown], y[shown], label=label, color=_COLOURS[drawn[curve.style]], **_STYLES[curve.style])
+        axes.plot(
+            x[shown],
+            y[shown],
+            label=label,
+            color=_COLOURS[drawn[curve.style]],
+            **_STYLES[curve.style],
+        )
         drawn[curve.style] += 1
     for shape, colour in zip(panel.shapes, _COLOURS, strict=False):
         closed = np.column_stack([shape.outlines, shape.outlines[:, 0]]).T
-        lines = axes.plot(closed.real, closed.imag, color=colour, **_STYLES[shape.style])
+        lines = axes.plot(
+            closed.real, closed.imag, color=colour, **_STYLES[shape.style]
+        )
         lines[0].set_label(shape.label)
         axes.set_aspect("equal")
     _draw_marks(axes, panel)
@@ -66,7 +92,9 @@ def _draw_panel(axes: Axes, panel: Panel, columns: Mapping[str, Samples]) -> Non
     axes.set_title(panel.title, fontsize="small")
     axes.set(xlabel=panel.xlabel, ylabel=panel.ylabel)
     finish(axes, legend=False)
-    if panel.curves and all(curve.x and curve.style == "dots" for curve in panel.curves):
+    if panel.curves and all(
+        curve.x and curve.style == "dots" for curve in panel.curves
+    ):
         axes.margins(x=0.1, y=0.1)  # single runs, which would stand on the edges
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     if axes.get_legend_handles_labels()[0]:
@@ -77,7 +105,9 @@ def _draw_marks(axes: Axes, panel: Panel) -> None:
     for name, level in panel.levels:
         axes.axhline(level, color=SWITCHED, linewidth=0.8, label=name)
     for place, (name, x) in enumerate(panel.marks):
-        axes.axvline(x, color=_COLOURS[2 + place], linestyle="--", linewidth=1, label=name)
+        axes.axvline(
+            x, color=_COLOURS[2 + place], linestyle="--", linewidth=1, label=name
+        )
     for x, y in panel.points:
         axes.plot(x, y, "o", color=GOOD, markersize=5)
     if panel.rigid:
@@ -89,7 +119,9 @@ def _show(axes: Axes, panel: Panel, columns: Mapping[str, Samples]) -> None:
     assert panel.span is not None
     low, high = panel.span
     x = next(iter(columns.values()))
-    values = np.concatenate([columns[curve.column][(low <= x) & (x <= high)] for curve in panel.curves])
+    values = np.concatenate(
+        [columns[curve.column][(low <= x) & (x <= high)] for curve in panel.curves]
+    )
     axes.set_xlim(low, high)
     room = 0.06 * float(np.ptp(values))
     axes.set_ylim(float(values.min()) - room, float(values.max()) + room)
@@ -109,15 +141,29 @@ def box(axes: Axes) -> None:
     parameters = Parameters()
     structure = build(parameters)
     draw_sled(axes, parameters, 0.0)
-    for truss, colour, width in ((structure.box, REFERENCE, 0.4), (structure.step, GOOD, 1.2)):
+    for truss, colour, width in (
+        (structure.box, REFERENCE, 0.4),
+        (structure.step, GOOD, 1.2),
+    ):
         for one, other in structure.places[truss.ends]:
-            axes.plot([one.real, other.real], [one.imag, other.imag], color=colour, linewidth=width)
+            axes.plot(
+                [one.real, other.real],
+                [one.imag, other.imag],
+                color=colour,
+                linewidth=width,
+            )
     _arrow(axes, (-1.35, 0.95), (-0.95, 0.95), "sled, 7 m/s, stops in 60 ms")
     for text, place, at in (
         ("box, switched", (0.55, 1.2), (0.1, 1.0)), ("step, stays deformable", (0.55, 0.75), (0.02, 0.1)),
         ("curb with cushion", (0.55, 0.35), (0.07, 0.04)), ("ground", (0.75, -0.08), (0.75, -parameters.ground)),
     ):  # fmt: skip
-        axes.annotate(text, at, xytext=place, fontsize="small", arrowprops={"arrowstyle": "-", "linewidth": 0.6})
+        axes.annotate(
+            text,
+            at,
+            xytext=place,
+            fontsize="small",
+            arrowprops={"arrowstyle": "-", "linewidth": 0.6},
+        )
     axes.set(xlim=(-1.7, 1.5), ylim=(-0.25, 1.7), xlabel="x [m]", ylabel="z [m]")
 
 
@@ -131,7 +177,13 @@ def masses(axes: Axes) -> None:
         _arrow(axes, (left + 0.5, 1.35), (left + 1.1, 1.35), name)
         _damper(axes, left + 0.5, label)
     _arrow(axes, (-1.0, 0.65), (-0.1, 0.65), "V0")
-    axes.text(2.0, -1.25, "β = M/m,  no support: dampers act against the rest", ha="center", fontsize="small")
+    axes.text(
+        2.0,
+        -1.25,
+        "β = M/m,  no support: dampers act against the rest",
+        ha="center",
+        fontsize="small",
+    )
     axes.set(xlim=(-1.3, 4.6), ylim=(-1.5, 1.9))
     axes.axis("off")
 
@@ -140,7 +192,14 @@ def elements(axes: Axes) -> None:
     """Ten bricks as the spring between two lumps of mass."""
     for number in range(10):
         axes.add_patch(
-            Rectangle((1.0 + 0.2 * number, 0.55), 0.2, 0.2, facecolor=FLIGHT, edgecolor=REFERENCE, alpha=0.6)
+            Rectangle(
+                (1.0 + 0.2 * number, 0.55),
+                0.2,
+                0.2,
+                facecolor=FLIGHT,
+                edgecolor=REFERENCE,
+                alpha=0.6,
+            )
         )
     _block(axes, 0.0, "m")
     _block(axes, 3.0, "M")
@@ -152,11 +211,24 @@ def elements(axes: Axes) -> None:
     axes.axis("off")
 
 
-SCHEMES: Final[Mapping[str, Callable[[Axes], None]]] = {"box": box, "masses": masses, "elements": elements}
+SCHEMES: Final[Mapping[str, Callable[[Axes], None]]] = {
+    "box": box,
+    "masses": masses,
+    "elements": elements,
+}
 
 
 def _block(axes: Axes, left: float, name: str) -> None:
-    axes.add_patch(Rectangle((left, 0.15), 1.0, 1.0, facecolor="white", edgecolor=REFERENCE, linewidth=1.2))
+    axes.add_patch(
+        Rectangle(
+            (left, 0.15),
+            1.0,
+            1.0,
+            facecolor="white",
+            edgecolor=REFERENCE,
+            linewidth=1.2,
+        )
+    )
     axes.text(left + 0.5, 0.65, name, ha="center", va="center", fontsize="large")
 
 
@@ -171,12 +243,21 @@ def _damper(axes: Axes, x: float, label: str) -> None:
     """A dashpot from a mass down to the rest."""
     axes.plot([x, x], [0.15, -0.25], color=REFERENCE, linewidth=1)
     axes.plot([x - 0.13, x + 0.13], [-0.25, -0.25], color=REFERENCE, linewidth=2)
-    axes.plot([x - 0.18, x - 0.18, x + 0.18, x + 0.18], [-0.15, -0.45, -0.45, -0.15], color=REFERENCE, linewidth=1)
+    axes.plot(
+        [x - 0.18, x - 0.18, x + 0.18, x + 0.18],
+        [-0.15, -0.45, -0.45, -0.15],
+        color=REFERENCE,
+        linewidth=1,
+    )
     axes.plot([x, x], [-0.45, -0.75], color=REFERENCE, linewidth=1)
     axes.plot([x - 0.35, x + 0.35], [-0.75, -0.75], color=REFERENCE, linewidth=1.5)
     axes.text(x + 0.28, -0.4, label, fontsize="small")
 
 
-def _arrow(axes: Axes, start: tuple[float, float], end: tuple[float, float], text: str) -> None:
-    axes.add_patch(FancyArrowPatch(start, end, arrowstyle="-|>", mutation_scale=12, color=SWITCHED))
+def _arrow(
+    axes: Axes, start: tuple[float, float], end: tuple[float, float], text: str
+) -> None:
+    axes.add_patch(
+        FancyArrowPatch(start, end, arrowstyle="-|>", mutation_scale=12, color=SWITCHED)
+    )
     axes.text(start[0], start[1] + 0.08, text, color=SWITCHED, fontsize="small")

@@ -107,15 +107,36 @@ def exhibits_of(solver: Tables) -> list[tuple[int, Callable[[], Exhibit]]]:
     figures: list[tuple[int, Callable[[], Exhibit]]] = [
         (
             2,
-            partial(_scheme, "masses", "The floating oscillator", 2, "3", "Two masses, a spring, dampers, no support."),
+            partial(
+                _scheme,
+                "masses",
+                "The floating oscillator",
+                2,
+                "3",
+                "Two masses, a spring, dampers, no support.",
+            ),
         ),
         (2, _response),
-        (3, partial(_scheme, "elements", "Its finite element model", 3, "5", "The oscillator in finite elements.")),
+        (
+            3,
+            partial(
+                _scheme,
+                "elements",
+                "Its finite element model",
+                3,
+                "5",
+                "The oscillator in finite elements.",
+            ),
+        ),
         (3, partial(_motion, solver.get("run"))),
         (4, _level),
         (4, _after_td),
     ]
-    return [*figures, (4, partial(_beside_solver, solver["pairs"]))] if "pairs" in solver else figures
+    return (
+        [*figures, (4, partial(_beside_solver, solver["pairs"]))]
+        if "pairs" in solver
+        else figures
+    )
 
 
 def _scheme(name: str, title: str, section: int, figure: str, paper: str) -> Exhibit:
@@ -139,10 +160,18 @@ def _response() -> Exhibit:
         columns[f"y_{key}_m"] = switched(pair).motion(TIME).y
         columns[f"error_{key}_m"] = columns[f"y_{key}_m"] - columns["y_free_m"]
         curves.append(Curve(f"({1e3 * pair[0]:g}, {1e3 * pair[1]:g}) ms", f"y_{key}_m"))
-        errors.append(Curve(f"({1e3 * pair[0]:g}, {1e3 * pair[1]:g}) ms", f"error_{key}_m"))
+        errors.append(
+            Curve(f"({1e3 * pair[0]:g}, {1e3 * pair[1]:g}) ms", f"error_{key}_m")
+        )
     panels = (
         (Panel("response of the suspended mass", "y [m]", tuple(curves)),),
-        (Panel("less that without switching", "difference [m]", (Curve("", "zero_m"), *errors)),),
+        (
+            Panel(
+                "less that without switching",
+                "difference [m]",
+                (Curve("", "zero_m"), *errors),
+            ),
+        ),
     )
     return Exhibit(
         "response", "Response for several switch times", 2, "4",
@@ -163,13 +192,28 @@ def _motion(run: Mapping[str, Samples] | None) -> Exhibit:
     ]  # fmt: skip
     method = "integrated" if run is None else "finite elements"
     columns = {"time_ms": 1e3 * time}
-    for name, unit, ours, theirs in zip(("z", "y", "vz", "vy"), ("m", "m", "mps", "mps"), closed, other, strict=True):
-        columns |= {f"{name}_closed_{unit}": ours, f"{name}_other_{unit}": np.asarray(theirs)}
+    for name, unit, ours, theirs in zip(
+        ("z", "y", "vz", "vy"), ("m", "m", "mps", "mps"), closed, other, strict=True
+    ):
+        columns |= {
+            f"{name}_closed_{unit}": ours,
+            f"{name}_other_{unit}": np.asarray(theirs),
+        }
     rigid = _rigid(INTEGRATED)
 
-    def panel(title: str, unit: str, ylabel: str, names: Sequence[str], span: tuple[float, float] | None) -> Panel:
-        lines = [Curve(f"{name}, closed form", f"{name}_closed_{unit}") for name in names]
-        dots = [Curve(f"{name}, {method}", f"{name}_other_{unit}", "dots") for name in names]
+    def panel(
+        title: str,
+        unit: str,
+        ylabel: str,
+        names: Sequence[str],
+        span: tuple[float, float] | None,
+    ) -> Panel:
+        lines = [
+            Curve(f"{name}, closed form", f"{name}_closed_{unit}") for name in names
+        ]
+        dots = [
+            Curve(f"{name}, {method}", f"{name}_other_{unit}", "dots") for name in names
+        ]
         return Panel(title, ylabel, (*lines, *dots), rigid, span=span)
 
     velocities = [
@@ -180,7 +224,13 @@ def _motion(run: Mapping[str, Samples] | None) -> Exhibit:
             ("at td", (rigid[1] - _NEAR, rigid[1] + _NEAR)),
         )
     ]
-    whole = panel(f"displacements, {_named(INTEGRATED)}", "m", "displacement [m]", ("z", "y"), None)
+    whole = panel(
+        f"displacements, {_named(INTEGRATED)}",
+        "m",
+        "displacement [m]",
+        ("z", "y"),
+        None,
+    )
     off = max(
         float(np.abs(columns[f"{name}_other_m"] - columns[f"{name}_closed_m"]).max()) for name in "zy"
     ) / float(np.abs(closed.z).max())  # fmt: skip
@@ -212,7 +262,15 @@ def _level() -> Exhibit:
     marks = ((f"{1e3 * exact:.3f} ms", 1e3 * exact), ("13 ms", 13.0))
     panels = (
         (
-            Panel("crossings of the level", "energy [J]", curve, None, levels, points=points, span=(0.0, 70.0)),
+            Panel(
+                "crossings of the level",
+                "energy [J]",
+                curve,
+                None,
+                levels,
+                points=points,
+                span=(0.0, 70.0),
+            ),
             Panel(
                 "tr as read and as computed",
                 "energy [J]",
@@ -237,13 +295,22 @@ def _level() -> Exhibit:
 
 def _after_td() -> Exhibit:
     """Response after td for the published pair and the better one, against the reference."""
-    columns: dict[str, Samples] = {"time_ms": 1e3 * TIME, "y_free_m": OSCILLATOR.free(START, TIME).y}
+    columns: dict[str, Samples] = {
+        "time_ms": 1e3 * TIME,
+        "y_free_m": OSCILLATOR.free(START, TIME).y,
+    }
     panels = []
     for name, pair in (("published", PUBLISHED), ("better", pair_at_peak())):
         columns[f"y_{name}_m"] = switched(pair).motion(TIME).y
         columns[f"r_{name}_m"] = deformation_of(switched(pair).motion(TIME))
-        motion = (Curve("without switching", "y_free_m"), Curve("switched", f"y_{name}_m"))
-        vibration = (Curve("without switching", "r_free_m"), Curve("switched", f"r_{name}_m"))
+        motion = (
+            Curve("without switching", "y_free_m"),
+            Curve("switched", f"y_{name}_m"),
+        )
+        vibration = (
+            Curve("without switching", "r_free_m"),
+            Curve("switched", f"r_{name}_m"),
+        )
         shown = (10.0, 150.0)
         panels.append((
             Panel(f"{name} pair: {_named(pair)}", "y [m]", motion, _rigid(pair), span=shown),
@@ -266,12 +333,24 @@ def _beside_solver(solver: Mapping[str, Samples]) -> Exhibit:
     columns = {"time_ms": 1e3 * time, "reference_solver_m": solver["reference_m"]}
     panels = []
     for name, pair in (("published", PUBLISHED), ("better", pair_at_peak())):
-        columns |= {f"{name}_solver_m": solver[f"{name}_m"], f"{name}_m": deformation_of(switched(pair).motion(time))}
+        columns |= {
+            f"{name}_solver_m": solver[f"{name}_m"],
+            f"{name}_m": deformation_of(switched(pair).motion(time)),
+        }
         curves = (
             Curve("without switching, solver", "reference_solver_m", "thin"),
             Curve("switched, closed form", f"{name}_m"), Curve("switched, solver", f"{name}_solver_m", "dots"),
         )  # fmt: skip
-        panels.append((Panel(f"{name} pair: {_named(pair)}", "deformation y - z [m]", curves, _rigid(pair)),))
+        panels.append(
+            (
+                Panel(
+                    f"{name} pair: {_named(pair)}",
+                    "deformation y - z [m]",
+                    curves,
+                    _rigid(pair),
+                ),
+            )
+        )
     return Exhibit(
         "solver", "Both pairs by an explicit solver", 4, "7b",
         "Not shown for finite elements.",

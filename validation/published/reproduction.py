@@ -10,7 +10,13 @@ from d2rpick.report.fields import Document, Field, Kind, kind_of, many, row
 from d2rpick.report.figures import svg_element
 from d2rpick.report.page import Markup, document, section, table, tag
 from validation.published.drawing import draw_exhibit
-from validation.published.values import MISPRINTS, MOST_DIFFERENCE, PUBLISHED, pair_at_peak, residual
+from validation.published.values import (
+    MISPRINTS,
+    MOST_DIFFERENCE,
+    PUBLISHED,
+    pair_at_peak,
+    residual,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,7 +27,16 @@ if TYPE_CHECKING:
 
 MODEL = "k = 660e3 N/m, M = 31.4 kg, beta = 2, alpha = 50 1/s, V0 = 6 m/s"
 _DECIMALS = 12
-HEAD = ("quantity", "unit", "published", "reference", "here", "difference", "agrees", "source")
+HEAD = (
+    "quantity",
+    "unit",
+    "published",
+    "reference",
+    "here",
+    "difference",
+    "agrees",
+    "source",
+)
 
 
 class Reproduction(NamedTuple):
@@ -72,17 +87,33 @@ DOCUMENT: Final = Document(
 def as_table(answer: Reproduction, shown: Shown) -> str:
     """Published numbers and reference values beside those here, the pairs, the figures, the misprints."""
     rows, exhibits = answer[:2]
-    lines = [tables.as_text(HEAD, [cells(row) for row in rows], shown.width), "", *pairs_of(), ""]
+    lines = [
+        tables.as_text(HEAD, [cells(row) for row in rows], shown.width),
+        "",
+        *pairs_of(),
+        "",
+    ]
     for one in exhibits:
-        lines += [f"{heading(one)}: {verdict(one)}", f"  paper  {one.paper}", f"  here   {one.found}"]
-    lines += ["", "misprints in the paper", *(f"  {misprint}" for misprint in MISPRINTS)]
+        lines += [
+            f"{heading(one)}: {verdict(one)}",
+            f"  paper  {one.paper}",
+            f"  here   {one.found}",
+        ]
+    lines += [
+        "",
+        "misprints in the paper",
+        *(f"  {misprint}" for misprint in MISPRINTS),
+    ]
     return tables.wrapped("\n".join(lines), shown.width)
 
 
 def as_markdown(answer: Reproduction, _: Shown, *, pictures: bool = False) -> str:
     """Give the same as Markdown, with the figures where ``pictures`` lie beside it."""
     rows, exhibits = answer[:2]
-    blocks = ["# Analysis of switched-rigid floating oscillator, reproduced", f"{MODEL}; d2rpick {__version__}."]
+    blocks = [
+        "# Analysis of switched-rigid floating oscillator, reproduced",
+        f"{MODEL}; d2rpick {__version__}.",
+    ]
     for one in exhibits:
         shown = [f"![{one.title}]({one.name}.svg)"] if pictures else []
         blocks += [
@@ -92,8 +123,15 @@ def as_markdown(answer: Reproduction, _: Shown, *, pictures: bool = False) -> st
             f"Here: {one.found}",
             f"Agrees: {verdict(one)}.",
         ]
-    blocks += ["## Published and computed values", tables.as_markdown(HEAD, [cells(row) for row in rows]), *pairs_of()]
-    blocks += ["## Misprints in the paper", "\n".join(f"* {misprint}" for misprint in MISPRINTS)]
+    blocks += [
+        "## Published and computed values",
+        tables.as_markdown(HEAD, [cells(row) for row in rows]),
+        *pairs_of(),
+    ]
+    blocks += [
+        "## Misprints in the paper",
+        "\n".join(f"* {misprint}" for misprint in MISPRINTS),
+    ]
     return "\n\n".join(blocks)
 
 
@@ -101,21 +139,44 @@ def as_csv(answer: Reproduction, _: Shown) -> str:
     """Give the rows at full precision."""
     rows = answer.rows
     body: list[list[tables.Cell]]
-    body = [[r.what, r.unit, r.published, r.reference, r.here, r.difference, r.agrees, r.source] for r in rows]
+    body = [
+        [
+            r.what,
+            r.unit,
+            r.published,
+            r.reference,
+            r.here,
+            r.difference,
+            r.agrees,
+            r.source,
+        ]
+        for r in rows
+    ]
     return tables.as_csv(HEAD, body).rstrip("\n")
 
 
 def cells(row: PublishedValue) -> list[tables.Cell]:
     """Give a row in digits that are the same on every machine."""
-    known = (None if value is None else f"{round(value, _DECIMALS):.12g}" for value in (row.published, row.reference))
+    known = (
+        None if value is None else f"{round(value, _DECIMALS):.12g}"
+        for value in (row.published, row.reference)
+    )
     here = f"{round(row.here, _DECIMALS):.12g}"
-    difference = "0" if abs(row.difference) < MOST_DIFFERENCE * abs(row.expected) else f"{row.difference:.1e}"
+    difference = (
+        "0"
+        if abs(row.difference) < MOST_DIFFERENCE * abs(row.expected)
+        else f"{row.difference:.1e}"
+    )
     return [row.what, row.unit, *known, here, difference, row.agrees, row.source]
 
 
 def heading(exhibit: Exhibit) -> str:
     """Give the figure of the paper and what it shows."""
-    place = exhibit.figure if exhibit.figure.startswith("section") else f"fig. {exhibit.figure}"
+    place = (
+        exhibit.figure
+        if exhibit.figure.startswith("section")
+        else f"fig. {exhibit.figure}"
+    )
     return f"{place[0].upper()}{place[1:]}: {exhibit.title}"
 
 
@@ -137,11 +198,17 @@ def as_page(answer: Reproduction, command: Sequence[str]) -> str:
     published = table("Published and here", HEAD, [cells(row) for row in answer.rows])
     return document(
         "Analysis of switched-rigid floating oscillator, reproduced",
-        tag("p", f"{MODEL}. The box is a model of our own; the paper states none of its figures."),
+        tag(
+            "p",
+            f"{MODEL}. The box is a model of our own; the paper states none of its figures.",
+        ),
         *(_exhibited(one) for one in answer.exhibits),
         section("Published and here", published),
         tag("ul", *(tag("li", text) for text in pairs_of())),
-        section("Misprints in the paper", tag("ul", *(tag("li", misprint) for misprint in MISPRINTS))),
+        section(
+            "Misprints in the paper",
+            tag("ul", *(tag("li", misprint) for misprint in MISPRINTS)),
+        ),
         page.repeated(command),
         signed=page.CHECKED,
     )

@@ -72,13 +72,42 @@ def _number(elements: Mapping[str, int]) -> int:
 # thread.
 _WEIGHTS: Final = Weights()
 _RIGID: Final = 0.0968 / 0.24
-_BODY: Final = {"QEPH": 764, "QBAT": 154, "BT": 258, "beam": 60, "solid": 160, "spring": 120, POINT: 4348}
+_BODY: Final = {
+    "QEPH": 764,
+    "QBAT": 154,
+    "BT": 258,
+    "beam": 60,
+    "solid": 160,
+    "spring": 120,
+    POINT: 4348,
+}
 _CAR: Final = {**_BODY, "BT": 258 + 309}
 RUNS: Final = (
     Run("all parts", _RIGID, _BODY, 1450, _CAPPED, 0.306),
-    Run("all but the part that lands first", _RIGID, {**_BODY, "QBAT": 92, POINT: 3356}, 1408, 1.0, 0.270),
-    Run("parts that have stopped deforming", _RIGID, {"QEPH": 764, "beam": 60, POINT: 1528}, 839, 1.0, 0.126),
-    Run("heavy parts", _RIGID, {"solid": 160, "beam": 18, "QEPH": 48, POINT: 96}, 361, 1.0, 0.075),
+    Run(
+        "all but the part that lands first",
+        _RIGID,
+        {**_BODY, "QBAT": 92, POINT: 3356},
+        1408,
+        1.0,
+        0.270,
+    ),
+    Run(
+        "parts that have stopped deforming",
+        _RIGID,
+        {"QEPH": 764, "beam": 60, POINT: 1528},
+        839,
+        1.0,
+        0.126,
+    ),
+    Run(
+        "heavy parts",
+        _RIGID,
+        {"solid": 160, "beam": 18, "QEPH": 48, POINT: 96},
+        361,
+        1.0,
+        0.075,
+    ),
 )
 
 

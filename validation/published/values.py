@@ -78,7 +78,9 @@ class PublishedValue:
 
 
 def _exact(what: str, unit: str, reference: float, here: float) -> PublishedValue:
-    return PublishedValue(what, unit, None, reference, here, MOST_DIFFERENCE * abs(reference), _EXACT)
+    return PublishedValue(
+        what, unit, None, reference, here, MOST_DIFFERENCE * abs(reference), _EXACT
+    )
 
 
 def pair_at_peak() -> tuple[float, float]:
@@ -96,7 +98,10 @@ def deviation(pair: tuple[float, float]) -> float:
     """Largest error of the deformation after td over the largest deformation without switching there [-]."""
     after = TIME[pair[1] <= TIME]
     replay = switched(pair)
-    wanted, found = deformation_of(replay.reference(after)), deformation_of(replay.motion(after))
+    wanted, found = (
+        deformation_of(replay.reference(after)),
+        deformation_of(replay.motion(after)),
+    )
     return float(np.abs(found - wanted).max() / np.abs(wanted).max())
 
 
@@ -114,7 +119,12 @@ def _rows() -> Iterator[PublishedValue]:
     yield _exact("the same, sign matched", "ms", 12.8852793630525, 1e3 * _matching(td))
     yield _exact("omega_2", "rad/s", 249.86461302226118, OSCILLATOR.omega_2)
     yield _exact("E(64 ms)", "J", 0.606348787620396, float(MODE.energy(td)))
-    yield _exact("kinetic share at 64 ms", "-", 0.916699887073, float(measures.kinetic_share(MODE, td)))
+    yield _exact(
+        "kinetic share at 64 ms",
+        "-",
+        0.916699887073,
+        float(measures.kinetic_share(MODE, td)),
+    )
     yield _exact("energy peak after 64 ms", "ms", 68.7533824301571, 1e3 * better[1])
     yield _exact("tr for that peak", "ms", 13.5866683619825, 1e3 * better[0])
     for pair, known in _STATES.items():
@@ -123,10 +133,17 @@ def _rows() -> Iterator[PublishedValue]:
             name = f"({1e3 * pair[0]:g}, {1e3 * pair[1]:g}) ms at {1e3 * time:g} ms"
             yield _exact(f"z of {name}", "m", z, float(state.z))
             yield _exact(f"y of {name}", "m", y, float(state.y))
-            yield _exact(f"E of {name}", "J", energy, float(OSCILLATOR.internal_energy(state)))
-    for name, pair, found in (("(13, 64) ms", PUBLISHED, 0.888), ("better pair", better, 0.005)):
+            yield _exact(
+                f"E of {name}", "J", energy, float(OSCILLATOR.internal_energy(state))
+            )
+    for name, pair, found in (
+        ("(13, 64) ms", PUBLISHED, 0.888),
+        ("better pair", better, 0.005),
+    ):
         what = f"deviation after td, {name}"
-        yield PublishedValue(what, "-", None, found, deviation(pair), _SOLVER_DIFFERENCE, _SOLVER)
+        yield PublishedValue(
+            what, "-", None, found, deviation(pair), _SOLVER_DIFFERENCE, _SOLVER
+        )
 
 
 # z [m], y [m], E [J] at times [s] of the switched runs
@@ -194,18 +211,35 @@ def integrated(switched: Replay, time: Samples) -> State:
 
     def free(_: float, x: Samples) -> Samples:
         force = o.stiffness * (x[1] - x[0])
-        return np.concatenate([x[2:], np.array([force, -force]) / masses - o.alpha * x[2:]])
+        return np.concatenate(
+            [x[2:], np.array([force, -force]) / masses - o.alpha * x[2:]]
+        )
 
     def rigid(_: float, x: Samples) -> Samples:
         return np.concatenate([x[2:], -o.alpha * x[2:]])
 
     x = np.array(switched.start, dtype=np.float64)
     found = np.empty((4, time.size))
-    bounds = (switched.origin, switched.tr, switched.td, max(switched.td, float(time[-1])))
-    for phase, (motion, start, end) in enumerate(zip((free, rigid, free), bounds, bounds[1:], strict=False)):
+    bounds = (
+        switched.origin,
+        switched.tr,
+        switched.td,
+        max(switched.td, float(time[-1])),
+    )
+    for phase, (motion, start, end) in enumerate(
+        zip((free, rigid, free), bounds, bounds[1:], strict=False)
+    ):
         if phase == 1:
             x[2:] = masses @ x[2:] / masses.sum()  # (8)
-        steps = solve_ivp(motion, (start, end), x, "DOP853", dense_output=True, rtol=_RELATIVE, atol=_ABSOLUTE)
+        steps = solve_ivp(
+            motion,
+            (start, end),
+            x,
+            "DOP853",
+            dense_output=True,
+            rtol=_RELATIVE,
+            atol=_ABSOLUTE,
+        )
         inside = (time >= start) & (time <= end)
         if inside.any():
             found[:, inside] = steps.sol(time[inside])

@@ -31,8 +31,12 @@ class Listed(NamedTuple):
 # In the order they are asked, and in which they are preferred as sources of one quantity: binary before text, since it
 # holds more digits; csv takes any text, so it comes last of those; and what a run writes seldom comes behind all.
 READERS: Final[Mapping[str, Listed]] = {
-    "binout": Listed("binout", rb"\A[\x08-\x40].{5}\0", "LS-DYNA", r"(?i:binout[\d%]*)"),
-    "radioss-th": Listed("radioss_th", rb"\A\0\0\0T|ZZZZZEOR", "Radioss", r"(?P<root>.*)T\d\d"),
+    "binout": Listed(
+        "binout", rb"\A[\x08-\x40].{5}\0", "LS-DYNA", r"(?i:binout[\d%]*)"
+    ),
+    "radioss-th": Listed(
+        "radioss_th", rb"\A\0\0\0T|ZZZZZEOR", "Radioss", r"(?P<root>.*)T\d\d"
+    ),
     "glstat": Listed("glstat", rb" time\.|ls-dyna", "LS-DYNA", "(?i:glstat)"),
     "matsum": Listed("matsum", rb" time =|{BEGIN LEGEND}", "LS-DYNA", "(?i:matsum)"),
     "hdf5": Listed("hdf5_file", rb"\x89HDF"),

@@ -48,19 +48,31 @@ class Binout(Database):
     format = "binout"
 
     def __init__(self, files: Sequence[tuple[str, bytes | Content]]) -> None:
-        self._files = [Lsda(content, name, (*_BRANCHES, *FORCES)) for name, content in files]
+        self._files = [
+            Lsda(content, name, (*_BRANCHES, *FORCES)) for name, content in files
+        ]
         self.source = ", ".join(name for name, _ in files)
-        whole, parts = self._branches = [Branch(name, self._files, by_part=name == "matsum") for name in _BRANCHES]
+        whole, parts = self._branches = [
+            Branch(name, self._files, by_part=name == "matsum") for name in _BRANCHES
+        ]
         head = whole or parts
         self.only_forces = not head and writes_forces(self._files)
         if not head and not self.only_forces:
             raise FormatError(self._without("glstat or matsum"))
         revision = head.text("revision")
-        names = (head.text("version"), f"rev {revision}" if revision else "", head.text("build_id"))
+        names = (
+            head.text("version"),
+            f"rev {revision}" if revision else "",
+            head.text("build_id"),
+        )
         self.version = " ".join(name for name in names if name)
         self.title = whole.text("title") or parts.text("title")
         self.digits = DIGITS[min(branch.time_width for branch in self._branches)]
-        stops = [f"{file.source}: {file.stop}; what lies before it was read" for file in self._files if file.stop]
+        stops = [
+            f"{file.source}: {file.stop}; what lies before it was read"
+            for file in self._files
+            if file.stop
+        ]
         self.complete = not stops and whole.complete and parts.complete
         self.notes = (*stops, *whole.notes, *parts.notes)
         self.channels = tuple(name for name in whole.scalars if name != "time")
@@ -69,7 +81,9 @@ class Binout(Database):
     def parts(self) -> tuple[Part, ...]:  # type: ignore[override]  # only when it is asked for
         """Parts of matsum, in the order of its first list of ids."""
         _, branch = self._branches
-        return tuple(Part(number, branch.legend.get(number, "")) for number in branch.part_ids)
+        return tuple(
+            Part(number, branch.legend.get(number, "")) for number in branch.part_ids
+        )
 
     @cached_property
     def contact_forces(self) -> tuple[ContactForce, ...]:
@@ -78,11 +92,18 @@ class Binout(Database):
 
     def branch(self, name: str) -> Branch:
         """Give a branch; FormatError where there is none, or records are lost: they may be the other's."""
-        found = next((branch for branch in self._branches if branch and branch.name == name), None)
+        found = next(
+            (branch for branch in self._branches if branch and branch.name == name),
+            None,
+        )
         if found is None:
             raise FormatError(self._without(name))
-        if damage := next(filter(None, (branch.damage for branch in self._branches)), ""):
-            raise FormatError(f"{damage}; records are lost or out of place, copy the file again")
+        if damage := next(
+            filter(None, (branch.damage for branch in self._branches)), ""
+        ):
+            raise FormatError(
+                f"{damage}; records are lost or out of place, copy the file again"
+            )
         return found
 
     def _without(self, name: str) -> str:

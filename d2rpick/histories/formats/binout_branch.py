@@ -49,7 +49,9 @@ class Group:
 
     def values(self, variable: Variable, places: Indices) -> NDArray[Any]:
         """Values of a variable at ``places`` of its list, shape (states, places); floating-point ones as doubles."""
-        positions = self.starts[:, None] + variable.offset + variable.dtype.itemsize * places
+        positions = (
+            self.starts[:, None] + variable.offset + variable.dtype.itemsize * places
+        )
         found = self.file.read(positions, variable.dtype)
         with np.errstate(invalid="ignore"):  # a NaN of any kind is refused, or not used
             return found.astype(np.float64) if variable.dtype.kind == "f" else found
@@ -70,7 +72,9 @@ def _is_unfinished(file: Lsda, branch: str) -> bool:
     return file.unfinished == branch and len({*layouts}) > 1
 
 
-def _damages(numbers: Indices, layouts: Sequence[DirectoryLayout], where: str) -> Iterator[str]:
+def _damages(
+    numbers: Indices, layouts: Sequence[DirectoryLayout], where: str
+) -> Iterator[str]:
     """Say what shows, in the states of one file, that records are lost or out of place."""
     steps = np.diff(numbers)
     if (steps > 1).any():
@@ -78,11 +82,15 @@ def _damages(numbers: Indices, layouts: Sequence[DirectoryLayout], where: str) -
         yield f"{where} goes from state {numbers[hole]} to {numbers[hole + 1]}"
     if doubled := sorted(name for layout in layouts for name in layout.doubled):
         yield f"{where} has {doubled[0]} twice in one state"
-    if (steps < 1).any() and len({frozenset(layout.variables) for layout in layouts}) > 1:
+    if (steps < 1).any() and len(
+        {frozenset(layout.variables) for layout in layouts}
+    ) > 1:
         yield f"{where} begins a new leg whose states hold other variables"
 
 
-def _groups(layouts: Sequence[tuple[Lsda, DirectoryLayout]], kinds: Indices, starts: Indices) -> Iterator[Group]:
+def _groups(
+    layouts: Sequence[tuple[Lsda, DirectoryLayout]], kinds: Indices, starts: Indices
+) -> Iterator[Group]:
     """States by layout; ``kinds`` says which of ``layouts`` each one has."""
     order = np.argsort(kinds, kind="stable")
     cuts = np.flatnonzero(np.diff(kinds[order])) + 1
@@ -116,17 +124,30 @@ class Branch(Database):
 
     def __init__(self, name: str, files: Sequence[Lsda], *, by_part: bool) -> None:
         self.name, self._by_part, self._files = name, by_part, files
-        visited = sorted((file for file in files if file.visits[name]), key=lambda file: _start(file, name))
-        self._unfinished = [file.source for file in visited if _is_unfinished(file, name)]  # less their last state
+        visited = sorted(
+            (file for file in files if file.visits[name]),
+            key=lambda file: _start(file, name),
+        )
+        self._unfinished = [
+            file.source for file in visited if _is_unfinished(file, name)
+        ]  # less their last state
         damages = [
-            f"{file.source}: {name} has {file.odd[name][0]!r}, which is not a state" for file in files if file.odd[name]
+            f"{file.source}: {name} has {file.odd[name][0]!r}, which is not a state"
+            for file in files
+            if file.odd[name]
         ]
         numbers, starts, kinds = np.empty((3, 0), dtype=np.int64)
         layouts: list[tuple[Lsda, DirectoryLayout]] = []
         for file in visited:
             states = file.states(name)
-            here, begin, used = states[: len(states) - (file.source in self._unfinished)].T
-            damages += _damages(here, [file.layouts[kind] for kind in {*used.tolist()}], f"{file.source}: {name}")
+            here, begin, used = states[
+                : len(states) - (file.source in self._unfinished)
+            ].T
+            damages += _damages(
+                here,
+                [file.layouts[kind] for kind in {*used.tolist()}],
+                f"{file.source}: {name}",
+            )
             numbers, starts = np.append(numbers, here), np.append(starts, begin)
             kinds = np.append(kinds, used + len(layouts))
             layouts += [(file, layout) for layout in file.layouts]
@@ -135,8 +156,12 @@ class Branch(Database):
         self._groups = tuple(_groups(layouts, kinds, starts))
         self._variables = [group.layout.variables for group in self._groups]
         holes = np.flatnonzero(np.diff(numbers) > 1)
-        self._missing = tuple(f"{numbers[i] + 1} to {numbers[i + 1] - 1}" for i in holes)
-        self.source = f"{', '.join(file.source for file in files if name in file.names)}: {name}"
+        self._missing = tuple(
+            f"{numbers[i] + 1} to {numbers[i + 1] - 1}" for i in holes
+        )
+        self.source = (
+            f"{', '.join(file.source for file in files if name in file.names)}: {name}"
+        )
         self.complete = not (self._missing or self._unfinished or self.damage)
         self.notes = self._remarks()
 
@@ -145,22 +170,35 @@ class Branch(Database):
 
     def _remarks(self) -> tuple[str, ...]:
         """What was left out, what is missing, what only some states hold."""
-        notes = [f"{name}: the last state of {self.name} is not whole and was left out" for name in self._unfinished]
+        notes = [
+            f"{name}: the last state of {self.name} is not whole and was left out"
+            for name in self._unfinished
+        ]
         if self.damage:
             notes.append(f"{self.damage}; records are lost or out of place")
         first = int(self._numbers[0]) if self._numbers.size else 1
         if first != 1:
-            notes.append(f"{self.source} begins with state {first}, not 1; is a file of the family missing or damaged?")
+            notes.append(
+                f"{self.source} begins with state {first}, not 1; is a file of the family missing or damaged?"
+            )
         if self._missing:
             holes = listing(self._missing, most=3)
-            notes.append(f"{self.source} lacks the states {holes}; is a file of the family missing?")
+            notes.append(
+                f"{self.source} lacks the states {holes}; is a file of the family missing?"
+            )
         every = set().union(*self._variables)
-        common = {name for name in every if all(name in held for held in self._variables)}
+        common = {
+            name for name in every if all(name in held for held in self._variables)
+        }
         if late := listing(sorted(every - common)):
             notes.append(f"{self.source} has {late} in some states only")
-        kinds = {name: {held[name].dtype.kind for held in self._variables} for name in common}
+        kinds = {
+            name: {held[name].dtype.kind for held in self._variables} for name in common
+        }
         if changing := listing(sorted(name for name in common if len(kinds[name]) > 1)):
-            notes.append(f"{self.source} has {changing} of another type in some states: damaged there, and left out")
+            notes.append(
+                f"{self.source} has {changing} of another type in some states: damaged there, and left out"
+            )
         if self and not self._numbers.size:
             notes.append(f"{self.source} holds no state yet")
         return tuple(notes)
@@ -169,7 +207,11 @@ class Branch(Database):
     def scalars(self) -> tuple[str, ...]:
         """Floating-point variables that all states hold with one value, in the order of the file."""
         held = self._variables
-        return tuple(name for name in (held[0] if held else ()) if all(_is_scalar(one.get(name)) for one in held))
+        return tuple(
+            name
+            for name in (held[0] if held else ())
+            if all(_is_scalar(one.get(name)) for one in held)
+        )
 
     @property
     def time_width(self) -> int:
@@ -182,11 +224,17 @@ class Branch(Database):
         """Titles of the parts by id."""
         titles: dict[int, str] = {}
         for file, start, layout in self._metadata:
-            ids, legend = _integers(file, start, layout, "legend_ids"), layout.variables.get("legend")
+            ids, legend = (
+                _integers(file, start, layout, "legend_ids"),
+                layout.variables.get("legend"),
+            )
             if legend is None or not ids.size or legend.count % ids.size:
                 continue  # without a whole length per title nobody knows where one ends
             raw, width = file.raw(start, legend), legend.count // ids.size
-            titles.update((id_, plain_text(raw[i * width : (i + 1) * width])) for i, id_ in enumerate(ids.tolist()))
+            titles.update(
+                (id_, plain_text(raw[i * width : (i + 1) * width]))
+                for i, id_ in enumerate(ids.tolist())
+            )
         return titles
 
     @cached_property
@@ -217,9 +265,14 @@ class Branch(Database):
         column = np.empty(self._numbers.size)
         for group, variable in self.checked(name):
             if variable.count != 1:
-                raise self.refused(group, f"one {name} was expected, not {variable.count}; ask for another")
+                raise self.refused(
+                    group,
+                    f"one {name} was expected, not {variable.count}; ask for another",
+                )
             for part in group.chunks(1):
-                column[part.rows] = part.values(variable, np.zeros((1, 1), dtype=np.int64))[:, 0]
+                column[part.rows] = part.values(
+                    variable, np.zeros((1, 1), dtype=np.int64)
+                )[:, 0]
         return column
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
@@ -232,7 +285,9 @@ class Branch(Database):
                     counts = f"{variable.count} values of {quantity} for {listed.shape[1]} parts"
                     raise self.refused(part, f"{counts}; they cannot be told apart")
                 places = [self._places(part, listed, id_) for id_ in ids]
-                columns[part.rows] = part.values(variable, np.stack(places, axis=1)) if places else 0.0
+                columns[part.rows] = (
+                    part.values(variable, np.stack(places, axis=1)) if places else 0.0
+                )
         return columns
 
     def checked(self, name: str) -> Iterator[tuple[Group, Variable]]:
@@ -244,9 +299,15 @@ class Branch(Database):
         for group in self._groups:
             variables = group.layout.variables
             if name not in variables:
-                raise self.refused(group, f"no {name}, only {listing(list(variables), most=40)}; ask for one of these")
+                raise self.refused(
+                    group,
+                    f"no {name}, only {listing(list(variables), most=40)}; ask for one of these",
+                )
             if variables[name].dtype.kind != "f":
-                raise self.refused(group, f"{name} is stored as {variables[name].dtype}, not as floating point")
+                raise self.refused(
+                    group,
+                    f"{name} is stored as {variables[name].dtype}, not as floating point",
+                )
             for other, variable in variables.items():
                 if variable.count not in (fit := self._fitting(group, other)):
                     counts = f"{variable.count} values of {other} where {listing(sorted(fit))} would fit"
@@ -265,19 +326,28 @@ class Branch(Database):
 
     def refused(self, group: Group, why: str, row: int = 0) -> FormatError:
         """Say why a value of a state is not given."""
-        return FormatError(f"{self.source} state {self._numbers[group.rows[row]]}: {why}")
+        return FormatError(
+            f"{self.source} state {self._numbers[group.rows[row]]}: {why}"
+        )
 
     @cached_property
     def _metadata(self) -> list[tuple[Lsda, int, DirectoryLayout]]:
         return [
-            (file, start, file.layouts[layout]) for file in self._files for start, layout in file.metadata[self.name]
+            (file, start, file.layouts[layout])
+            for file in self._files
+            for start, layout in file.metadata[self.name]
         ]
 
     @cached_property
     def _id_lists(self) -> list[tuple[int, int, Indices]]:
         """Each list of part ids in the metadata: number of the file, byte, ids."""
-        lists = ((file, at, _integers(file, at, layout, "ids")) for file, at, layout in self._metadata)
-        return [(self._files.index(file), at, ids) for file, at, ids in lists if ids.size]
+        lists = (
+            (file, at, _integers(file, at, layout, "ids"))
+            for file, at, layout in self._metadata
+        )
+        return [
+            (self._files.index(file), at, ids) for file, at, ids in lists if ids.size
+        ]
 
     def ids_of(self, group: Group) -> Indices:
         """Part ids of a group's states, shape (states, parts); (1, parts) if they are the same for all."""
@@ -285,15 +355,25 @@ class Branch(Database):
         if own and own.dtype.kind in "iu":
             return group.values(own, np.arange(own.count)[None, :]).astype(np.int64)
         if not self._id_lists:
-            raise FormatError(f"{self.source} has no part ids in its metadata; the values cannot be assigned to parts")
+            raise FormatError(
+                f"{self.source} has no part ids in its metadata; the values cannot be assigned to parts"
+            )
         index = self._files.index(group.file)
         before = sum(1 for file, _, _ in self._id_lists if file < index)
-        here = np.array([start for file, start, _ in self._id_lists if file == index], dtype=np.int64)
+        here = np.array(
+            [start for file, start, _ in self._id_lists if file == index],
+            dtype=np.int64,
+        )
         # The last list before a state is in force; a rank's file may bring its list behind the first states.
         in_force = np.maximum(before + np.searchsorted(here, group.starts) - 1, 0)
-        lists = {int(i): self._id_lists[i][2] for i in np.flatnonzero(np.bincount(in_force))}
+        lists = {
+            int(i): self._id_lists[i][2] for i in np.flatnonzero(np.bincount(in_force))
+        }
         if len({entry.size for entry in lists.values()}) > 1:
-            raise self.refused(group, "the number of parts changes here or later, that of the values does not")
+            raise self.refused(
+                group,
+                "the number of parts changes here or later, that of the values does not",
+            )
         if len(lists) == 1:
             ids: Indices = next(iter(lists.values()))
             return ids[None, :]
@@ -305,8 +385,14 @@ class Branch(Database):
         times = found.sum(axis=1)
         if (times != 1).any():
             row = int(np.argmax(times != 1))
-            hint = "it is there in some states only" if id_ in self.part_ids else f"there are {listing(self.part_ids)}"
-            raise self.refused(group, f"part {id_} is listed {times[row]} times, not once; {hint}", row)
+            hint = (
+                "it is there in some states only"
+                if id_ in self.part_ids
+                else f"there are {listing(self.part_ids)}"
+            )
+            raise self.refused(
+                group, f"part {id_} is listed {times[row]} times, not once; {hint}", row
+            )
         return np.asarray(found.argmax(axis=1))
 
 
@@ -319,5 +405,7 @@ def _integers(file: Lsda, start: int, layout: DirectoryLayout, name: str) -> Ind
     variable = layout.variables.get(name)
     if variable is None or variable.dtype.kind not in "iu":
         return np.empty(0, dtype=np.int64)
-    places = start + variable.offset + variable.dtype.itemsize * np.arange(variable.count)
+    places = (
+        start + variable.offset + variable.dtype.itemsize * np.arange(variable.count)
+    )
     return file.read(places, variable.dtype).astype(np.int64)

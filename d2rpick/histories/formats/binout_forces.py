@@ -31,7 +31,12 @@ def writes_forces(files: Sequence[Lsda]) -> bool:
 def forces_of(files: Sequence[Lsda]) -> tuple[ContactForce, ...]:
     """Give the forces of all contacts and rigid walls of a family; FormatError where they cannot be assigned."""
     branches = [ForceBranch(name, files, by_part=True) for name in FORCES]
-    return tuple(force for branch in branches if branch.writes_forces for force in _forces_of(branch))
+    return tuple(
+        force
+        for branch in branches
+        if branch.writes_forces
+        for force in _forces_of(branch)
+    )
 
 
 class ForceBranch(Branch):
@@ -40,7 +45,9 @@ class ForceBranch(Branch):
     @property
     def writes_forces(self) -> bool:
         """Whether its states hold forces; a run without a contact writes states of their time alone."""
-        return bool(self._variables) and all("x_force" in held for held in self._variables)
+        return bool(self._variables) and all(
+            "x_force" in held for held in self._variables
+        )
 
     def of_each(self, name: str) -> tuple[Indices, Samples]:
         """Ids of all that is listed, of contacts once for each side, and one variable of theirs, of shape (n, ids)."""
@@ -49,8 +56,15 @@ class ForceBranch(Branch):
         for group, variable in self.checked(name):
             ids = self.ids_of(group)
             first = ids[0] if listed is None else listed
-            if variable.count != ids.shape[1] or ids.shape[1] != first.size or (ids != first).any():
-                raise self.refused(group, f"other ids than before, which the values of {name} cannot be assigned to")
+            if (
+                variable.count != ids.shape[1]
+                or ids.shape[1] != first.size
+                or (ids != first).any()
+            ):
+                raise self.refused(
+                    group,
+                    f"other ids than before, which the values of {name} cannot be assigned to",
+                )
             listed = first
             values = group.values(variable, np.arange(variable.count)[None, :])
             columns.append((group.rows, values))
@@ -63,7 +77,9 @@ class ForceBranch(Branch):
 def _forces_of(branch: ForceBranch) -> Iterator[ContactForce]:
     """Put the sides of each contact together: they have the same force in opposite directions, or one has none."""
     ids, first = branch.of_each("x_force")
-    forces = np.stack([first, *(branch.of_each(f"{axis}_force")[1] for axis in "yz")], axis=2)
+    forces = np.stack(
+        [first, *(branch.of_each(f"{axis}_force")[1] for axis in "yz")], axis=2
+    )
     for id_ in dict.fromkeys(ids.tolist()):
         sides = forces[:, ids == id_]
         strongest = int(np.abs(sides).sum(axis=(0, 2)).argmax())

@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-UNSURE: Final = -1  # in place of an offset: the field is cut, or stands in the block twice
+UNSURE: Final = (
+    -1
+)  # in place of an offset: the field is cut, or stands in the block twice
 
 _OVERLONG: Final = 512  # bytes of a line that no solver writes
 
@@ -55,7 +57,9 @@ class Grammar(NamedTuple):
 
     start: bytes
     lines: re.Pattern[bytes]
-    describe: Callable[[bytes, Sequence[re.Match[bytes]], Bytes], tuple[Mapping[Any, int], Hashable]]
+    describe: Callable[
+        [bytes, Sequence[re.Match[bytes]], Bytes], tuple[Mapping[Any, int], Hashable]
+    ]
     changing: re.Pattern[bytes]
     time: Hashable
     whole: Callable[[BlockLayout], bool]
@@ -65,14 +69,22 @@ class Grammar(NamedTuple):
 
     def layout(self, block: bytes) -> BlockLayout:
         """Find where in a block what stands."""
-        literal, lines = np.full(len(block), 255, np.uint8), [*self.lines.finditer(block)]
+        literal, lines = (
+            np.full(len(block), 255, np.uint8),
+            [*self.lines.finditer(block)],
+        )
         edges = [0, *(edge for line in lines for edge in line.span()), len(block)]
         for first, behind in zip(edges[::2], edges[1::2], strict=True):
             for piece in self.changing.finditer(block, first, behind):
                 literal[piece.start() : piece.end()] = 0
         fields, last = self.describe(block, lines, literal)
-        if max(map(len, block.split(b"\n"))) >= _OVERLONG:  # states were blanked, and hide in it
-            fields = {name: place if name == self.time else UNSURE for name, place in fields.items()}
+        if (
+            max(map(len, block.split(b"\n"))) >= _OVERLONG
+        ):  # states were blanked, and hide in it
+            fields = {
+                name: place if name == self.time else UNSURE
+                for name, place in fields.items()
+            }
         return BlockLayout(fields, literal, last, broken_off=b"ls-dyna" in block)
 
 
@@ -98,7 +110,9 @@ def written_head(title: str, database: str) -> str:
     return f" {title}\n{' ' * 25}d2rpick {__version__}, layout of ls-dyna {database}\n"
 
 
-CHUNK: Final = 1 << 20  # bytes compared at a time: they stay in the cache between the two passes
+CHUNK: Final = (
+    1 << 20
+)  # bytes compared at a time: they stay in the cache between the two passes
 _FOLD: Final = 16  # blocks side by side compared as one row: saves half the time
 
 
@@ -144,12 +158,20 @@ def like_example(
     most -= most % _FOLD if most > _FOLD else 0
     alike = True
     while alike and done < run.repeats:
-        rows = _rows(data, run.start + done * run.stride + offset, run.stride, min(step, run.repeats - done), size)
+        rows = _rows(
+            data,
+            run.start + done * run.stride + offset,
+            run.stride,
+            min(step, run.repeats - done),
+            size,
+        )
         differing = _differing(rows, example)
         alike = not (differing & literal).any()
         if not alike:
             rows = rows[: int(((rows ^ example) & literal).any(axis=1).argmax())]
-            differing = _differing(rows, example) if len(rows) else np.zeros_like(example)
+            differing = (
+                _differing(rows, example) if len(rows) else np.zeros_like(example)
+            )
         if varied is not None:
             varied |= differing
         if take is not None:
@@ -173,14 +195,19 @@ def _differing(rows: Bytes, example: Bytes) -> Bytes:
     if count % _FOLD == 0 and rows.flags.c_contiguous:
         rows = rows.reshape(count // _FOLD, _FOLD * size)
     # a bit is the example's in all rows where it is so in their AND and in their OR
-    least, most = (of.reduce(of.reduce(rows, axis=0).reshape(-1, size)) for of in (np.bitwise_and, np.bitwise_or))
+    least, most = (
+        of.reduce(of.reduce(rows, axis=0).reshape(-1, size))
+        for of in (np.bitwise_and, np.bitwise_or)
+    )
     return np.asarray((least ^ example) | (most ^ example))
 
 
 _LONGEST: Final = 1 << 22  # a block with more bytes is left to the walk
 
 
-def repeats(data: Content, begin: int, fixed: Bytes, numbers: Sequence[tuple[int, int]]) -> tuple[int, list[int]]:
+def repeats(
+    data: Content, begin: int, fixed: Bytes, numbers: Sequence[tuple[int, int]]
+) -> tuple[int, list[int]]:
     """Count the whole repetitions that follow the block at ``begin`` without a gap.
 
     Parameters
@@ -211,12 +238,16 @@ def repeats(data: Content, begin: int, fixed: Bytes, numbers: Sequence[tuple[int
     if fixed.size > _LONGEST:
         return 0, []
     found: list[NDArray[np.int64]] = []
-    like_example(data, run, 0, fixed, take=lambda rows: found.append(_decimals(rows, numbers)))
+    like_example(
+        data, run, 0, fixed, take=lambda rows: found.append(_decimals(rows, numbers))
+    )
     states = np.concatenate(found)
     steps = np.diff(states[:2], axis=0)
     if not steps.size or steps.min() < 1:
         return 0, []
-    even = (states == states[0] + steps * np.arange(len(states))[:, np.newaxis]).all(axis=1)
+    even = (states == states[0] + steps * np.arange(len(states))[:, np.newaxis]).all(
+        axis=1
+    )
     return (len(even) if even.all() else int(even.argmin())) - 1, steps[0].tolist()
 
 
@@ -226,13 +257,20 @@ def _decimals(blocks: Bytes, places: Sequence[tuple[int, int]]) -> NDArray[np.in
     for column, (at, width) in enumerate(places):
         digits = blocks[:, at : at + width].astype(np.int64) - ord("0")
         number = digits @ 10 ** np.arange(width - 1, -1, -1, dtype=np.int64)
-        numbers[:, column] = np.where(((digits < 0) | (digits > 9)).any(axis=1), -1, number)
+        numbers[:, column] = np.where(
+            ((digits < 0) | (digits > 9)).any(axis=1), -1, number
+        )
     return numbers
 
 
-_NUMBER: Final = re.compile(rb" *([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]\d+)|[EeDd](\d+))?")
+_NUMBER: Final = re.compile(
+    rb" *([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]\d+)|[EeDd](\d+))?"
+)
 _EXACT: Final = 22  # 10**22 is the largest power of ten that a double holds exactly
-_SHRINKS, _NEGATIVE = 1 << 8, 1 << 9  # beside the two digits of an exponent, which fill a byte
+_SHRINKS, _NEGATIVE = (
+    1 << 8,
+    1 << 9,
+)  # beside the two digits of an exponent, which fill a byte
 
 
 @cache
@@ -243,7 +281,9 @@ def _scales(decimals: int) -> tuple[Samples, Samples]:
         np.minimum(abs(exponent), _EXACT + 1)
     ]
     factors = np.where(exponent > 0, powers, 1.0)
-    return np.stack([factors, -factors]).ravel(), np.tile(np.where(exponent < 0, powers, 1.0).ravel(), 2)
+    return np.stack([factors, -factors]).ravel(), np.tile(
+        np.where(exponent < 0, powers, 1.0).ravel(), 2
+    )
 
 
 def number(text: bytes) -> float:
@@ -290,11 +330,15 @@ def decode(fields: NDArray[np.bytes_], decimals: int) -> Samples:
     if not fields.size:
         return np.empty(0)
     width = fields.dtype.itemsize
-    column = np.ascontiguousarray(np.ascontiguousarray(fields).view(np.uint8).reshape(-1, width).T)
+    column = np.ascontiguousarray(
+        np.ascontiguousarray(fields).view(np.uint8).reshape(-1, width).T
+    )
     point, mark = width - 5 - decimals, width - 4
     negative, shrinks = column[point - 2] == ord("-"), column[mark + 1] == ord("-")
     # wraps around for what is below "0", so one comparison is enough
-    digits = column[[point - 1, *range(point + 1, mark), mark + 2, mark + 3]] - np.uint8(ord("0"))
+    digits = column[
+        [point - 1, *range(point + 1, mark), mark + 2, mark + 3]
+    ] - np.uint8(ord("0"))
     usual = digits.max(axis=0) <= 9
     usual &= (column[point] == ord(".")) & (column[mark] == ord("E"))
     usual &= negative | (column[point - 2] == ord(" "))
@@ -304,7 +348,12 @@ def decode(fields: NDArray[np.bytes_], decimals: int) -> Samples:
     weights = np.array([float(10**place) for place in range(decimals, -1, -1)])
     values: Samples = weights @ digits[:-2].astype(np.float64)  # exact
     tens, ones = digits[-2:]
-    scale = tens * np.uint8(10) + ones + shrinks * np.uint16(_SHRINKS) + negative * np.uint16(_NEGATIVE)
+    scale = (
+        tens * np.uint8(10)
+        + ones
+        + shrinks * np.uint16(_SHRINKS)
+        + negative * np.uint16(_NEGATIVE)
+    )
     factors, divisors = (table.take(scale) for table in _scales(decimals))
     values *= factors
     values /= divisors

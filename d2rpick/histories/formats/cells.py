@@ -11,7 +11,19 @@ if TYPE_CHECKING:
 _COMMENTS: Final = ("#", "$", "%", "//")
 # What a spreadsheet writes for a value it cannot compute, in English and German; a line may begin with it.
 _SPREADSHEET_ERRORS: Final = frozenset(
-    {"#div/0!", "#nv", "#n/a", "#wert!", "#value!", "#bezug!", "#ref!", "#name?", "#zahl!", "#num!", "#null!"}
+    {
+        "#div/0!",
+        "#nv",
+        "#n/a",
+        "#wert!",
+        "#value!",
+        "#bezug!",
+        "#ref!",
+        "#name?",
+        "#zahl!",
+        "#num!",
+        "#null!",
+    }
 )
 _MISSING: Final = _SPREADSHEET_ERRORS | frozenset(
     {"", "nan", "+nan", "-nan", "inf", "+inf", "-inf", "infinity", "-infinity", "na", "n/a", "null", "none", "nil",
@@ -28,8 +40,12 @@ _GROUPED: Final = r"[+-]?[1-9]\d{0,2}(?:%s\d{3})+(?:%s\d*)?"  # thousands and de
 # Signs between groups of three digits, beside the one of "." and "," that is not the decimal sign.
 _THOUSANDS: Final = ("'", "’", "\N{NO-BREAK SPACE}", "\N{NARROW NO-BREAK SPACE}", " ")
 # A date or clock time, a percentage: no numbers, but nothing that a wrong separator makes either.
-_DATE_OR_SHARE: Final = re.compile(r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d.*|[-+]?[\d.,]+\s*%", re.ASCII)
-_RULE: Final = "-=+|:_ \t"  # signs of a line that is drawn between rows or around a table
+_DATE_OR_SHARE: Final = re.compile(
+    r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d.*|[-+]?[\d.,]+\s*%", re.ASCII
+)
+_RULE: Final = (
+    "-=+|:_ \t"  # signs of a line that is drawn between rows or around a table
+)
 _RULE_STARTS: Final = ("-", "=", "+", "|", ":")
 
 
@@ -42,7 +58,11 @@ def split(line: str, separator: str | None) -> list[str]:
     ['part 3, left', '1.5', '']
     """
     if '"' not in line:
-        return line.split() if separator is None else [cell.strip() for cell in line.split(separator)]
+        return (
+            line.split()
+            if separator is None
+            else [cell.strip() for cell in line.split(separator)]
+        )
     sign = separator or " "
     cells: list[str] = []
     inside = False
@@ -82,7 +102,9 @@ def as_number(cell: str, decimal: str, thousands: str = "") -> float | None:
     if not cell.isascii():
         cell = cell.replace("\N{MINUS SIGN}", "-")
     if thousands and thousands in cell:
-        if not re.fullmatch(_GROUPED % (re.escape(thousands), re.escape(decimal)), cell, re.ASCII):
+        if not re.fullmatch(
+            _GROUPED % (re.escape(thousands), re.escape(decimal)), cell, re.ASCII
+        ):
             return None
         cell = cell.replace(thousands, "")
     if not _NUMBER[decimal].fullmatch(cell):
@@ -116,7 +138,10 @@ def find_thousands(cells: Sequence[str], decimal: str) -> str:
     for sign in ("." if decimal == "," else ",", *_THOUSANDS):
         grouped = re.compile(_GROUPED % (re.escape(sign), re.escape(decimal)), re.ASCII)
         sure = (
-            cell for cell in cells if sign in cell and (decimal in cell or cell.count(sign) > 1 or sign not in ".,")
+            cell
+            for cell in cells
+            if sign in cell
+            and (decimal in cell or cell.count(sign) > 1 or sign not in ".,")
         )
         if any(grouped.fullmatch(cell) for cell in sure):
             return sign

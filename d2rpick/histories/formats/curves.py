@@ -20,7 +20,11 @@ from d2rpick.histories.database import Database
 from d2rpick.histories.formats.cells import as_number
 from d2rpick.histories.formats.layout import unique
 from d2rpick.histories.formats.text import is_whole, precisions
-from d2rpick.histories.meaning import find_internal_energies, is_time, refuse_other_quantity
+from d2rpick.histories.meaning import (
+    find_internal_energies,
+    is_time,
+    refuse_other_quantity,
+)
 from d2rpick.histories.names import Selection, resolve, unit_of
 from d2rpick.histories.samples import of_one_run
 
@@ -32,7 +36,9 @@ if TYPE_CHECKING:
 
 _POINTS: Final = "#pts="
 _DYNAFORM: Final = r"\s*\d+\s+'([^']*)'\s*"  # compiled where it is needed
-_LONGEST_LABEL: Final = 1000  # what is longer is no label, and would be searched for long
+_LONGEST_LABEL: Final = (
+    1000  # what is longer is no label, and would be searched for long
+)
 # Type and factor that the Oasys programs write behind a label: "Time <TIME/0.001>;".  Compiled where it is needed.
 _TYPE: Final = r"\s*<([^<>/]*)(?:/([^<>]*))?>\s*;?\s*$"
 _UNITS_OF_TIME: Final = {1.0: "s", 1e-3: "ms", 1e-6: "us"}
@@ -55,7 +61,10 @@ class _Curve:
 def find_curves(text: Text, selection: Selection) -> Curves | None:
     """Read a text of curves, those whose times are asked for first by the selection; None for any other text."""
     found = _CurveText(text)
-    read = next((read for read in (_curveplot, _t_his, _dynaform, _counted) if read(found)), None)
+    read = next(
+        (read for read in (_curveplot, _t_his, _dynaform, _counted) if read(found)),
+        None,
+    )
     return Curves(found, selection) if read else None
 
 
@@ -89,7 +98,9 @@ class _CurveText:
         """Add a pair to the last curve."""
         cells = line.replace(",", " ").split()
         if len(cells) != 2 or not self.curves:
-            raise FormatError(f"{self.source}:{number}: {line.strip()[:60]!r}, a pair of numbers was expected")
+            raise FormatError(
+                f"{self.source}:{number}: {line.strip()[:60]!r}, a pair of numbers was expected"
+            )
         curve = self.curves[-1]
         curve.times.append(cells[0])
         curve.values.append(cells[1])
@@ -98,7 +109,9 @@ class _CurveText:
     def count(self, number: int, digits: str) -> int:
         """Read how many pairs or curves a line announces."""
         if len(digits) > _MOST_DIGITS:
-            raise FormatError(f"{self.source}:{number}: a count of {len(digits)} digits; the file is damaged")
+            raise FormatError(
+                f"{self.source}:{number}: a count of {len(digits)} digits; the file is damaged"
+            )
         return int(digits)
 
     def close(self, number: int, expected: int) -> None:
@@ -119,28 +132,44 @@ class Curves(Database):
     def __init__(self, found: _CurveText, selection: Selection) -> None:
         self.source = found.source
         self.time_unit = unit_of(found.x_label) or found.time_unit
-        self._curves = dict(zip(unique([one.name for one in found.curves], "curve"), found.curves, strict=True))
+        self._curves = dict(
+            zip(
+                unique([one.name for one in found.curves], "curve"),
+                found.curves,
+                strict=True,
+            )
+        )
         self.channels = tuple(self._curves)
         notes = [f"the file ends within {found.stops}"] if found.stops else []
         if found.x_label and not is_time(found.x_label):
-            notes.append(f"the x axis is called {found.x_label!r}; it was taken for the time")
+            notes.append(
+                f"the x axis is called {found.x_label!r}; it was taken for the time"
+            )
         last = found.curves[-1]
         breaks_off = found.unended and bool(last.times) and last.lines[-1] == found.last
         cut = breaks_off and not is_whole(last.values[-1], last.values[:-1])
         if cut:
             for cells in (last.times, last.values, last.lines):
                 cells.pop()
-            notes.append("the last line has no line end and may be cut; it was left out")
+            notes.append(
+                "the last line has no line end and may be cut; it was left out"
+            )
         self.complete = not found.stops and not cut
         self.notes = tuple(notes)
         if selection.time is not None and not is_time(selection.time):
-            raise FormatError(f"{self.source}: each curve has its own times; leave `time` {selection.time!r} out")
+            raise FormatError(
+                f"{self.source}: each curve has its own times; leave `time` {selection.time!r} out"
+            )
         self._asked = selection.energy
 
     @property
     def energy_channel(self) -> str:
         """The only curve, or the only one named like an internal energy; else FormatError with all there are."""
-        fitting = range(1) if len(self.channels) == 1 else find_internal_energies(self.channels)
+        fitting = (
+            range(1)
+            if len(self.channels) == 1
+            else find_internal_energies(self.channels)
+        )
         if len(fitting) != 1:
             found = f"{len(fitting)} curves are" if fitting else "no curve is"
             what = f"{self.source}: {found} named like an internal energy"
@@ -151,7 +180,11 @@ class Curves(Database):
 
     def find(self, wanted: str) -> str:
         """Name of the curve that is meant by its name or 1-based number; FormatError with what there is."""
-        if wanted.isdecimal() and wanted not in self.channels and 0 < int(wanted) <= len(self.channels):
+        if (
+            wanted.isdecimal()
+            and wanted not in self.channels
+            and 0 < int(wanted) <= len(self.channels)
+        ):
             return self.channels[int(wanted) - 1]
         return resolve(wanted, self.channels, self.source)
 
@@ -160,14 +193,19 @@ class Curves(Database):
         """Times of the curve that is asked for first, shape (n,) [time]."""
         name = self.find(self._asked[0]) if self._asked else self.energy_channel
         lines = self._curves[name].lines
-        return of_one_run(self._numbers(name, "times"), lambda state: f"{self.source}:{lines[state]}, {name!r}")
+        return of_one_run(
+            self._numbers(name, "times"),
+            lambda state: f"{self.source}:{lines[state]}, {name!r}",
+        )
 
     def channel(self, name: str) -> Samples:
         """Values of one curve, shape (n,); FormatError when its times are not those of the run."""
         if name not in self._curves:
             raise FormatError(f"{self.source}: no curve {name!r}, only {self._menu()}")
         if not np.array_equal(self._numbers(name, "times"), self.time):
-            raise FormatError(f"{self.source}: {name!r} has other times than the first curve that is asked for")
+            raise FormatError(
+                f"{self.source}: {name!r} has other times than the first curve that is asked for"
+            )
         return self._numbers(name, "values")
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
@@ -180,7 +218,9 @@ class Curves(Database):
     def _numbers(self, name: str, axis: str) -> Samples:
         curve = self._curves[name]
         cells = curve.times if axis == "times" else curve.values
-        numbers = np.array([as_number(cell, ".") for cell in cells], dtype=np.float64)  # None becomes nan
+        numbers = np.array(
+            [as_number(cell, ".") for cell in cells], dtype=np.float64
+        )  # None becomes nan
         bad = np.flatnonzero(~np.isfinite(numbers))
         if bad.size:
             found = f"{self.source}:{curve.lines[bad[0]]}: {cells[bad[0]][:60]!r} of {name!r}, a number was expected"
@@ -188,7 +228,9 @@ class Curves(Database):
         return numbers
 
     def _menu(self) -> str:
-        return listing([f"{number} {name!r}" for number, name in enumerate(self.channels, 1)])
+        return listing(
+            [f"{number} {name!r}" for number, name in enumerate(self.channels, 1)]
+        )
 
 
 def _curveplot(found: _CurveText) -> bool:
@@ -201,21 +243,30 @@ def _curveplot(found: _CurveText) -> bool:
         name, mark, digits = (piece.strip() for piece in line.rpartition(_POINTS))
         if mark and digits.isdecimal():
             points = found.count(number, digits)
-            found.curves.append(_Curve(name if name == y_label else f"{name}: {y_label}"))
+            found.curves.append(
+                _Curve(name if name == y_label else f"{name}: {y_label}")
+            )
             found.stops = f"the curve {name!r}"
         elif line.strip() == "endcurve" and found.stops:
             found.close(number, points)
         elif found.stops and not line.startswith("*"):
             found.add(number, line)
     if not found.curves:
-        raise FormatError(f"{found.source}: a Curveplot without a line '#pts=', no curve was found; export it again")
+        raise FormatError(
+            f"{found.source}: a Curveplot without a line '#pts=', no curve was found; export it again"
+        )
     return True
 
 
 def _t_his(found: _CurveText) -> bool:
     top = [_without_type(line) for line in found.top(5)]
-    labels = list(takewhile(lambda line: not _is_pair(line), top))  # the title may be blank
-    x_label = next((place for place in (0, 1) if place < len(labels) and is_time(labels[place])), None)
+    labels = list(
+        takewhile(lambda line: not _is_pair(line), top)
+    )  # the title may be blank
+    x_label = next(
+        (place for place in (0, 1) if place < len(labels) and is_time(labels[place])),
+        None,
+    )
     if x_label is None or not _FEWEST_LABELS <= len(labels) < len(top):
         return False
     found.x_label = labels[x_label]
@@ -229,7 +280,12 @@ def _t_his(found: _CurveText) -> bool:
             labels.append(_without_type(line))
         else:
             if in_head:
-                found.curves.append(_Curve(": ".join(reversed(labels[-2:])) or f"curve {len(found.curves) + 1}"))
+                found.curves.append(
+                    _Curve(
+                        ": ".join(reversed(labels[-2:]))
+                        or f"curve {len(found.curves) + 1}"
+                    )
+                )
                 in_head = False
             found.add(number, line)
     return True
@@ -255,7 +311,11 @@ def _unit_of_type(line: str) -> str:
 
 def _dynaform(found: _CurveText) -> bool:
     top = found.top(2)
-    if len(top) < 2 or not top[0].strip().isdecimal() or not re.fullmatch(_DYNAFORM, top[1]):
+    if (
+        len(top) < 2
+        or not top[0].strip().isdecimal()
+        or not re.fullmatch(_DYNAFORM, top[1])
+    ):
         return False
     head = re.compile(_DYNAFORM)
     lines = found.lines()

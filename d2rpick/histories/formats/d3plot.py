@@ -37,10 +37,22 @@ if TYPE_CHECKING:
     Rows = NDArray[np.floating[Any]]
 
 # Values of the whole model behind the time of a state.
-_MODEL: Final = ("kinetic_energy", "internal_energy", "total_energy", "x_velocity", "y_velocity", "z_velocity")
+_MODEL: Final = (
+    "kinetic_energy",
+    "internal_energy",
+    "total_energy",
+    "x_velocity",
+    "y_velocity",
+    "z_velocity",
+)
 _FIRST_OF_PARTS: Final = 1 + GLOBALS
 # Values of the parts, each for all parts together, by how many of a part come before; the velocity has three of each.
-_OF_PARTS: Final = {"internal_energy": 0, "kinetic_energy": 1, "mass": 5, "hourglass_energy": 6}
+_OF_PARTS: Final = {
+    "internal_energy": 0,
+    "kinetic_energy": 1,
+    "mass": 5,
+    "hourglass_energy": 6,
+}
 _VELOCITY: Final = 2
 _VELOCITIES: Final = ("x_rbvelocity", "y_rbvelocity", "z_rbvelocity")
 _MOMENTA: Final = ("x_momentum", "y_momentum", "z_momentum")
@@ -62,7 +74,11 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[D3plot]:
         if first in families and number is not None:
             families[first][number] = source
             del families[source.name]
-    return [D3plot(source, families[source.name]) for source in sources if source.name in families]
+    return [
+        D3plot(source, families[source.name])
+        for source in sources
+        if source.name in families
+    ]
 
 
 class _States(NamedTuple):
@@ -84,10 +100,19 @@ class D3plot(Database):
     def __init__(self, first: Source, others: Mapping[int, Source]) -> None:
         files = [first, *(others[number] for number in sorted(others))]
         self._head = head = read_head(content_of(first.data), first.name)
-        self.source = first.name if len(files) == 1 else f"{first.name} and {len(files) - 1} files behind it"
+        self.source = (
+            first.name
+            if len(files) == 1
+            else f"{first.name} and {len(files) - 1} files behind it"
+        )
         found = _states_of(files, head)
         self._rows = found.rows
-        self.title, self.version, self.parts, self.no_parts = head.title, head.version, head.parts, head.no_parts
+        self.title, self.version, self.parts, self.no_parts = (
+            head.title,
+            head.version,
+            head.parts,
+            head.no_parts,
+        )
         self.digits = DIGITS[head.form.width]
         walls = [_WALL.format(number) for number in range(1, head.walls + 1)]
         self.channels = (*_MODEL, *walls)
@@ -108,7 +133,9 @@ class D3plot(Database):
     def channel(self, name: str) -> Samples:
         """One value of the whole model, or the force of a rigid wall, shape (n,)."""
         if name not in self.channels:
-            raise FormatError(f"{self.source}: no {name}, there are {listing(self.channels)}; ask for one of these")
+            raise FormatError(
+                f"{self.source}: no {name}, there are {listing(self.channels)}; ask for one of these"
+            )
         place = self.channels.index(name)
         of_parts = self._head.part_values * len(self.parts) if place >= GLOBALS else 0
         return self._column(1 + place + of_parts)
@@ -119,7 +146,9 @@ class D3plot(Database):
         walls = self.channels[GLOBALS:]
         return tuple(
             ContactForce.of_forces(
-                f"rigid wall {number}", self.time, np.outer(self.channel(name), np.array([1.0, 0.0, 0.0]))
+                f"rigid wall {number}",
+                self.time,
+                np.outer(self.channel(name), np.array([1.0, 0.0, 0.0])),
             )
             for number, name in enumerate(walls, start=1)
         )
@@ -142,12 +171,20 @@ class D3plot(Database):
         if quantity in _MOMENTA:
             velocity = self.part_channel(_VELOCITIES[_MOMENTA.index(quantity)], ids)
             return velocity * self.part_channel("mass", ids)
-        before = _VELOCITY if quantity in _VELOCITIES else _OF_PARTS.get(quantity, self._head.part_values)
+        before = (
+            _VELOCITY
+            if quantity in _VELOCITIES
+            else _OF_PARTS.get(quantity, self._head.part_values)
+        )
         if before >= self._head.part_values:
-            raise FormatError(f"{self.source}: no {quantity} of parts in its states; ask for another")
+            raise FormatError(
+                f"{self.source}: no {quantity} of parts in its states; ask for another"
+            )
         if quantity in _VELOCITIES:
             places = 3 * places + _VELOCITIES.index(quantity)
-        return self._rows[:, _FIRST_OF_PARTS + before * len(self.parts) + places].astype(np.float64)
+        return self._rows[
+            :, _FIRST_OF_PARTS + before * len(self.parts) + places
+        ].astype(np.float64)
 
     def _column(self, place: int) -> Samples:
         return self._rows[:, place].astype(np.float64)
@@ -156,35 +193,60 @@ class D3plot(Database):
 def _states_of(files: Sequence[Source], head: Head) -> _States:
     """Read the heads of the states of a family, whose first file has them behind its own head."""
     real, values = head.form.real, 1 + head.globals
-    contents, begins = [content_of(file.data) for file in files], [head.begin] + [0] * (len(files) - 1)
-    counts = [max(0, len(one) - begin) // head.state for one, begin in zip(contents, begins, strict=True)]
+    contents, begins = (
+        [content_of(file.data) for file in files],
+        [head.begin] + [0] * (len(files) - 1),
+    )
+    counts = [
+        max(0, len(one) - begin) // head.state
+        for one, begin in zip(contents, begins, strict=True)
+    ]
     behind = np.cumsum(counts).tolist()
     heads = np.empty((behind[-1], values * real.itemsize), np.uint8)
     rests = [
         content.fill_rows(heads[end - count : end], begin, head.state, real.itemsize)
-        for content, begin, end, count in zip(contents, begins, behind, counts, strict=True)
+        for content, begin, end, count in zip(
+            contents, begins, behind, counts, strict=True
+        )
     ]
     for content in contents:
         content.check()
     rows = heads.view(real)
-    first_is_empty = not counts[0] and _is_blank(contents[0], begins[0], len(contents[0]) - begins[0])
-    if first_is_empty and set(rests[1:]) == {np.array(END, real).tobytes()} and _ascend(rows[:, 0], behind):
+    first_is_empty = not counts[0] and _is_blank(
+        contents[0], begins[0], len(contents[0]) - begins[0]
+    )
+    if (
+        first_is_empty
+        and set(rests[1:]) == {np.array(END, real).tobytes()}
+        and _ascend(rows[:, 0], behind)
+    ):
         return _States(rows)  # as mostly
     pieces = zip(files, begins, np.split(rows, behind[:-1]), rests, strict=True)
-    found = [_whole_states(file, head, begin, piece, rest) for file, begin, piece, rest in pieces]
+    found = [
+        _whole_states(file, head, begin, piece, rest)
+        for file, begin, piece, rest in pieces
+    ]
     notes = tuple(note for states in found for note in states.notes)
-    return _States(np.concatenate([states.rows for states in found]), all(states.ended for states in found), notes)
+    return _States(
+        np.concatenate([states.rows for states in found]),
+        all(states.ended for states in found),
+        notes,
+    )
 
 
 def _ascend(time: NDArray[np.floating[Any]], behind: Sequence[int]) -> bool:
     """Whether times are numbers that ascend in each of several files, which end ``behind`` so many states."""
     with np.errstate(invalid="ignore"):
         ascends = np.diff(time) > 0
-    ascends[[end - 1 for end in behind if 0 < end < time.size]] = True  # a restart may write a state again
+    ascends[[end - 1 for end in behind if 0 < end < time.size]] = (
+        True  # a restart may write a state again
+    )
     return bool(ascends.all() and np.isfinite(time).all() and (time != END).all())
 
 
-def _whole_states(file: Source, head: Head, begin: int, rows: Rows, rest: bytes) -> _States:
+def _whole_states(
+    file: Source, head: Head, begin: int, rows: Rows, rest: bytes
+) -> _States:
     """Give the states of one file up to its end, which the solver marks."""
     content, name = content_of(file.data), file.name
     ends = np.flatnonzero(rows[:, 0] == END)
@@ -200,11 +262,15 @@ def _whole_states(file: Source, head: Head, begin: int, rows: Rows, rest: bytes)
         _refuse_other_states(content, name, head, begin)
     time = rows[:, 0]
     with np.errstate(invalid="ignore"):
-        wrong = np.flatnonzero(~(np.diff(time, prepend=-np.inf) > 0) | ~np.isfinite(time))
+        wrong = np.flatnonzero(
+            ~(np.diff(time, prepend=-np.inf) > 0) | ~np.isfinite(time)
+        )
     if wrong.size:
         where = begin + head.state * int(wrong[0])
         found = f"{name}: a state was expected at byte {where}, with a time above that of the one before"
-        raise FormatError(f"{found}, not {time[wrong[0]]:g}; the file is damaged, copy it again")
+        raise FormatError(
+            f"{found}, not {time[wrong[0]]:g}; the file is damaged, copy it again"
+        )
     return _States(rows, ended, () if ended else (_cut(content, name, end, rows),))
 
 
@@ -212,7 +278,9 @@ def _cut(content: Content, name: str, end: int, rows: Rows) -> str:
     """Say that a file does not end as the solver ends it."""
     if end < len(content):
         return f"{name}: the file ends within state {len(rows) + 1}, which was left out; is the run still writing?"
-    return f"{name}: the file ends without the mark of its end; is the run still writing?"
+    return (
+        f"{name}: the file ends without the mark of its end; is the run still writing?"
+    )
 
 
 def _is_blank(content: Content, begin: int, size: int) -> bool:
@@ -227,7 +295,8 @@ def _refuse_other_states(content: Content, name: str, head: Head, begin: int) ->
     at = tail.rfind(mark)
     if at >= 0 and not tail[at + len(mark) :].strip(b"\0"):
         found = (
-            f"{name}: its states are {first + at - begin} bytes together, one of {head.state} bytes each by the head"
+            f"{name}: its states are {first + at - begin} bytes together, one of "
+            f"{head.state} bytes each by the head"
         )
         cure = "that layout is not known; name the glstat, matsum or binout of the run"
         raise FormatError(f"{found}; {cure}")
@@ -235,8 +304,15 @@ def _refuse_other_states(content: Content, name: str, head: Head, begin: int) ->
 
 def _missing(first: str, numbers: Sequence[int]) -> tuple[str, ...]:
     """Say which numbers of a family are left out."""
-    gaps = [(low + 1, high - 1) for low, high in pairwise([0, *numbers]) if high > low + 1]
-    names = [f"{low:02d}" if low == high else f"{low:02d} to {high:02d}" for low, high in gaps]
+    gaps = [
+        (low + 1, high - 1) for low, high in pairwise([0, *numbers]) if high > low + 1
+    ]
+    names = [
+        f"{low:02d}" if low == high else f"{low:02d} to {high:02d}"
+        for low, high in gaps
+    ]
     if not names:
         return ()
-    return (f"{first}: of the files behind it {listing(names, most=5)} are not there; are they missing?",)
+    return (
+        f"{first}: of the files behind it {listing(names, most=5)} are not there; are they missing?",
+    )

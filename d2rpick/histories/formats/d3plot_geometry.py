@@ -48,7 +48,9 @@ class Geometry:
         self._words, self._control = words, control
         self.at = CONTROL + max(0, control["extra"])
         self.part_ids: tuple[tuple[int, ...], ...] = ()
-        self.rigid_shells = self.values_of_sph = self.airbag_values = self.roads = self.rigid_bodies = 0
+        self.rigid_shells = self.values_of_sph = self.airbag_values = self.roads = (
+            self.rigid_bodies
+        ) = 0
         self._airbag_geometry = self._left_nodes = 0
 
     def pass_over(self) -> None:
@@ -59,7 +61,11 @@ class Geometry:
         self._airbag_flags()
         self._nodes_and_elements()
         self._rigid_bodies()
-        self.at += 2 * self._control["nadapt"] + 2 * self._control["nmsph"] + self._airbag_geometry
+        self.at += (
+            2 * self._control["nadapt"]
+            + 2 * self._control["nmsph"]
+            + self._airbag_geometry
+        )
         self._roads()
         self._extra_nodes()
 
@@ -82,7 +88,9 @@ class Geometry:
         begin = self.at
         (length,) = self._next(1)
         flags = self._words.integers(begin + 1, 10)
-        histories = flags[-1] if length > len(flags) else 0  # older files have no word for them
+        histories = (
+            flags[-1] if length > len(flags) else 0
+        )  # older files have no word for them
         self.values_of_sph = 1 + sum(abs(flag) for flag in flags[:-1]) + histories
         self.at = begin + length
 
@@ -92,7 +100,9 @@ class Geometry:
             return
         of_geometry, of_particle, particles, of_airbag = self._next(4)
         self.at += version == 4  # the number of chambers
-        self.at += 9 * (of_geometry + of_particle + of_airbag)  # a type and a name of each value
+        self.at += 9 * (
+            of_geometry + of_particle + of_airbag
+        )  # a type and a name of each value
         self._airbag_geometry = airbags * of_geometry
         self.airbag_values = airbags * of_airbag + particles * of_particle
 
@@ -108,7 +118,9 @@ class Geometry:
         self._numbering()
 
     def _begins_numbering(self, place: int) -> bool:
-        if not self._words.has(place * self._words.form.width, _NUMBERING * self._words.form.width):
+        if not self._words.has(
+            place * self._words.form.width, _NUMBERING * self._words.form.width
+        ):
             return False
         counts = self._words.integers(place + 5, 2)
         return counts == (self._control["numnp"], abs(self._control["nel8"]))
@@ -129,9 +141,13 @@ class Geometry:
         width = 8 if long else form.width
         expected = _PART_NUMBERING + (sum(head[5:]) + 3 * count) * width // form.width
         if size != expected:
-            raise self._words.damaged(f"a section of ids of {size} words, not of {expected}")
+            raise self._words.damaged(
+                f"a section of ids of {size} words, not of {expected}"
+            )
         begin = (self.at + size) * form.width - 3 * count * width
-        found_ids = np.frombuffer(self._words.bytes(begin, 2 * count * width), f"{form.order}i{width}")
+        found_ids = np.frombuffer(
+            self._words.bytes(begin, 2 * count * width), f"{form.order}i{width}"
+        )
         return tuple(tuple(ids.tolist()) for ids in found_ids.reshape(2, count))
 
     def _rigid_bodies(self) -> None:
@@ -159,7 +175,9 @@ class Geometry:
             kinds |= _FULL_QUADRATIC
         if control["cubic"]:
             kinds |= _CUBIC
-        self.at += self._left_nodes + sum(words * control[name] for name, words in kinds.items())
+        self.at += self._left_nodes + sum(
+            words * control[name] for name, words in kinds.items()
+        )
 
 
 class Titles:
@@ -175,7 +193,9 @@ class Titles:
         if not self._words.has(self.at, width):
             self._words.bytes(self.at, width)
         if not self._words.ends_at(self.at):
-            raise self._words.damaged(f"no end of the geometry at byte {self.at}, where its head says")
+            raise self._words.damaged(
+                f"no end of the geometry at byte {self.at}, where its head says"
+            )
         self.at += width
         while self._words.has(self.at, width) and self._section():
             if self._words.ends_at(self.at):
@@ -195,7 +215,11 @@ class Titles:
         rows = self._words.bytes(self.at + 2 * width, min(count, _MOST_TITLES) * size)
         if kind == _PART_TITLES:
             for begin in range(0, len(rows), size):
-                id_ = int(np.frombuffer(rows[begin : begin + width], self._words.form.integer)[0])
+                id_ = int(
+                    np.frombuffer(
+                        rows[begin : begin + width], self._words.form.integer
+                    )[0]
+                )
                 self.of_parts[id_] = plain_text(rows[begin + width : begin + size])
         self.at += 2 * width + len(rows)
         return True

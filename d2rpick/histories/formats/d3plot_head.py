@@ -6,8 +6,18 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import FormatError
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.formats.d3plot_geometry import WITH_RIGID_BODIES, Geometry, Titles
-from d2rpick.histories.formats.d3plot_words import HEAD, Form, Words, dimensions_of, form_of
+from d2rpick.histories.formats.d3plot_geometry import (
+    WITH_RIGID_BODIES,
+    Geometry,
+    Titles,
+)
+from d2rpick.histories.formats.d3plot_words import (
+    HEAD,
+    Form,
+    Words,
+    dimensions_of,
+    form_of,
+)
 from d2rpick.histories.names import Part, plain_text
 
 if TYPE_CHECKING:
@@ -15,13 +25,24 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.content import Content
 
-GLOBALS: Final = 6  # kinetic, internal and total energy, and the velocity of the whole model
+GLOBALS: Final = (
+    6  # kinetic, internal and total energy, and the velocity of the whole model
+)
 
 _FEMZIP: Final = 76_893_465  # stands in place of the number of parts in packed files
-_BY_ELEMENT: Final = -10_000  # at most this: the state tells which elements are deleted, else which nodes
-_WITH_WALL_PLACES: Final = 971.0  # since this release a rigid wall has its place beside its force
+_BY_ELEMENT: Final = (
+    -10_000
+)  # at most this: the state tells which elements are deleted, else which nodes
+_WITH_WALL_PLACES: Final = (
+    971.0  # since this release a rigid wall has its place beside its force
+)
 
-_THERMAL: Final = {0: 0, 1: 1, 2: 4, 3: 6}  # values of a node: temperatures of one layer or three, and heat flux
+_THERMAL: Final = {
+    0: 0,
+    1: 1,
+    2: 4,
+    3: 6,
+}  # values of a node: temperatures of one layer or three, and heat flux
 
 
 class Head(NamedTuple):
@@ -54,7 +75,9 @@ def read_head(content: Content, source: str) -> Head:
     """
     form = form_of(content[:HEAD])
     if form is None:
-        raise FormatError(f"{source}: this is not the first file of a d3plot or d3thdt; name that of the run")
+        raise FormatError(
+            f"{source}: this is not the first file of a d3plot or d3thdt; name that of the run"
+        )
     words = Words(content, form, source)
     control = words.control()
     if control["nmmat"] == _FEMZIP:
@@ -76,7 +99,9 @@ def read_head(content: Content, source: str) -> Head:
     parts = tuple(Part(id_, titles.of_parts.get(id_, "")) for id_ in ids)
     state = form.width * _words_of_state(control, geometry)
     if state < form.width * (1 + control["nglbv"]):
-        raise words.damaged(f"states of {state} bytes, less than the values of the model have,")
+        raise words.damaged(
+            f"states of {state} bytes, less than the values of the model have,"
+        )
     return Head(
         form=form,
         title=plain_text(content[: 10 * form.width]) or titles.of_run,
@@ -92,7 +117,9 @@ def read_head(content: Content, source: str) -> Head:
 
 
 def _number_of_parts(control: Mapping[str, int]) -> int:
-    return control["nmmat"] or sum(control[name] for name in ("nummat8", "nummat2", "nummat4", "nummatt", "ngpsph"))
+    return control["nmmat"] or sum(
+        control[name] for name in ("nummat8", "nummat2", "nummat4", "nummatt", "ngpsph")
+    )
 
 
 def _ids_by(geometry: Geometry, titles: Titles, number: int) -> tuple[int, ...]:
@@ -111,7 +138,10 @@ def _values_of_parts(values: int, number: int, source: str) -> tuple[int, str]:
     """Give how many quantities a state has of each part: 7, or less in older files; 0 and the reason where none."""
     of_parts = values - GLOBALS
     if number == 0 or of_parts == 0:
-        return 0, f"{source}: its states hold the whole model alone; give the matsum or binout of the run for its parts"
+        return (
+            0,
+            f"{source}: its states hold the whole model alone; give the matsum or binout of the run for its parts",
+        )
     each = 7 if of_parts >= 7 * number else of_parts // number
     fits = of_parts >= 7 * number or of_parts % number == 0
     if not fits or each < 2:
@@ -143,7 +173,8 @@ def _words_of_state(control: Mapping[str, int], geometry: Geometry) -> int:
         control["nmsph"] * geometry.values_of_sph
         + geometry.airbag_values
         + 6 * geometry.roads
-        + geometry.rigid_bodies * (12 if control["ndim"] == max(WITH_RIGID_BODIES) else 24)
+        + geometry.rigid_bodies
+        * (12 if control["ndim"] == max(WITH_RIGID_BODIES) else 24)
     )
     nodes = control["numnp"] * _values_of_node(control)
     return 1 + control["nglbv"] + nodes + elements + _deletions(control) + others
@@ -154,11 +185,20 @@ def _values_of_node(control: Mapping[str, int]) -> int:
     heat, scaled_mass = control["it"] % 10, control["it"] // 10 % 10 == 1
     rates, residuals = control["idtdt"] % 10 == 1, control["idtdt"] // 10 % 10 == 1
     contact = control["penout"] + (control["engout"] == 1)
-    return dimensions_of(control) * vectors + _THERMAL.get(heat, 0) + scaled_mass + rates + 6 * residuals + contact
+    return (
+        dimensions_of(control) * vectors
+        + _THERMAL.get(heat, 0)
+        + scaled_mass
+        + rates
+        + 6 * residuals
+        + contact
+    )
 
 
 def _deletions(control: Mapping[str, int]) -> int:
     """Count the words that say which elements or nodes are deleted."""
     if control["maxint"] <= _BY_ELEMENT:
-        return abs(control["nel8"]) + control["nelt"] + control["nel4"] + control["nel2"]
+        return (
+            abs(control["nel8"]) + control["nelt"] + control["nel4"] + control["nel2"]
+        )
     return control["numnp"] if control["maxint"] < 0 else 0

@@ -89,16 +89,30 @@ class Words:
         """Read the control words by their names; those that an older file has not are 0."""
         words = self.integers(0, CONTROL)
         length = CONTROL + max(0, words[_PLACES["extra"]])
-        words += self.integers(CONTROL, min(length, max(_PLACES.values()) + 1) - CONTROL)
-        found = {name: words[place] if place < len(words) else 0 for name, place in _PLACES.items()}
-        negative = [name for name, count in found.items() if count < 0 and name not in _SIGNED]
+        words += self.integers(
+            CONTROL, min(length, max(_PLACES.values()) + 1) - CONTROL
+        )
+        found = {
+            name: words[place] if place < len(words) else 0
+            for name, place in _PLACES.items()
+        }
+        negative = [
+            name for name, count in found.items() if count < 0 and name not in _SIGNED
+        ]
         if negative:
-            raise self.damaged(f"a count of {found[negative[0]]} ({negative[0]}) in its head")
+            raise self.damaged(
+                f"a count of {found[negative[0]]} ({negative[0]}) in its head"
+            )
         return found
 
     def release(self) -> float:
         """Read the number of the release, as 971."""
-        return float(np.frombuffer(self.bytes((_RELEASE + 1) * self.form.width, self.form.width), self.form.real)[0])
+        return float(
+            np.frombuffer(
+                self.bytes((_RELEASE + 1) * self.form.width, self.form.width),
+                self.form.real,
+            )[0]
+        )
 
     @property
     def is_named(self) -> bool:
@@ -118,7 +132,9 @@ class Words:
     def ends_at(self, at: int) -> bool:
         """Whether the mark of an end stands at a byte."""
         found = self._content[at : at + self.form.width]
-        return len(found) == self.form.width and bool(np.frombuffer(found, self.form.real)[0] == END)
+        return len(found) == self.form.width and bool(
+            np.frombuffer(found, self.form.real)[0] == END
+        )
 
     def has(self, at: int, size: int) -> bool:
         """Whether the file has so many bytes there."""

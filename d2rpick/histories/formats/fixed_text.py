@@ -18,7 +18,15 @@ import numpy as np
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.content import content_of, line_at
 from d2rpick.histories.database import Database
-from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, Stretch, decode, head, like_example
+from d2rpick.histories.formats.blocks import (
+    UNSURE,
+    BlockLayout,
+    Grammar,
+    Stretch,
+    decode,
+    head,
+    like_example,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Hashable, Iterator, Sequence
@@ -61,27 +69,43 @@ class Blocks(Database):
     many = 64  # of so many blocks it is remembered what differs between them, a small share of the file
     batch = 1 << 14  # numbers that are converted together: they stay in the cache
 
-    def __init__(self, data: bytes | Content, source: str, grammar: Grammar, ahead: Sequence[Hashable] = ()) -> None:
+    def __init__(
+        self,
+        data: bytes | Content,
+        source: str,
+        grammar: Grammar,
+        ahead: Sequence[Hashable] = (),
+    ) -> None:
         self.source = source
         self.title, self.version, self._begin = head(data)
         self._data = content_of(data)
         self._grammar = grammar
         self._end = self._data.rfind(b"\n", 0, len(self._data)) + 1
-        self._runs = array("q")  # packed: a file whose blocks all differ must not fill the memory
+        self._runs = array(
+            "q"
+        )  # packed: a file whose blocks all differ must not fill the memory
         data, end = self._data, self._end  # not self: a circle would keep the file open
-        self.layout = lru_cache(maxsize=16)(lambda at, size: grammar.layout(data[at : min(at + size, end)]))
+        self.layout = lru_cache(maxsize=16)(
+            lambda at, size: grammar.layout(data[at : min(at + size, end)])
+        )
         self._compared = grammar.compare_all
         self._trusted = False  # whether a part of each block was compared for numbers that were asked for
-        self._varied: dict[int, Bytes] = {}  # by the start of a run of many blocks: 0 for the bytes that they share
+        self._varied: dict[
+            int, Bytes
+        ] = {}  # by the start of a run of many blocks: 0 for the bytes that they share
         self._asked_ahead = tuple(ahead)
-        self._ahead: dict[int, Fields] = {}  # by the start of such a run: the numbers taken of its blocks, as printed
+        self._ahead: dict[
+            int, Fields
+        ] = {}  # by the start of such a run: the numbers taken of its blocks, as printed
         self._walk()
         if not self._compared and not self._is_even():
             self._compared = True
             self._walk()
 
     def __iter__(self) -> Iterator[Stretch]:
-        return (Stretch(*self._runs[at : at + 4]) for at in range(0, len(self._runs), 4))
+        return (
+            Stretch(*self._runs[at : at + 4]) for at in range(0, len(self._runs), 4)
+        )
 
     def refuse_foreign(self) -> None:
         """FormatError where there is neither a head nor a state."""
@@ -89,7 +113,9 @@ class Blocks(Database):
             told = f"{self.source}:1: neither a line with 'ls-dyna' nor a whole state was found, this is not a"
             raise FormatError(f"{told} {self.format}; choose another input format")
 
-    def numbers(self, names: Sequence[Hashable], anchors: Sequence[Hashable] = ()) -> Samples:
+    def numbers(
+        self, names: Sequence[Hashable], anchors: Sequence[Hashable] = ()
+    ) -> Samples:
         """Numbers of all states, shape (states, len(names)).
 
         ``anchors`` name, for each number, the field or line from which on the text is compared before the
@@ -100,13 +126,21 @@ class Blocks(Database):
         FormatError
             If a state lacks one of the numbers, has it twice, or has something else in its place.
         """
-        if anchors and not self._compared and (self._trusted or not self._alike(names, anchors)):
-            self._compare_in_full(names)  # who asks again will go on asking: one comparison is for all
+        if (
+            anchors
+            and not self._compared
+            and (self._trusted or not self._alike(names, anchors))
+        ):
+            self._compare_in_full(
+                names
+            )  # who asks again will go on asking: one comparison is for all
         self._trusted = self._trusted or bool(anchors)
         taken: dict[int, Fields] = {}
         if tuple(names) == self._asked_ahead:
             taken, self._ahead = self._ahead, taken  # who asks again has them
-        values = np.zeros((self.states, len(names)))  # memory that is never written costs nothing
+        values = np.zeros(
+            (self.states, len(names))
+        )  # memory that is never written costs nothing
         few, row = np.ones(self.states, bool), 0
         for run in self:
             rows = slice(row, row := row + run.repeats)
@@ -115,7 +149,11 @@ class Blocks(Database):
                 self._read(values[rows], run, offsets, taken.get(run.start))
                 few[rows] = False
             else:  # each address gives way to the number found there
-                np.add(_starts(run, 0, run.repeats), offsets, out=values[rows].view(np.int64))
+                np.add(
+                    _starts(run, 0, run.repeats),
+                    offsets,
+                    out=values[rows].view(np.int64),
+                )
         together = values if few.all() else values[few]
         flat = together.reshape(-1)
         for piece in np.split(flat, range(self.batch, flat.size, self.batch)):
@@ -130,26 +168,36 @@ class Blocks(Database):
         """Let the last state count although the file ends within it, if these numbers and a line behind are there."""
         if self.rest is None:
             return
-        offsets = [self.layout(self.rest.example, self.rest.stride).fields.get(name, UNSURE) for name in names]
+        offsets = [
+            self.layout(self.rest.example, self.rest.stride).fields.get(name, UNSURE)
+            for name in names
+        ]
         end_of_line = self._data.find(b"\n", self.rest.start + max(offsets))
         if UNSURE in offsets or end_of_line == len(self._data) - 1:
             return
         self._runs.extend(self.rest)
         self.states += 1
-        self.notes = (*self.notes[:-1], "the file ends within its last state, after the lines that were needed")
+        self.notes = (
+            *self.notes[:-1],
+            "the file ends within its last state, after the lines that were needed",
+        )
 
     def text(self, start: int, size: int) -> bytes:
         """Copy a piece of the whole lines of the file."""
         return self._data[start : min(start + size, self._end)]
 
-    def _read(self, values: Samples, run: Stretch, offsets: Addresses, taken: Fields | None) -> None:
+    def _read(
+        self, values: Samples, run: Stretch, offsets: Addresses, taken: Fields | None
+    ) -> None:
         """Read the numbers of a run of many blocks, which may have been taken; what never changes is read once."""
         before = np.append(0, np.cumsum(self._varied[run.start] != 0))
         moves = before[offsets + self._grammar.width] > before[offsets]
         still = self._decoded(run.start + offsets[~moves])
         if still.view(np.int64).any():
             values[:, ~moves] = still
-        moving = slice(None) if moves.all() else np.flatnonzero(moves)  # without copies, as mostly
+        moving = (
+            slice(None) if moves.all() else np.flatnonzero(moves)
+        )  # without copies, as mostly
         step = max(1, self.batch // max(1, offsets[moving].size))
         for at in range(0, run.repeats if moves.any() else 0, step):
             end = min(at + step, run.repeats)
@@ -162,7 +210,9 @@ class Blocks(Database):
     def _decoded(self, addresses: Addresses) -> Samples:
         """Numbers at these addresses, NaN for what is none."""
         fields = self._data.fields(addresses, self._grammar.width)
-        return decode(fields.view(f"S{self._grammar.width}").ravel(), self._grammar.decimals)
+        return decode(
+            fields.view(f"S{self._grammar.width}").ravel(), self._grammar.decimals
+        )
 
     def _refuse_odd(self, values: Samples, names: Sequence[Hashable]) -> None:
         """FormatError with the line of the first of values (states, len(names)) that is no number."""
@@ -174,7 +224,9 @@ class Blocks(Database):
         address = run.start + state * run.stride + int(self._offsets(run, names)[place])
         text = self.text(address, self._grammar.width).decode("latin-1").strip()
         what = f"{self.source}:{line_at(self._data, address)}: {_spoken(names[place])} is {text!r}"
-        raise FormatError(f"{what}, a number in its columns was expected; cut the file before this state")
+        raise FormatError(
+            f"{what}, a number in its columns was expected; cut the file before this state"
+        )
 
     def _run_of(self, state: int) -> tuple[Stretch, int]:
         """Find the run that a state belongs to, and its place there."""
@@ -207,7 +259,9 @@ class Blocks(Database):
         previous: BlockLayout | None = None
         position = self._find(self._begin)
         while position is not None:
-            example, stride, count = self._known(position, recent) or self._new(position, recent)
+            example, stride, count = self._known(position, recent) or self._new(
+                position, recent
+            )
             layout = self.layout(example, stride)
             self.tail = position + (count - 1) * stride
             is_last = (following := position + count * stride) >= self._end
@@ -222,22 +276,34 @@ class Blocks(Database):
             self.notes = ("the file ends within a line, which was left out",)
 
     def _is_whole(self, layout: BlockLayout, previous: BlockLayout | None) -> bool:
-        return self._grammar.whole(layout) if previous is None else previous.last in layout.fields
+        return (
+            self._grammar.whole(layout)
+            if previous is None
+            else previous.last in layout.fields
+        )
 
     def _leave_out(self, block: Stretch, is_last: bool) -> None:
         if is_last:
             self.complete, self.rest = False, block
         where = "the file" if is_last else "a leg of the run"
-        self.notes += (f"{where} ends within the state of line {line_at(self._data, block.start)}, which was left out",)
+        self.notes += (
+            f"{where} ends within the state of line {line_at(self._data, block.start)}, which was left out",
+        )
 
-    def _known(self, position: int, recent: list[tuple[int, int]]) -> tuple[int, int, int] | None:
+    def _known(
+        self, position: int, recent: list[tuple[int, int]]
+    ) -> tuple[int, int, int] | None:
         """Try the recent layouts: example, stride and count of the blocks that follow one of them."""
         start = self._grammar.start
-        fitting = (one for one in recent if self.text(position + one[1], len(start)) == start)
+        fitting = (
+            one for one in recent if self.text(position + one[1], len(start)) == start
+        )
         counted = ((*one, self._count(position, *one)) for one in fitting)
         return next((found for found in counted if found[2]), None)
 
-    def _new(self, position: int, recent: list[tuple[int, int]]) -> tuple[int, int, int]:
+    def _new(
+        self, position: int, recent: list[tuple[int, int]]
+    ) -> tuple[int, int, int]:
         """Take the block apart: the same for a layout not met before."""
         following = self._find(position + 1)
         if following is None:
@@ -256,7 +322,12 @@ class Blocks(Database):
             example
             for example, stride in recent
             if stride == last.stride
-            and like_example(self._data, last._replace(example=example), 0, self.layout(example, stride).literal)
+            and like_example(
+                self._data,
+                last._replace(example=example),
+                0,
+                self.layout(example, stride).literal,
+            )
         )
         return next(alike, last.start)
 
@@ -271,22 +342,40 @@ class Blocks(Database):
         else:
             first_line = self.text(example, _LINE).find(b"\n") + 1
             count = like_example(self._data, run, 0, literal[:first_line])
-            count = like_example(self._data, run._replace(repeats=count), stride - 1, literal[-1:])
-        return count if self.text(position + count * stride, len(start)) == start else max(0, count - 1)
+            count = like_example(
+                self._data, run._replace(repeats=count), stride - 1, literal[-1:]
+            )
+        return (
+            count
+            if self.text(position + count * stride, len(start)) == start
+            else max(0, count - 1)
+        )
 
     def _count_and_take(self, run: Stretch, literal: Bytes) -> int:
         """Count the blocks like the example; remember what differs in them, and the numbers that will be asked for."""
-        varied, fields = np.zeros_like(literal), self.layout(run.example, run.stride).fields
-        offsets = np.array([fields.get(name, UNSURE) for name in self._asked_ahead], dtype=np.int64)
+        varied, fields = (
+            np.zeros_like(literal),
+            self.layout(run.example, run.stride).fields,
+        )
+        offsets = np.array(
+            [fields.get(name, UNSURE) for name in self._asked_ahead], dtype=np.int64
+        )
         sure = offsets.size > 0 and not np.any(offsets == UNSURE)
         width = self._grammar.width
         ahead: list[Fields] = []
 
         def take(rows: Bytes) -> None:
-            starts = np.ndarray((len(rows), run.stride - width + 1), f"S{width}", rows, strides=(rows.strides[0], 1))
+            starts = np.ndarray(
+                (len(rows), run.stride - width + 1),
+                f"S{width}",
+                rows,
+                strides=(rows.strides[0], 1),
+            )
             ahead.append(starts[:, offsets])
 
-        count = like_example(self._data, run, 0, literal, varied, take if sure else None)
+        count = like_example(
+            self._data, run, 0, literal, varied, take if sure else None
+        )
         if count > self.many:
             self._varied[run.start] = varied
             if sure:
@@ -298,15 +387,24 @@ class Blocks(Database):
 
         False without a look where that is most of a block: to compare all of it costs no more.
         """
-        return all(self._alike_in(run, self._offsets(run, names), anchors) for run in self)
+        return all(
+            self._alike_in(run, self._offsets(run, names), anchors) for run in self
+        )
 
-    def _alike_in(self, run: Stretch, offsets: Addresses, anchors: Sequence[Hashable]) -> bool:
+    def _alike_in(
+        self, run: Stretch, offsets: Addresses, anchors: Sequence[Hashable]
+    ) -> bool:
         if run.repeats == 1 and run.start == run.example:
             return True
         layout = self.layout(run.example, run.stride)
         first = min(layout.fields[anchor] for anchor in anchors)
-        text = layout.literal[first : int(offsets.max()) + self._grammar.width + 1]  # with what follows a number
-        return 2 * text.size <= run.stride and like_example(self._data, run, first, text) == run.repeats
+        text = layout.literal[
+            first : int(offsets.max()) + self._grammar.width + 1
+        ]  # with what follows a number
+        return (
+            2 * text.size <= run.stride
+            and like_example(self._data, run, first, text) == run.repeats
+        )
 
     def _is_even(self) -> bool:
         """Tell whether all blocks but the last have one size, and look alike at both ends of the file."""
@@ -317,7 +415,12 @@ class Blocks(Database):
         literal = self.layout(first.example, first.stride).literal
         last = first.repeats - 1
         return [run.start for run in runs[1:]] in ([], [self.tail]) and all(
-            like_example(self._data, first._replace(start=first.start + block * first.stride, repeats=1), 0, literal)
+            like_example(
+                self._data,
+                first._replace(start=first.start + block * first.stride, repeats=1),
+                0,
+                literal,
+            )
             for block in (min(1, last), last)
         )
 

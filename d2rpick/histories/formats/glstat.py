@@ -12,7 +12,13 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.errors import FormatError
-from d2rpick.histories.formats.blocks import UNSURE, BlockLayout, Grammar, head, written_head
+from d2rpick.histories.formats.blocks import (
+    UNSURE,
+    BlockLayout,
+    Grammar,
+    head,
+    written_head,
+)
 from d2rpick.histories.formats.fixed_text import Blocks
 from d2rpick.histories.history import Samples, frozen
 
@@ -32,10 +38,14 @@ _WIDTH: Final = 14
 _CONTROL: Final = b"\n dt of cycle"
 _LAST: Final = "time per zone cycle.(nanosec)"  # in every glstat seen; mass scaling may add lines behind it
 _LINE: Final = re.compile(rb"^ ([A-Za-z][^=\r\n]{29}\.)([^\r\n]*)\r?$", re.MULTILINE)
-_VALUE: Final = re.compile(rb".{14}(?: +(wall# *\d+))?(?=[ \t]|$)")  # there is a line for each wall
+_VALUE: Final = re.compile(
+    rb".{14}(?: +(wall# *\d+))?(?=[ \t]|$)"
+)  # there is a line for each wall
 
 # In lines other than these: numbers, and what controls the time step.
-_CHANGING: Final = re.compile(rb" {0,12}[+-]?\d[\d+-]*|(?<= is controlled by )[^\r\n]{1,40}")
+_CHANGING: Final = re.compile(
+    rb" {0,12}[+-]?\d[\d+-]*|(?<= is controlled by )[^\r\n]{1,40}"
+)
 
 
 def recognises(data: bytes) -> bool:
@@ -49,7 +59,10 @@ def recognises(data: bytes) -> bool:
 
 def open_legs(sources: Sequence[Source], selection: Selection) -> list[Glstat]:
     """Open each file as a leg of the run; the selection tells what its last state must have to count."""
-    return [Glstat(source.data, source.name, selection.energy or (_ENERGY,)) for source in sources]
+    return [
+        Glstat(source.data, source.name, selection.energy or (_ENERGY,))
+        for source in sources
+    ]
 
 
 class Glstat(Blocks):
@@ -62,12 +75,16 @@ class Glstat(Blocks):
     format, digits = "glstat", 6
     no_parts = "a glstat has no parts; add the matsum of the run"
 
-    def __init__(self, data: bytes | Content, source: str, needed: Sequence[str] = ()) -> None:
+    def __init__(
+        self, data: bytes | Content, source: str, needed: Sequence[str] = ()
+    ) -> None:
         springs = [_SPRINGS] if _SPRINGS.encode() in data[:_NEAR] else []
         super().__init__(data, source, _GRAMMAR, (_TIME, _ENERGY, *springs))
         self.channels = self._names()
         names = [_TIME]
-        with suppress(FormatError):  # that there is no such line is said when it is read
+        with suppress(
+            FormatError
+        ):  # that there is no such line is said when it is read
             names += [self.find(name) for name in needed or self.channels]
             self.admit_rest(names)
         self.refuse_foreign()
@@ -75,7 +92,9 @@ class Glstat(Blocks):
             self.complete = False
             self.notes += ("the file ends before the time of its next state",)
         if not self.version:
-            self.notes += ("the file has no header; everything before its first time line was left out",)
+            self.notes += (
+                "the file has no header; everything before its first time line was left out",
+            )
         self._even = True  # until a state lacks what another has
         self._columns = self._pass_over([*names, *springs], [_TIME])
         self.time = self._columns[_TIME]
@@ -84,7 +103,9 @@ class Glstat(Blocks):
         """Values of the line ``name``, shape (n,); FormatError unless every state has a number in one such line."""
         if name not in self._columns:  # who wants one more mostly wants the others
             every = dict.fromkeys((*self.channels, name)) if self._even else [name]
-            self._columns |= self._pass_over([one for one in every if one not in self._columns], [name])
+            self._columns |= self._pass_over(
+                [one for one in every if one not in self._columns], [name]
+            )
         return self._columns[name]
 
     def _pass_over(self, names: list[str], least: list[str]) -> dict[str, Samples]:
@@ -100,15 +121,23 @@ class Glstat(Blocks):
         layouts = {(run.example, run.stride) for run in self}
         if not layouts and self.rest:
             layouts = {(self.rest.example, self.rest.stride)}
-        names = {str(name): None for layout in sorted(layouts) for name in self.layout(*layout).fields}
+        names = {
+            str(name): None
+            for layout in sorted(layouts)
+            for name in self.layout(*layout).fields
+        }
         return tuple(name for name in names if name != _TIME)
 
 
-def _describe(block: bytes, lines: Sequence[re.Match[bytes]], literal: Bytes) -> tuple[dict[str, int], str]:
+def _describe(
+    block: bytes, lines: Sequence[re.Match[bytes]], literal: Bytes
+) -> tuple[dict[str, int], str]:
     fields: dict[str, int] = {}
     name, behind, mixed = "", 0, False
     for line in lines:
-        mixed |= name in fields and b"..." in block[behind : line.start()]  # a line that lost some of its columns
+        mixed |= (
+            name in fields and b"..." in block[behind : line.start()]
+        )  # a line that lost some of its columns
         name, behind = line[1].rstrip(b".").rstrip().decode("latin-1"), line.end()
         value = _VALUE.match(line[2])
         if value is None:
@@ -120,7 +149,9 @@ def _describe(block: bytes, lines: Sequence[re.Match[bytes]], literal: Bytes) ->
         mixed |= name in fields
         fields[name] = line.start(2)
     if mixed:  # with lines of another state: any of them may be
-        fields = {name: place if name == _TIME else UNSURE for name, place in fields.items()}
+        fields = {
+            name: place if name == _TIME else UNSURE for name, place in fields.items()
+        }
     return fields, name
 
 
@@ -129,7 +160,15 @@ def _is_whole(layout: BlockLayout) -> bool:
 
 
 _GRAMMAR: Final = Grammar(
-    _START, _LINE, _describe, _CHANGING, _TIME, _is_whole, width=_WIDTH, decimals=5, compare_all=True
+    _START,
+    _LINE,
+    _describe,
+    _CHANGING,
+    _TIME,
+    _is_whole,
+    width=_WIDTH,
+    decimals=5,
+    compare_all=True,
 )
 
 
@@ -138,7 +177,10 @@ def write(title: str, lines: Mapping[str, Samples]) -> bytes:
     states = zip(*(values.tolist() for values in lines.values()), strict=True)
     blocks = (
         f" dt of cycle{cycle:8d} is controlled by solid              1 of part         1\n\n"
-        + "".join(f" {label:.<31}{value:14.5E}\n" for label, value in zip(lines, values, strict=True))
+        + "".join(
+            f" {label:.<31}{value:14.5E}\n"
+            for label, value in zip(lines, values, strict=True)
+        )
         for cycle, values in enumerate(states, start=1)
     )
     return (written_head(title, "glstat") + "\n\n" + "\n\n".join(blocks)).encode()

@@ -25,10 +25,14 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 _PICKLED_NAME: Final = re.compile(rb"^a?V([^\n]*)$", re.MULTILINE)
-_PICKLED_INDEX_NAME: Final = re.compile(rb"^s?a?Vindex_name\n(?:p\d+\n)?V([^\n]*)$", re.MULTILINE)
+_PICKLED_INDEX_NAME: Final = re.compile(
+    rb"^s?a?Vindex_name\n(?:p\d+\n)?V([^\n]*)$", re.MULTILINE
+)
 _BOOKKEEPING: Final = ("_i_", "#")  # PyTables' index trees, MATLAB's references
 _ERF_BLOCK: Final = "/erfblock"
-_WIDEST: Final = 64  # a matrix with more columns and no names for them is no table of histories
+_WIDEST: Final = (
+    64  # a matrix with more columns and no names for them is no table of histories
+)
 
 
 class Column(NamedTuple):
@@ -67,7 +71,9 @@ class Column(NamedTuple):
         dataset = file[self.dataset]
         check_data(dataset, source)
         if self.field is None and self.place is None:
-            return finite(_values(dataset, content), self.path, source).reshape(self.size)
+            return finite(_values(dataset, content), self.path, source).reshape(
+                self.size
+            )
         whole = dataset if self.field is None else dataset.fields(self.field)
         if self.place is None:
             values = whole[()]
@@ -86,15 +92,25 @@ def check_data(dataset: h5py.Dataset, source: str) -> None:
     if too_much := unpacked_beyond(stored, dataset.nbytes):
         raise FormatError(f"{source}: {dataset.name} becomes {too_much}")
     if dataset.size and not stored:
-        raise FormatError(f"{source}: {dataset.name} was never written; choose another dataset or copy the file again")
+        raise FormatError(
+            f"{source}: {dataset.name} was never written; choose another dataset or copy the file again"
+        )
     if dataset.chunks and dataset.size:
         chunks: set[tuple[int, ...]] = set()
         dataset.id.chunk_iter(lambda chunk: chunks.add(tuple(chunk.chunk_offset)))
-        expected = math.prod(-(-extent // length) for extent, length in zip(dataset.shape, dataset.chunks, strict=True))
-        inside = sum(all(at < extent for at, extent in zip(chunk, dataset.shape, strict=True)) for chunk in chunks)
+        expected = math.prod(
+            -(-extent // length)
+            for extent, length in zip(dataset.shape, dataset.chunks, strict=True)
+        )
+        inside = sum(
+            all(at < extent for at, extent in zip(chunk, dataset.shape, strict=True))
+            for chunk in chunks
+        )
         if inside < expected:
             found = f"{source}: {dataset.name} has {inside} of {expected} chunks of its data"
-            raise FormatError(f"{found}; the file is damaged or was not written to its end")
+            raise FormatError(
+                f"{found}; the file is damaged or was not written to its end"
+            )
 
 
 def _check_type(dataset: h5py.Dataset, source: str) -> None:
@@ -102,7 +118,9 @@ def _check_type(dataset: h5py.Dataset, source: str) -> None:
     for kind in _numbers(dataset.id.get_type()):
         if not any(kind.equal(standard) for standard in _standard_types()):
             found = f"{source}: {dataset.name} has numbers of {kind.get_size()} bytes that are no standard type of HDF5"
-            raise FormatError(f"{found}; the file is damaged, copy it again, or write it with a standard type")
+            raise FormatError(
+                f"{found}; the file is damaged, copy it again, or write it with a standard type"
+            )
 
 
 def _numbers(kind: h5py.h5t.TypeID) -> Iterator[h5py.h5t.TypeID]:
@@ -114,7 +132,10 @@ def _numbers(kind: h5py.h5t.TypeID) -> Iterator[h5py.h5t.TypeID]:
             yield from _numbers(kind.get_member_type(member))
     elif isinstance(kind, h5py.h5t.TypeArrayID | h5py.h5t.TypeEnumID):
         yield from _numbers(kind.get_super())
-    elif isinstance(kind, h5py.h5t.TypeAtomicID) and kind.get_class() in (h5py.h5t.INTEGER, h5py.h5t.FLOAT):
+    elif isinstance(kind, h5py.h5t.TypeAtomicID) and kind.get_class() in (
+        h5py.h5t.INTEGER,
+        h5py.h5t.FLOAT,
+    ):
         yield kind
 
 
@@ -125,7 +146,9 @@ def _standard_types() -> tuple[h5py.h5t.TypeID, ...]:
     names = [f"IEEE_F{bits}" for bits in (16, 32, 64)] + [
         f"STD_{sign}{bits}" for sign in "IU" for bits in (8, 16, 32, 64)
     ]
-    return tuple(getattr(h5py.h5t, name + order) for name in names for order in ("LE", "BE"))
+    return tuple(
+        getattr(h5py.h5t, name + order) for name in names for order in ("LE", "BE")
+    )
 
 
 # Of a file: smaller data are copied out of it, or what a column keeps in memory would be far more than itself.
@@ -135,9 +158,14 @@ _LARGE: Final = 1 / 4
 def _values(dataset: h5py.Dataset, content: bytes) -> Any:
     """Numbers of a dataset; where it makes much of the file with that ``content``, in one piece, they stay there."""
     start = dataset.id.get_offset()  # None of data in chunks, and in other files
-    if start is None or not _LARGE * len(content) < dataset.nbytes <= len(content) - start:
+    if (
+        start is None
+        or not _LARGE * len(content) < dataset.nbytes <= len(content) - start
+    ):
         return dataset[()]
-    return np.frombuffer(content, dataset.dtype, dataset.size, start).reshape(dataset.shape)
+    return np.frombuffer(content, dataset.dtype, dataset.size, start).reshape(
+        dataset.shape
+    )
 
 
 def finite(values: Any, path: str, source: str) -> Samples:
@@ -160,12 +188,18 @@ def columns_of(file: h5py.File) -> tuple[Column, ...]:
     done: list[str] = []  # groups that were understood as a whole
 
     def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:
-        if any(step.startswith(_BOOKKEEPING) for step in name.split("/")) or name.startswith(tuple(done)):
+        if any(
+            step.startswith(_BOOKKEEPING) for step in name.split("/")
+        ) or name.startswith(tuple(done)):
             return
         if isinstance(item, h5py.Dataset):
             found.extend(_dataset_columns(name, item))
             return
-        reader = _erf_block if name.endswith(_ERF_BLOCK) else _PANDAS.get(_text(item.attrs.get("pandas_type")))
+        reader = (
+            _erf_block
+            if name.endswith(_ERF_BLOCK)
+            else _PANDAS.get(_text(item.attrs.get("pandas_type")))
+        )
         if reader is not None:
             found.extend(reader(name, item))
             done.append(name + "/")
@@ -178,7 +212,11 @@ def _dataset_columns(name: str, dataset: h5py.Dataset) -> Iterator[Column]:
     import h5py
 
     plan, shape, dtype = dataset.id.get_create_plist(), dataset.shape, dataset.dtype
-    if shape is None or plan.get_layout() == h5py.h5d.VIRTUAL or plan.get_external_count():
+    if (
+        shape is None
+        or plan.get_layout() == h5py.h5d.VIRTUAL
+        or plan.get_external_count()
+    ):
         return
     if dtype.names is not None:
         yield from _compound_columns(name, dataset, index_name="index")
@@ -189,11 +227,15 @@ def _dataset_columns(name: str, dataset: h5py.Dataset) -> Iterator[Column]:
     if max(shape) == size:
         yield Column(name, size, str(dtype), name)
     elif len(shape) == 2:
-        titles = _exodus_titles(dataset) or _titles(dataset.attrs.get("columns", dataset.attrs.get("names")))
+        titles = _exodus_titles(dataset) or _titles(
+            dataset.attrs.get("columns", dataset.attrs.get("names"))
+        )
         yield from _matrix_columns(name, dataset, titles)
 
 
-def _matrix_columns(name: str, dataset: h5py.Dataset, titles: list[str]) -> Iterator[Column]:
+def _matrix_columns(
+    name: str, dataset: h5py.Dataset, titles: list[str]
+) -> Iterator[Column]:
     """Columns along the axis that has as many entries as there are titles, or the shorter one."""
     rows, width = dataset.shape
     if rows == width:
@@ -207,7 +249,9 @@ def _matrix_columns(name: str, dataset: h5py.Dataset, titles: list[str]) -> Iter
         if len(paths) > _WIDEST:
             return
     for index, path in enumerate(paths):
-        yield Column(path, dataset.shape[1 - axis], str(dataset.dtype), name, place=(axis, index))
+        yield Column(
+            path, dataset.shape[1 - axis], str(dataset.dtype), name, place=(axis, index)
+        )
 
 
 def _erf_block(name: str, block: h5py.Group) -> Iterator[Column]:
@@ -217,7 +261,12 @@ def _erf_block(name: str, block: h5py.Group) -> Iterator[Column]:
     Only quantities of one component are columns.  Those of entities beside the model have the number in their path.
     """
     results, times, entities = (block.get(key) for key in ("res", "indexval", "entid"))
-    if results is None or times is None or results.dtype.kind not in "iuf" or times.dtype.kind not in "iuf":
+    if (
+        results is None
+        or times is None
+        or results.dtype.kind not in "iuf"
+        or times.dtype.kind not in "iuf"
+    ):
         return
     states = math.prod(times.shape)
     if results.ndim != 3 or states != results.shape[0] or results.shape[2] != 1:
@@ -229,7 +278,13 @@ def _erf_block(name: str, block: h5py.Group) -> Iterator[Column]:
     for place in range(results.shape[1]):
         number = "" if of_model or place >= len(numbers) else f"/{numbers[place]}"
         where = None if results.shape[1] == 1 else (1, place)
-        yield Column(f"{variable}{number}/value", states, str(results.dtype), results.name[1:], place=where)
+        yield Column(
+            f"{variable}{number}/value",
+            states,
+            str(results.dtype),
+            results.name[1:],
+            place=where,
+        )
 
 
 def _exodus_titles(dataset: h5py.Dataset) -> list[str]:
@@ -237,13 +292,26 @@ def _exodus_titles(dataset: h5py.Dataset) -> list[str]:
     import h5py
 
     place = (dataset.name or "").rpartition("/")[2]
-    beside = dataset.parent.get(f"name_{place.removeprefix('vals_')}") if place.startswith("vals_") else None
-    if not isinstance(beside, h5py.Dataset) or beside.dtype.kind != "S" or beside.ndim != 2:
+    beside = (
+        dataset.parent.get(f"name_{place.removeprefix('vals_')}")
+        if place.startswith("vals_")
+        else None
+    )
+    if (
+        not isinstance(beside, h5py.Dataset)
+        or beside.dtype.kind != "S"
+        or beside.ndim != 2
+    ):
         return []
-    return [b"".join(letters).decode("utf-8", "replace").strip("\0 ") for letters in beside[()].tolist()]
+    return [
+        b"".join(letters).decode("utf-8", "replace").strip("\0 ")
+        for letters in beside[()].tolist()
+    ]
 
 
-def _compound_columns(name: str, dataset: h5py.Dataset, index_name: str) -> Iterator[Column]:
+def _compound_columns(
+    name: str, dataset: h5py.Dataset, index_name: str
+) -> Iterator[Column]:
     """One column for each member, several for a member that is a vector; pandas notes its names beside it."""
     if len(dataset.shape) != 1:
         return
@@ -260,12 +328,16 @@ def _compound_columns(name: str, dataset: h5py.Dataset, index_name: str) -> Iter
         named = len(titles) == kind.shape[0]
         for index in range(kind.shape[0]):
             path = f"{base}/{titles[index]}" if named else f"{base}/{field}[{index}]"
-            yield Column(path, dataset.shape[0], str(kind.base), name, field, (1, index))
+            yield Column(
+                path, dataset.shape[0], str(kind.base), name, field, (1, index)
+            )
 
 
 def _pandas_table(name: str, group: h5py.Group) -> Iterator[Column]:
     found = _PICKLED_INDEX_NAME.search(bytes(_text(group.attrs.get("info")), "utf-8"))
-    yield from _compound_columns(f"{name}/table", group["table"], found[1].decode() if found else "index")
+    yield from _compound_columns(
+        f"{name}/table", group["table"], found[1].decode() if found else "index"
+    )
 
 
 def _pandas_frame(name: str, group: h5py.Group) -> Iterator[Column]:
@@ -275,12 +347,23 @@ def _pandas_frame(name: str, group: h5py.Group) -> Iterator[Column]:
     for number in range(int(group.attrs["nblocks"])):
         titles = _titles(group[f"block{number}_items"][()])
         values = group[f"block{number}_values"]
-        if values.dtype.kind not in "iuf" or values.shape not in ((index.size, len(titles)), (len(titles), index.size)):
+        if values.dtype.kind not in "iuf" or values.shape not in (
+            (index.size, len(titles)),
+            (len(titles), index.size),
+        ):
             continue
-        across = values.shape[0] == index.size and (index.size != len(titles) or bool(values.attrs.get("transposed")))
+        across = values.shape[0] == index.size and (
+            index.size != len(titles) or bool(values.attrs.get("transposed"))
+        )
         for place, title in enumerate(titles):
             where = (1 if across else 0, place)
-            yield Column(f"{name}/{title}", index.size, str(values.dtype), values.name[1:], place=where)
+            yield Column(
+                f"{name}/{title}",
+                index.size,
+                str(values.dtype),
+                values.name[1:],
+                place=where,
+            )
 
 
 def _pandas_series(name: str, group: h5py.Group) -> Iterator[Column]:
@@ -297,7 +380,11 @@ def _pandas_index(name: str, index: h5py.Dataset) -> Iterator[Column]:
         yield Column(f"{name}/{title}", index.size, str(index.dtype), index.name[1:])
 
 
-_PANDAS: Final = {"frame": _pandas_frame, "series": _pandas_series, "frame_table": _pandas_table}
+_PANDAS: Final = {
+    "frame": _pandas_frame,
+    "series": _pandas_series,
+    "frame_table": _pandas_table,
+}
 
 
 def _text(value: object) -> str:
@@ -318,4 +405,7 @@ def _titles(value: object) -> list[str]:
 
 
 def _pickled_names(value: object) -> list[str]:
-    return [name.decode("raw-unicode-escape") for name in _PICKLED_NAME.findall(bytes(_text(value), "utf-8"))]
+    return [
+        name.decode("raw-unicode-escape")
+        for name in _PICKLED_NAME.findall(bytes(_text(value), "utf-8"))
+    ]

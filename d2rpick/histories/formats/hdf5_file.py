@@ -20,7 +20,12 @@ from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, listing, printable
 from d2rpick.base.files import beyond, unpacked_beyond
 from d2rpick.histories.database import DIGITS, Database
-from d2rpick.histories.formats.hdf5_columns import Column, check_data, columns_of, finite
+from d2rpick.histories.formats.hdf5_columns import (
+    Column,
+    check_data,
+    columns_of,
+    finite,
+)
 from d2rpick.histories.history import Precision, Samples
 from d2rpick.histories.interleaved import refuse_rows_of_parts
 from d2rpick.histories.meaning import find_internal_energies, refuse_other_quantity
@@ -38,7 +43,16 @@ SIGNATURE: Final = b"\x89HDF\r\n\x1a\n"
 _MANY: Final = 12  # candidates named in a message
 _BRANCHES: Final = ("glstat", "matsum")
 # What h5py makes of a damaged file.
-_DAMAGED: Final = OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError, OverflowError, MemoryError
+_DAMAGED: Final = (
+    OSError,
+    RuntimeError,
+    KeyError,
+    ValueError,
+    TypeError,
+    AttributeError,
+    OverflowError,
+    MemoryError,
+)
 
 
 def recognises(data: bytes) -> bool:
@@ -56,8 +70,14 @@ def _opened_leg(source: Source, selection: Selection) -> Database:
     # In memory whatever its size: the library crashes on some mixtures of two states of a file.
     file = io.BytesIO(bytes(source.data))
     check_file(file, source.name)
-    branches = {} if selection.time or selection.energy else _branches(file, source.name)
-    return SavedBinout(source.name, branches) if branches else Columns(file, source.name, selection)
+    branches = (
+        {} if selection.time or selection.energy else _branches(file, source.name)
+    )
+    return (
+        SavedBinout(source.name, branches)
+        if branches
+        else Columns(file, source.name, selection)
+    )
 
 
 def _branches(file: io.BytesIO, source: str) -> dict[str, PartGroup]:
@@ -82,9 +102,15 @@ class Columns(Database):
         self._file, self.source = file, source
         with _opened(file, source) as opened:
             self._columns = columns_of(opened)
-        self._named_time = _named(selection.time, self._columns, source) if selection.time else None
-        self._energies = [_named(path, self._columns, source) for path in selection.energy]
-        self.channels = tuple(column.path for column in self._columns if column is not self._named_time)
+        self._named_time = (
+            _named(selection.time, self._columns, source) if selection.time else None
+        )
+        self._energies = [
+            _named(path, self._columns, source) for path in selection.energy
+        ]
+        self.channels = tuple(
+            column.path for column in self._columns if column is not self._named_time
+        )
 
     @property
     def energy_channel(self) -> str:
@@ -99,11 +125,23 @@ class Columns(Database):
     def time(self) -> Samples:
         """Values of the time column, shape (n,) [time]; FormatError where they are not those of one run."""
         path = self._time_column.path
-        times = of_one_run(self._load(self._time_column), lambda state: f"{self.source}: {path}, value {state + 1}")
+        times = of_one_run(
+            self._load(self._time_column),
+            lambda state: f"{self.source}: {path}, value {state + 1}",
+        )
         if count_rows_per_time(times) > 1:
-            energies = self._energies or [_only_energy(self._columns, self._named_time, self.source)]
-            beside = [column for column in self._columns if column.size == times.size and column.is_whole_number]
-            others = {column.path: self._load(column).astype(int).tolist() for column in beside}
+            energies = self._energies or [
+                _only_energy(self._columns, self._named_time, self.source)
+            ]
+            beside = [
+                column
+                for column in self._columns
+                if column.size == times.size and column.is_whole_number
+            ]
+            others = {
+                column.path: self._load(column).astype(int).tolist()
+                for column in beside
+            }
             refuse_rows_of_parts(self.source, times, self._load(energies[0]), others)
         return times
 
@@ -120,24 +158,37 @@ class Columns(Database):
 
     def _check_own_times(self, column: Column) -> None:
         """Raise FormatError if a column has times beside it that are not those of the energy."""
-        beside = [time for time in self._columns if time.is_time and time.group == column.group]
+        beside = [
+            time
+            for time in self._columns
+            if time.is_time and time.group == column.group
+        ]
         if len(beside) != 1 or beside[0] in (self._time_column, column):
             return
         if not np.array_equal(self._load(beside[0]), self.time):
             found = f"{self.source}: {column.path} has other times ({beside[0].path}) than the energy"
-            raise FormatError(f"{found} ({self._time_column.path}); choose columns of the same times")
+            raise FormatError(
+                f"{found} ({self._time_column.path}); choose columns of the same times"
+            )
 
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:
         """Digits that the stored types hold."""
         energies = [_named(name, self._columns, self.source) for name in names]
-        digits = [DIGITS[4 if column.dtype.endswith("32") else 8] for column in (self._time_column, *energies)]
+        digits = [
+            DIGITS[4 if column.dtype.endswith("32") else 8]
+            for column in (self._time_column, *energies)
+        ]
         return Precision(digits[0]), Precision(min(digits[1:], default=DIGITS[8]))
 
     @cached_property
     def _time_column(self) -> Column:
         if self._named_time:
             return self._named_time
-        energy = self._energies[0] if self._energies else _only_energy(self._columns, None, self.source)
+        energy = (
+            self._energies[0]
+            if self._energies
+            else _only_energy(self._columns, None, self.source)
+        )
         return _only_time(self._columns, energy, self.source)
 
     def _load(self, column: Column) -> Samples:
@@ -160,33 +211,45 @@ class SavedBinout(Database):
     def branch(self, name: str) -> PartGroup:
         """Give a branch; FormatError where it was not saved."""
         if name not in self._branches:
-            raise FormatError(f"{self.source}: no {name} in this saved binout; name the run's own files")
+            raise FormatError(
+                f"{self.source}: no {name} in this saved binout; name the run's own files"
+            )
         return self._branches[name]
 
 
 class PartGroup(Database):
     """The glstat or matsum branch of a file that lasso-python saved."""
 
-    def __init__(self, file: io.BytesIO, source: str, opened: h5py.File, name: str) -> None:
+    def __init__(
+        self, file: io.BytesIO, source: str, opened: h5py.File, name: str
+    ) -> None:
         self._file, self.source, self.name = file, source, name
         group = opened[name]
         self.title = _line(group, "title")
-        self.version = " ".join(text for text in (_line(group, "version"), _line(group, "revision")) if text)
+        self.version = " ".join(
+            text for text in (_line(group, "version"), _line(group, "revision")) if text
+        )
         check_data(group["time"], source)
-        self.time: Samples = finite(group["time"][()], f"{name}/time", source).reshape(-1)
+        self.time: Samples = finite(group["time"][()], f"{name}/time", source).reshape(
+            -1
+        )
         if "ids" in group:
             self.parts = _parts(group, source)
         else:
             self.channels = tuple(
                 column.path
                 for column in columns_of(group)
-                if column.size == self.time.size and column.place is None and column.path != "time"
+                if column.size == self.time.size
+                and column.place is None
+                and column.path != "time"
             )
 
     def channel(self, name: str) -> Samples:
         """Values of the dataset ``name``, shape (n,)."""
         if name not in self.channels:
-            raise FormatError(f"{self.source}: {self.name} has no channel {name!r}, only {', '.join(self.channels)}")
+            raise FormatError(
+                f"{self.source}: {self.name} has no channel {name!r}, only {', '.join(self.channels)}"
+            )
         with _opened(self._file, self.source) as opened:
             return self._load(opened[self.name], name, (self.time.size,))
 
@@ -196,7 +259,9 @@ class PartGroup(Database):
         missing = [id_ for id_ in ids if known.count(id_) != 1]
         if missing:
             found = f"{self.source}: {self.name} has not exactly one part {', '.join(map(str, missing))}"
-            raise FormatError(f"{found}; choose from {', '.join(map(str, known)) or 'none'}")
+            raise FormatError(
+                f"{found}; choose from {', '.join(map(str, known)) or 'none'}"
+            )
         with _opened(self._file, self.source) as opened:
             group = opened[self.name]
             if quantity not in group:
@@ -208,8 +273,12 @@ class PartGroup(Database):
         """Dataset ``name``, which may lack the axes of length 1 of ``shape``."""
         dataset = group[name]
         check_data(dataset, self.source)
-        if [size for size in dataset.shape if size != 1] != [size for size in shape if size != 1]:
-            raise FormatError(f"{self.source}: {dataset.name} has shape {dataset.shape}, {shape} was expected")
+        if [size for size in dataset.shape if size != 1] != [
+            size for size in shape if size != 1
+        ]:
+            raise FormatError(
+                f"{self.source}: {dataset.name} has shape {dataset.shape}, {shape} was expected"
+            )
         return finite(dataset[()], dataset.name, self.source).reshape(shape)
 
 
@@ -224,8 +293,13 @@ def _parts(group: h5py.Group, source: str) -> tuple[Part, ...]:
         size, rest = divmod(len(legend), max(1, ids.size))
         if not rest:
             cut = [legend[size * row : size * (row + 1)] for row in range(ids.size)]
-            titles = {int(id_): text.decode("latin-1").strip() for id_, text in zip(ids, cut, strict=True)}
-    return tuple(Part(int(id_), titles.get(int(id_), "")) for id_ in np.ravel(group["ids"][()]))
+            titles = {
+                int(id_): text.decode("latin-1").strip()
+                for id_, text in zip(ids, cut, strict=True)
+            }
+    return tuple(
+        Part(int(id_), titles.get(int(id_), "")) for id_ in np.ravel(group["ids"][()])
+    )
 
 
 def _line(group: h5py.Group, name: str) -> str:
@@ -234,24 +308,36 @@ def _line(group: h5py.Group, name: str) -> str:
         return ""
     values = np.ravel(group[name][()])
     text = values[0] if values.size else b""
-    return text.decode("latin-1").strip("\0 ") if isinstance(text, bytes) else str(text).strip()
+    return (
+        text.decode("latin-1").strip("\0 ")
+        if isinstance(text, bytes)
+        else str(text).strip()
+    )
 
 
 def _named(path: str, columns: Sequence[Column], source: str) -> Column:
     found = [column for column in columns if column.path == path.strip("/")]
-    near = "" if found else near_miss(path.strip("/"), [column.path for column in columns])
+    near = (
+        "" if found else near_miss(path.strip("/"), [column.path for column in columns])
+    )
     return _only(found, columns, f"{path!r}{near}", source)
 
 
 def _only_energy(columns: Sequence[Column], time: Column | None, source: str) -> Column:
     """Find the only column called an internal energy, or the only one beside the time."""
-    fitting = [columns[place] for place in find_internal_energies([column.path for column in columns])]
+    fitting = [
+        columns[place]
+        for place in find_internal_energies([column.path for column in columns])
+    ]
     if not fitting:
         times = [time] if time else [column for column in columns if column.is_time]
         fitting = [
             column
             for column in columns
-            if column not in times and any((column.group, column.size) == (one.group, one.size) for one in times)
+            if column not in times
+            and any(
+                (column.group, column.size) == (one.group, one.size) for one in times
+            )
         ]
         if len(fitting) == 1:
             refuse_other_quantity(fitting[0].path, source)
@@ -262,18 +348,30 @@ def _only_time(columns: Sequence[Column], energy: Column, source: str) -> Column
     """Find the time in the group of the energy, else in the nearest group around it."""
     group = energy.group
     while True:
-        fitting = [column for column in columns if column.is_time and column.group == group]
+        fitting = [
+            column for column in columns if column.is_time and column.group == group
+        ]
         if fitting or not group:
             return _only(fitting, columns, f"the time of {energy.path}", source)
         group = group.rpartition("/")[0]
 
 
-def _only(fitting: Sequence[Column], columns: Sequence[Column], what: str, source: str) -> Column:
+def _only(
+    fitting: Sequence[Column], columns: Sequence[Column], what: str, source: str
+) -> Column:
     if len(fitting) == 1:
         return fitting[0]
     count = "no column" if not fitting else f"{len(fitting)} columns"
-    there = listing([f"{column.path} ({column.size})" for column in fitting or columns], most=_MANY) or "there is none"
-    raise FormatError(f"{source}: {count} for {what}, one was expected; give its path: {there}")
+    there = (
+        listing(
+            [f"{column.path} ({column.size})" for column in fitting or columns],
+            most=_MANY,
+        )
+        or "there is none"
+    )
+    raise FormatError(
+        f"{source}: {count} for {what}, one was expected; give its path: {there}"
+    )
 
 
 def _import_library(source: str) -> None:
@@ -281,7 +379,9 @@ def _import_library(source: str) -> None:
     try:
         import_module("h5py")
     except ImportError:
-        raise FormatError(f"{source}: HDF5 files need h5py; pip install h5py, or export the columns as CSV") from None
+        raise FormatError(
+            f"{source}: HDF5 files need h5py; pip install h5py, or export the columns as CSV"
+        ) from None
 
 
 @contextmanager
@@ -294,7 +394,9 @@ def _opened(file: io.BytesIO, source: str) -> Iterator[h5py.File]:
             yield opened
     except _DAMAGED as error:
         reason = printable(" ".join(str(error).split()))
-        raise FormatError(f"{source}: HDF5 cannot be read ({reason}); the file is damaged or needs a filter") from error
+        raise FormatError(
+            f"{source}: HDF5 cannot be read ({reason}); the file is damaged or needs a filter"
+        ) from error
 
 
 # Damage of which the library crashes or goes round in a circle.
@@ -329,8 +431,14 @@ def check_file(file: BinaryIO, source: str, seconds: int = _SECONDS) -> None:
         raise FormatError(message)
     if os.WIFSIGNALED(status):
         number = os.WTERMSIG(status)
-        what = "did not finish reading it" if number == signal.SIGXCPU else f"crashed on it (signal {number})"
-        raise FormatError(f"{source}: the HDF5 library {what}; the file is damaged, copy it again")
+        what = (
+            "did not finish reading it"
+            if number == signal.SIGXCPU
+            else f"crashed on it (signal {number})"
+        )
+        raise FormatError(
+            f"{source}: the HDF5 library {what}; the file is damaged, copy it again"
+        )
 
 
 def _check_size_of_file(file: BinaryIO, source: str) -> None:
@@ -339,7 +447,11 @@ def _check_size_of_file(file: BinaryIO, source: str) -> None:
     head = head[base:]
     version = head[_VERSION] if len(head) > _VERSION else -1
     place = _END_OF_FILE.get(version)
-    if place is None or len(head) < place + _ADDRESS_SIZE or head[_SIZE[version]] != _ADDRESS_SIZE:
+    if (
+        place is None
+        or len(head) < place + _ADDRESS_SIZE
+        or head[_SIZE[version]] != _ADDRESS_SIZE
+    ):
         return  # the library says what is wrong with it
     (end,) = struct.unpack_from("<Q", head, place)
     if size not in (end, end + base):
@@ -363,7 +475,9 @@ def _read_and_exit(file: BinaryIO, source: str, seconds: int, told: int) -> None
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         limit = seconds + _head_and_size(file)[1] // _SLOWEST
         _, most = resource.getrlimit(resource.RLIMIT_CPU)
-        resource.setrlimit(resource.RLIMIT_CPU, (limit if most < 0 else min(limit, most), most))
+        resource.setrlimit(
+            resource.RLIMIT_CPU, (limit if most < 0 else min(limit, most), most)
+        )
         os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
         _read(file, source)
     except FormatError as error:

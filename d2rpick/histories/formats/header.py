@@ -18,10 +18,27 @@ _SHORT: Final = 60
 # The first columns of th_to_csv of OpenRadioss, in every version; some versions name more or fewer columns behind them
 # than they write (OpenRadioss/Tools, issue 98).
 _TH_TO_CSV: Final = (
-    *("time", "internalenergy", "kineticenergy", "xmomentum", "ymomentum", "zmomentum", "mass", "timestep"),
-    *("rotationenergy", "externalwork", "springenergy", "contactenergy", "hourglassenergy"),
+    *(
+        "time",
+        "internalenergy",
+        "kineticenergy",
+        "xmomentum",
+        "ymomentum",
+        "zmomentum",
+        "mass",
+        "timestep",
+    ),
+    *(
+        "rotationenergy",
+        "externalwork",
+        "springenergy",
+        "contactenergy",
+        "hourglassenergy",
+    ),
 )
-_SURE_WITHOUT: Final = 2  # columns that may be used below too many names of another program
+_SURE_WITHOUT: Final = (
+    2  # columns that may be used below too many names of another program
+)
 
 
 class Header(NamedTuple):
@@ -33,7 +50,9 @@ class Header(NamedTuple):
     sure: int | None = None
 
 
-def read_header(where: str, lines: Sequence[str], separator: str | None, columns: int) -> Header:
+def read_header(
+    where: str, lines: Sequence[str], separator: str | None, columns: int
+) -> Header:
     """Read the lines above the rows of a table of so many ``columns``.
 
     Parameters
@@ -71,7 +90,9 @@ def read_header(where: str, lines: Sequence[str], separator: str | None, columns
         return Header(units=units, title=names[0])
     sure = _count_sure(where, names, columns)
     if columns == 2 < len(names):
-        title = " ".join(filter(None, names[2:]))  # 3DEXPERIENCE: the third name is the curve's
+        title = " ".join(
+            filter(None, names[2:])
+        )  # 3DEXPERIENCE: the third name is the curve's
         sure = None
     return Header(tuple(names), units, title, sure)
 
@@ -110,7 +131,9 @@ def _compose_names(rows: Sequence[Sequence[str]], columns: int) -> list[str]:
         if not cells:
             return []
         upper = _fill_from_left(cells) if names else cells
-        names = [_join(*pair) for pair in zip(upper, names or [""] * columns, strict=True)]
+        names = [
+            _join(*pair) for pair in zip(upper, names or [""] * columns, strict=True)
+        ]
         if all(names) and len({*names}) == columns:
             return names if names != cells else []
     return []
@@ -135,7 +158,9 @@ def _fill_from_left(cells: Sequence[str]) -> list[str]:
     return filled
 
 
-def _split_rows(lines: Sequence[str], separator: str | None, columns: int) -> Iterator[list[str]]:
+def _split_rows(
+    lines: Sequence[str], separator: str | None, columns: int
+) -> Iterator[list[str]]:
     """Cells of the header lines; a quoted name may go on over a line end."""
     pending = ""
     for line in lines:
@@ -155,10 +180,14 @@ def _split_header(line: str, separator: str | None, columns: int) -> list[str]:
         return split(line, separator)
     wide = [cell.strip('"') for cell in re.split(r"\s{2,}|\t", line.strip())]
     narrow = split(line, None)
-    return next((cells for cells in (wide, narrow) if len(cells) == columns), [line.strip()])
+    return next(
+        (cells for cells in (wide, narrow) if len(cells) == columns), [line.strip()]
+    )
 
 
-def _commented_names(lines: Sequence[str], separator: str | None, columns: int) -> tuple[str, ...]:
+def _commented_names(
+    lines: Sequence[str], separator: str | None, columns: int
+) -> tuple[str, ...]:
     """Names in the last comment line, as numpy.savetxt writes them: one per column, among them a time."""
     comments = [line.strip().lstrip("#$%/ ") for line in lines if line.strip()]
     cells = _split_header(comments[-1], separator, columns) if comments else []

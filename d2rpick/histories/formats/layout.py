@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING
 
 from d2rpick.base.errors import FormatError
 from d2rpick.base.tuples import NamedTuple
-from d2rpick.histories.formats.cells import as_number, find_thousands, is_missing, is_skipped, is_word, split
+from d2rpick.histories.formats.cells import (
+    as_number,
+    find_thousands,
+    is_missing,
+    is_skipped,
+    is_word,
+    split,
+)
 from d2rpick.histories.formats.header import Header, read_header, shorten
 from d2rpick.histories.formats.text import HEAD, Text
 from d2rpick.histories.names import unit_of
@@ -91,7 +98,10 @@ def unique(names: Sequence[str], what: str) -> list[str]:
     ['time', 'IE (column 2)', 'IE (column 3)']
     """
     bearers = Counter(names)
-    return [name if bearers[name] == 1 else f"{name} ({what} {number})" for number, name in enumerate(names, 1)]
+    return [
+        name if bearers[name] == 1 else f"{name} ({what} {number})"
+        for number, name in enumerate(names, 1)
+    ]
 
 
 def find_layout(text: Text) -> Layout:
@@ -105,28 +115,46 @@ def find_layout(text: Text) -> Layout:
     lines, every = text.head, [*text.head, *([text.unended] if text.is_short else [])]
     told = _SEP_LINE.fullmatch(lines[0].strip()) if lines else None
     first, separator = (1, told[1]) if told else (0, "")
-    table = _search_rows(lines, first, separator) or _search_rows(every, first, separator)
+    table = _search_rows(lines, first, separator) or _search_rows(
+        every, first, separator
+    )
     if table is None:
         raise _no_table(text, every)
     _refuse_odd_rows(text.name, lines, first, table)
     _refuse_decimal_commas(text.name, lines, table)
-    header = read_header(f"{text.name}:{table.start + 1}", lines[first : table.start], table.separator, table.columns)
+    header = read_header(
+        f"{text.name}:{table.start + 1}",
+        lines[first : table.start],
+        table.separator,
+        table.columns,
+    )
     return _with_header(table, header)
 
 
 def _with_header(table: Layout, header: Header) -> Layout:
-    return table._replace(names=header.names, units=header.units, title=header.title, sure=header.sure)
+    return table._replace(
+        names=header.names, units=header.units, title=header.title, sure=header.sure
+    )
 
 
 def with_thousands(table: Layout, rows: Sequence[Sequence[str]]) -> Layout:
     """Add the sign between groups of three digits that cells of ``rows`` show, if they are no numbers without one."""
-    odd = [cell for row in rows for cell in row if not is_missing(cell) and table.number(cell) is None]
-    return table._replace(thousands=find_thousands(odd, table.decimal)) if odd else table
+    odd = [
+        cell
+        for row in rows
+        for cell in row
+        if not is_missing(cell) and table.number(cell) is None
+    ]
+    return (
+        table._replace(thousands=find_thousands(odd, table.decimal)) if odd else table
+    )
 
 
 def _no_table(text: Text, lines: Sequence[str]) -> FormatError:
     """Say that a text is no table, by the first line that might be a row or else by the first of all."""
-    numbered = [(number, line) for number, line in enumerate(lines, 1) if not is_skipped(line)]
+    numbered = [
+        (number, line) for number, line in enumerate(lines, 1) if not is_skipped(line)
+    ]
     rows = [(number, line) for number, line in numbered if line.lstrip()[0].isdigit()]
     number, line = next(iter(rows or numbered), (1, ""))
     below = "below" if text.is_short else f"in the first {HEAD} lines"
@@ -137,7 +165,11 @@ def _no_table(text: Text, lines: Sequence[str]) -> FormatError:
 
 def _search_rows(lines: Sequence[str], first: int, separator: str) -> Layout | None:
     """Find the rows among few lines, then among more, with and without thousands in their numbers."""
-    numbered = [(number, line) for number, line in enumerate(lines) if number >= first and not is_skipped(line)]
+    numbered = [
+        (number, line)
+        for number, line in enumerate(lines)
+        if number >= first and not is_skipped(line)
+    ]
     for count in _LINES_SEARCHED:
         for with_groups in (False, True):
             table = _find_rows(numbered[:count], separator, with_groups=with_groups)
@@ -148,27 +180,48 @@ def _search_rows(lines: Sequence[str], first: int, separator: str) -> Layout | N
     return None
 
 
-def _find_rows(sample: Sequence[tuple[int, str]], separator: str, *, with_groups: bool) -> Layout | None:
+def _find_rows(
+    sample: Sequence[tuple[int, str]], separator: str, *, with_groups: bool
+) -> Layout | None:
     """Take the form in which most lines are rows, with words or without, else any with rows of numbers."""
-    forms = [(separator, decimal) for decimal in ".," if separator != decimal] if separator else _FORMS
+    forms = (
+        [(separator, decimal) for decimal in ".," if separator != decimal]
+        if separator
+        else _FORMS
+    )
     for only_numbers in (False, True):
         best, most = None, 0 if only_numbers else len(sample) // 2
         for sign, decimal in forms:
             if sign and not any(sign in line for _, line in sample):
                 continue
             cells = [(i, split(line, sign)) for i, line in sample]
-            thousands = find_thousands([cell for _, row in cells for cell in row], decimal) if with_groups else ""
+            thousands = (
+                find_thousands([cell for _, row in cells for cell in row], decimal)
+                if with_groups
+                else ""
+            )
             if with_groups and not thousands:
                 continue
             form = Layout(sign, decimal, 0, 0, thousands=thousands)
-            kinds = [(i, row, kind) for i, row in cells if (kind := _kind(row, form, only_numbers))]
+            kinds = [
+                (i, row, kind)
+                for i, row in cells
+                if (kind := _kind(row, form, only_numbers))
+            ]
             if not kinds:
                 continue
-            common, times = max(Counter(kind for _, _, kind in kinds).items(), key=itemgetter(1))
+            common, times = max(
+                Counter(kind for _, _, kind in kinds).items(), key=itemgetter(1)
+            )
             alike = [(i, row) for i, row, kind in kinds if _is_like(kind, common)]
-            closed = not any(row[-1] for _, row in alike)  # every row ends with a separator
+            closed = not any(
+                row[-1] for _, row in alike
+            )  # every row ends with a separator
             if len(common) - closed > 1 and times > most:
-                best, most = form._replace(start=alike[0][0], columns=len(common) - closed), times
+                best, most = (
+                    form._replace(start=alike[0][0], columns=len(common) - closed),
+                    times,
+                )
         if best:
             return best
     return None
@@ -179,32 +232,50 @@ def _kind(cells: list[str], form: Layout, only_numbers: bool) -> tuple[bool, ...
     if len(cells) < 2:  # as with most separators
         return ()
     written = [form.number(cell) is not None for cell in cells]
-    numbers = tuple(number or is_missing(cell) for cell, number in zip(cells, written, strict=True))
+    numbers = tuple(
+        number or is_missing(cell) for cell, number in zip(cells, written, strict=True)
+    )
     words = [cell for cell, number in zip(cells, numbers, strict=True) if not number]
     # "| a title |" is no row.
-    is_row = any(written) and sum(numbers) > 1 and all(is_word(word) and not only_numbers for word in words)
+    is_row = (
+        any(written)
+        and sum(numbers) > 1
+        and all(is_word(word) and not only_numbers for word in words)
+    )
     return numbers if is_row else ()
 
 
 def _is_like(kind: tuple[bool, ...], common: tuple[bool, ...]) -> bool:
-    return len(kind) == len(common) and all(here or not there for here, there in zip(kind, common, strict=True))
+    return len(kind) == len(common) and all(
+        here or not there for here, there in zip(kind, common, strict=True)
+    )
 
 
-def _refuse_odd_rows(source: str, lines: Sequence[str], first: int, table: Layout) -> None:
+def _refuse_odd_rows(
+    source: str, lines: Sequence[str], first: int, table: Layout
+) -> None:
     """Refuse a line above the rows that begins with a number: a row unlike the others, not a header."""
     for number, line in enumerate(lines[first : table.start], first + 1):
         cells = [] if is_skipped(line) else split(line, table.separator)
         if cells and table.number(cells[0]) is not None:
             found = f"{source}:{number}: {shorten(line)} differs from the rows below"
-            raise FormatError(f"{found}, {table.columns} values were expected; repair or delete the line")
+            raise FormatError(
+                f"{found}, {table.columns} values were expected; repair or delete the line"
+            )
 
 
 def _refuse_decimal_commas(source: str, lines: Sequence[str], table: Layout) -> None:
     """Refuse ``0,05,1,25``: integers throughout, some with leading zeros, are halves of numbers."""
     if table.separator != ",":
         return
-    for number, line in enumerate(lines[table.start : table.start + _LOOK_AT], table.start + 1):
+    for number, line in enumerate(
+        lines[table.start : table.start + _LOOK_AT], table.start + 1
+    ):
         cells = split(line, ",")
-        if any(map(_DECIMAL_PART.fullmatch, cells)) and not any("." in cell or "," in cell for cell in cells):
+        if any(map(_DECIMAL_PART.fullmatch, cells)) and not any(
+            "." in cell or "," in cell for cell in cells
+        ):
             found = f"{source}:{number}: {shorten(line)} looks like decimal commas between commas"
-            raise FormatError(f"{found}, which cannot be told apart; write the file with semicolons or decimal points")
+            raise FormatError(
+                f"{found}, which cannot be told apart; write the file with semicolons or decimal points"
+            )

@@ -39,7 +39,18 @@ _TABLES: Final = range(4, 8)  # symbol tables and what is in them
 _LONGEST: Final = 1 << 32  # bytes that no symbol table has
 
 _FIELDS: Final = {1: "B", 2: "H", 4: "I", 8: "Q"}
-_TYPES: Final = {1: "i1", 2: "i2", 3: "i4", 4: "i8", 5: "u1", 6: "u2", 7: "u4", 8: "u8", 9: "f4", 10: "f8"}
+_TYPES: Final = {
+    1: "i1",
+    2: "i2",
+    3: "i4",
+    4: "i8",
+    5: "u1",
+    6: "u2",
+    7: "u4",
+    8: "u8",
+    9: "f4",
+    10: "f8",
+}
 
 # Head, type and name of a variable are not longer than this; more around them is read with them.
 _HEAD: Final = 1 << 9
@@ -116,11 +127,15 @@ class Lsda:
         If the file does not begin with an LSDA header.
     """
 
-    def __init__(self, content: bytes | Content, source: str, branches: Collection[str]) -> None:
+    def __init__(
+        self, content: bytes | Content, source: str, branches: Collection[str]
+    ) -> None:
         self.data = content_of(content)
         self.source = source
         self.visits = {branch: array("q") for branch in branches}
-        self.metadata: dict[str, list[tuple[int, int]]] = {branch: [] for branch in branches}
+        self.metadata: dict[str, list[tuple[int, int]]] = {
+            branch: [] for branch in branches
+        }
         self.odd: dict[str, list[str]] = {branch: [] for branch in branches}
         self.layouts: list[DirectoryLayout] = []
         self.names: set[str] = set()
@@ -151,7 +166,9 @@ class Lsda:
         near, base = b"", 0  # the bytes around the position
         path: tuple[str, ...] = ()
         number, start, records, command = -1, position, list[bytes](), 0
-        anchors: dict[tuple[str, ...], int] = {}  # where the last state of each branch began
+        anchors: dict[
+            tuple[str, ...], int
+        ] = {}  # where the last state of each branch began
         heads: set[bytes] = set()
         while position + head <= size:
             at = position - base
@@ -185,11 +202,19 @@ class Lsda:
                     records, command = list(form.heads), VARIABLE
                     end = start + form.length
             elif command == VARIABLE and length > name_length:
-                records.append(near[at : min(at + length, at + name_length + 1 + near[at + name_length])])
+                records.append(
+                    near[
+                        at : min(
+                            at + length, at + name_length + 1 + near[at + name_length]
+                        )
+                    ]
+                )
             else:
                 records.append(near[at : at + head])
             position = end
-        if position < size and not self._goes_on(data[position : position + head], heads):
+        if position < size and not self._goes_on(
+            data[position : position + head], heads
+        ):
             records = records[:-1]
         self._leave(path, number, start, records)
         if position < size:
@@ -207,7 +232,9 @@ class Lsda:
         length, command = self._head.unpack(rest.ljust(self._head.size, b"\0"))
         return command in _TABLES and length < _LONGEST
 
-    def _leave(self, path: tuple[str, ...], number: int, start: int, records: list[bytes]) -> None:
+    def _leave(
+        self, path: tuple[str, ...], number: int, start: int, records: list[bytes]
+    ) -> None:
         """Keep what the directory that is now left held, if it is wanted."""
         while records and self._head.unpack_from(records[-1])[1] != VARIABLE:
             records.pop()  # a symbol table behind the variables is no part of their layout
@@ -243,7 +270,9 @@ class Lsda:
                 whole = name.isprintable() and len(name) == record[begin - 1]
                 if code in _TYPES and whole and values % dtype.itemsize == 0:
                     doubled.update({name} & variables.keys())
-                    variables[name] = Variable(offset + len(record), dtype, values // dtype.itemsize)
+                    variables[name] = Variable(
+                        offset + len(record), dtype, values // dtype.itemsize
+                    )
             offset += length
         return DirectoryLayout(variables, frozenset(doubled))
 
@@ -262,7 +291,11 @@ class Lsda:
             return None
         form = self._forms[branch][1]
         block = int.from_bytes(self.data[start : start + form.length])
-        return form if start + form.length <= len(self.data) and block & form.mask == form.fixed else None
+        return (
+            form
+            if start + form.length <= len(self.data) and block & form.mask == form.fixed
+            else None
+        )
 
     def _skip(self, previous: int | None, position: int) -> int:
         """Bytes to go on when the records from ``previous`` to ``position`` repeat; their states are kept.
@@ -279,13 +312,20 @@ class Lsda:
         if times < 2:
             return 0
         # A number ends its record: the next byte is where the state's records start.
-        growth = {previous + at + width: step for (at, width), step in zip(numbers, steps, strict=True)}
+        growth = {
+            previous + at + width: step
+            for (at, width), step in zip(numbers, steps, strict=True)
+        }
         ahead = np.arange(1, times)[:, None, None]
-        for visits in filter(None, self.visits.values()):  # a branch that is not there has none
+        for visits in filter(
+            None, self.visits.values()
+        ):  # a branch that is not there has none
             known = np.array(visits[-3 * len(growth) :]).reshape(-1, 3)
             repeated = known[np.isin(known[:, 1], [*growth])]
             more = [[growth[start], stride, 0] for start in repeated[:, 1].tolist()]
-            visits.frombytes((repeated + ahead * np.array(more, np.int64).reshape(-1, 3)).tobytes())
+            visits.frombytes(
+                (repeated + ahead * np.array(more, np.int64).reshape(-1, 3)).tobytes()
+            )
         return (times - 1) * stride
 
     def _alike(self, previous: int, position: int) -> bool:
@@ -295,7 +335,9 @@ class Lsda:
         ahead = range(position, position + _WORTH * stride, stride)
         return all(self.data[place : place + head] == first for place in ahead)
 
-    def _pattern(self, begin: int, end: int) -> tuple[NDArray[np.uint8], list[tuple[int, int]]]:
+    def _pattern(
+        self, begin: int, end: int
+    ) -> tuple[NDArray[np.uint8], list[tuple[int, int]]]:
         """Which bytes from one record to another are structure, and where states are numbered."""
         fixed = np.zeros(end - begin, dtype=np.uint8)
         numbers = []
@@ -319,7 +361,9 @@ class Lsda:
         return fixed, numbers
 
 
-def _header(data: Content, source: str) -> tuple[int, str, struct.Struct, struct.Struct]:
+def _header(
+    data: Content, source: str
+) -> tuple[int, str, struct.Struct, struct.Struct]:
     """Where the records begin, the byte order, how a record begins and how a type is written."""
     header = data[:8]
     if not recognises(header):
@@ -340,7 +384,11 @@ def recognises(head: bytes) -> bool:
     (True, False)
     """
     return (
-        len(head) >= 8 and 8 <= head[0] <= 64 and all(n in _FIELDS for n in head[1:5]) and head[5] <= 1 and not head[6]
+        len(head) >= 8
+        and 8 <= head[0] <= 64
+        and all(n in _FIELDS for n in head[1:5])
+        and head[5] <= 1
+        and not head[6]
     )
 
 

@@ -48,15 +48,22 @@ _LUMPED: Final = 0  # "mat.#=    0" holds the kinetic energy of lumped masses
 _UNREADABLE: Final = -1  # in place of a part number that is damaged or has overflowed
 _WIDEST: Final = 99_999_999  # larger part numbers overflow their eight columns
 
-_LEGEND: Final = re.compile(rb"^\{BEGIN LEGEND\}[ \r]*\n(.*?)^\{END LEGEND\}", re.MULTILINE | re.DOTALL)
-_ENTRY: Final = re.compile(rb"^(?=[ \d]{9}(?: {5}|\r?$)) *(\d+)(?: {5}([^\r\n]*))?\r?$", re.MULTILINE)
+_LEGEND: Final = re.compile(
+    rb"^\{BEGIN LEGEND\}[ \r]*\n(.*?)^\{END LEGEND\}", re.MULTILINE | re.DOTALL
+)
+_ENTRY: Final = re.compile(
+    rb"^(?=[ \d]{9}(?: {5}|\r?$)) *(\d+)(?: {5}([^\r\n]*))?\r?$", re.MULTILINE
+)
 _LONGEST: Final = 1 << 24  # no legend has more bytes
 _LINE: Final = re.compile(
-    rb"^(?: time =| mat\.#=([^\r\n]*)| [xyz]-(?:mom|rbv)=| +hgeng=| +\+mass=)[^\r\n]*\r?$", re.MULTILINE
+    rb"^(?: time =| mat\.#=([^\r\n]*)| [xyz]-(?:mom|rbv)=| +hgeng=| +\+mass=)[^\r\n]*\r?$",
+    re.MULTILINE,
 )
 _FIELD: Final = re.compile(rb" ([a-z_+-]+) ?=([^\r\n]{13}(?=[ \r\n]|\Z))?")
 # A part number has 5 or, from 100000 on, 8 columns; a longer one, where it is printed, pushes the line.
-_ID: Final = re.compile(rb"(?=[ \d]{4}\d {13}i|(?:  \d{6}| \d{7}|\d{8,18}) {10}i) *(0|[1-9]\d*) +inten=")
+_ID: Final = re.compile(
+    rb"(?=[ \d]{4}\d {13}i|(?:  \d{6}| \d{7}|\d{8,18}) {10}i) *(0|[1-9]\d*) +inten="
+)
 _CHANGING: Final = re.compile(rb" {0,12}[+-]?\d[\d+-]*")  # numbers in other lines
 _OVERFLOW: Final = re.compile(rb"\*+ +inten=")
 
@@ -81,18 +88,37 @@ class Matsum(Blocks):
     """
 
     format, digits = "matsum", 5
-    no_channels = "a matsum has parts only; choose with `parts` or add the glstat of the run"
+    no_channels = (
+        "a matsum has parts only; choose with `parts` or add the glstat of the run"
+    )
 
     def __init__(self, data: bytes | Content, source: str) -> None:
         self._legend = _legend(data)
-        describe, whole = partial(_describe, self._legend), partial(_is_whole, self._legend)
-        grammar = Grammar(_START, _LINE, describe, _CHANGING, _TIME, whole, width=13, decimals=4, compare_all=False)
+        describe, whole = (
+            partial(_describe, self._legend),
+            partial(_is_whole, self._legend),
+        )
+        grammar = Grammar(
+            _START,
+            _LINE,
+            describe,
+            _CHANGING,
+            _TIME,
+            whole,
+            width=13,
+            decimals=4,
+            compare_all=False,
+        )
         super().__init__(data, source, grammar)
         self.refuse_foreign()
         self.part_time = self.numbers([_TIME])[:, 0]
-        self._together: dict[tuple[str | int, ...], Samples] = {}  # read with what was asked for
+        self._together: dict[
+            tuple[str | int, ...], Samples
+        ] = {}  # read with what was asked for
         present = self._present()
-        self.parts = tuple(Part(id_, self._legend.get(id_, "")) for id_ in present if id_ > _LUMPED)
+        self.parts = tuple(
+            Part(id_, self._legend.get(id_, "")) for id_ in present if id_ > _LUMPED
+        )
         self.notes += self._remarks(present)
 
     def part_channel(self, quantity: str, ids: Sequence[int]) -> Samples:
@@ -104,18 +130,27 @@ class Matsum(Blocks):
             If the file does not have the quantity or a part, or not exactly once in every state.
         """
         if quantity not in QUANTITIES:
-            raise FormatError(f"{self.source}: no quantity {quantity!r} in a matsum, only {', '.join(QUANTITIES)}")
+            raise FormatError(
+                f"{self.source}: no quantity {quantity!r} in a matsum, only {', '.join(QUANTITIES)}"
+            )
         known = {part.id for part in self.parts}
         missing = [id_ for id_ in ids if id_ not in known]
         if missing:
             found = f"{self.source}: no part {', '.join(map(str, missing))}"
-            raise FormatError(f"{found}; choose from {', '.join(str(part.id) for part in self.parts) or 'none'}")
+            raise FormatError(
+                f"{found}; choose from {', '.join(str(part.id) for part in self.parts) or 'none'}"
+            )
         wanted: tuple[str | int, ...] = (quantity, *ids)
         if wanted not in self._together:
-            together = _AXES if quantity in _AXES else (quantity,)  # who asks for one component asks for the others
+            together = (
+                _AXES if quantity in _AXES else (quantity,)
+            )  # who asks for one component asks for the others
             names = [(id_, QUANTITIES[one]) for id_ in ids for one in together]
             values = self.numbers(names, anchors=[(id_, _MAT) for id_, _ in names])
-            self._together = {(one, *ids): values[:, place :: len(together)] for place, one in enumerate(together)}
+            self._together = {
+                (one, *ids): values[:, place :: len(together)]
+                for place, one in enumerate(together)
+            }
         return self._together.pop(wanted)
 
     def _present(self) -> Counter[int]:
@@ -123,27 +158,39 @@ class Matsum(Blocks):
         states = Counter[int]()
         for run in self:
             names = self.layout(run.example, run.stride).fields
-            ids = {name[0]: run.repeats for name in names if isinstance(name, tuple) and name[1] == _MAT}
+            ids = {
+                name[0]: run.repeats
+                for name in names
+                if isinstance(name, tuple) and name[1] == _MAT
+            }
             states.update(ids)
         return states
 
     def _remarks(self, present: Counter[int]) -> tuple[str, ...]:
         unseen = [id_ for id_ in self._legend if id_ not in present]
-        passing = [id_ for id_, states in present.items() if id_ > 0 and states < self.states]
+        passing = [
+            id_ for id_, states in present.items() if id_ > 0 and states < self.states
+        ]
         remarks = []
         if unseen and self.states:
-            remarks.append(f"no state has part {', '.join(map(str, unseen))} of the legend")
+            remarks.append(
+                f"no state has part {', '.join(map(str, unseen))} of the legend"
+            )
         if passing:
             remarks.append(f"only some states have part {', '.join(map(str, passing))}")
         if _UNREADABLE in present:
-            remarks.append("parts whose number is damaged or too wide for its columns were left out")
+            remarks.append(
+                "parts whose number is damaged or too wide for its columns were left out"
+            )
         return tuple(remarks)
 
 
 def _legend(data: bytes | Content) -> dict[int, str]:
     """Titles of the parts by number, in the order of the legend."""
     first_state = data.find(b"\n" + _START)
-    match = _LEGEND.search(data[: min(first_state, _LONGEST) if first_state >= 0 else _LONGEST])
+    match = _LEGEND.search(
+        data[: min(first_state, _LONGEST) if first_state >= 0 else _LONGEST]
+    )
     entries = _ENTRY.findall(match[1]) if match else []
     return {int(id_): title.decode("latin-1").strip() for id_, title in entries}
 
@@ -160,18 +207,28 @@ class PartColumns(NamedTuple):
 
 def write(title: str, time: Samples, parts: Sequence[PartColumns]) -> bytes:
     """Blocks of the parts, numbered from 1, with five significant digits (13 columns, E13.4); ``time`` is (n,)."""
-    legend = "".join(f"{number:9d}     {part.title:<70}\n" for number, part in enumerate(parts, start=1))
-    columns = [list(zip(*(column.tolist() for column in part[1:]), strict=True)) for part in parts]
+    legend = "".join(
+        f"{number:9d}     {part.title:<70}\n"
+        for number, part in enumerate(parts, start=1)
+    )
+    columns = [
+        list(zip(*(column.tolist() for column in part[1:]), strict=True))
+        for part in parts
+    ]
     blocks = (
         f"\n time ={moment:13.4E}\n"
-        + "".join(_written(number, *rows[i]) for number, rows in enumerate(columns, start=1))
+        + "".join(
+            _written(number, *rows[i]) for number, rows in enumerate(columns, start=1)
+        )
         for i, moment in enumerate(time.tolist())
     )
     head = f"{written_head(title, 'matsum')}\n{{BEGIN LEGEND}}\n Entity #        Title\n{legend}{{END LEGEND}}\n"
     return (head + "\n".join(blocks)).encode()
 
 
-def _written(number: int, internal: float, kinetic: float, x_momentum: float, z_momentum: float) -> str:
+def _written(
+    number: int, internal: float, kinetic: float, x_momentum: float, z_momentum: float
+) -> str:
     return (
         f" mat.#={number:5d}             inten={internal:13.4E}     kinen={kinetic:13.4E}"
         f"     eroded_ie={0:13.4E}     eroded_ke={0:13.4E}\n"
@@ -187,7 +244,10 @@ def _is_whole(legend: Mapping[int, str], layout: BlockLayout) -> bool:
 
 
 def _describe(
-    legend: Mapping[int, str], block: bytes, lines: Sequence[re.Match[bytes]], literal: Bytes
+    legend: Mapping[int, str],
+    block: bytes,
+    lines: Sequence[re.Match[bytes]],
+    literal: Bytes,
 ) -> tuple[dict[tuple[int | None, str], int], tuple[int | None, str]]:
     fields: dict[tuple[int | None, str], int] = {}
     part: int | None = None
@@ -199,7 +259,9 @@ def _describe(
             doubled = (part, _MAT) in fields
             if doubled:  # two groups of lines: neither is sure
                 fields.update({field: UNSURE for field in fields if field[0] == part})
-            fields[part, _MAT] = UNSURE if doubled else line.start() - 1  # with the line end before it
+            fields[part, _MAT] = (
+                UNSURE if doubled else line.start() - 1
+            )  # with the line end before it
         for field in _FIELD.finditer(block, *line.span()):
             name = (part, field[1].decode())
             if field[2] is None or doubled or name in fields:

@@ -24,16 +24,22 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 INT: Final = struct.Struct(">i")
-WIDTH: Final = 4  # bytes of a binary number, and of the length before and behind a record
+WIDTH: Final = (
+    4  # bytes of a binary number, and of the length before and behind a record
+)
 RUN: Final = 84  # bytes of the first record: a code and a title of 80
 
 _MARK: Final = b"ZZZZZEOR"
 _BEGIN: Final = re.compile(rb"([^\r\n]* FORMAT)(\r?\n)ZZZZZEOR    1I   72C\r?\n")
-_SHAPE: Final = re.compile(rb"ZZZZZEOR(?: *(\d{1,5})I)?(?: *(\d{1,5})C)?(?: *(\d{1,5})([IR]))?")
+_SHAPE: Final = re.compile(
+    rb"ZZZZZEOR(?: *(\d{1,5})I)?(?: *(\d{1,5})C)?(?: *(\d{1,5})([IR]))?"
+)
 _LONG, _SHORT = 10, 5  # columns of integers
 _STARS: Final = b"*" * _SHORT  # what Fortran shows of a number that is too long
 _ROOM: Final = 1024  # more than a record of the head has but for integers [byte]
-_RUN_TITLE: Final = 72  # characters of the title of the run, of the 80 of the binary form
+_RUN_TITLE: Final = (
+    72  # characters of the title of the run, of the 80 of the binary form
+)
 _REAL: Final = 16  # columns of a real, and its point is the fourth
 _DECIMALS: Final = 8
 _PER_LINE: Final = 5
@@ -42,7 +48,11 @@ _JUDGED: Final = 100  # times that tell the precision
 
 def is_binary(head: bytes) -> bool:
     """Whether a file that begins like this is a binary time history."""
-    return len(head) >= 8 and INT.unpack_from(head)[0] == RUN and 3000 <= INT.unpack_from(head, 4)[0] < 6000
+    return (
+        len(head) >= 8
+        and INT.unpack_from(head)[0] == RUN
+        and 3000 <= INT.unpack_from(head, 4)[0] < 6000
+    )
 
 
 def is_text(head: bytes) -> bool:
@@ -75,9 +85,17 @@ class Records:
     def take(self) -> bytes | None:
         """Take the next record of the head; None where there is no complete one."""
         begin = self.at + WIDTH
-        found = INT.unpack(self._data[self.at : begin])[0] if begin <= len(self._data) else -1
+        found = (
+            INT.unpack(self._data[self.at : begin])[0]
+            if begin <= len(self._data)
+            else -1
+        )
         end = begin + found
-        if found < 0 or end + WIDTH > len(self._data) or INT.unpack(self._data[end : end + WIDTH])[0] != found:
+        if (
+            found < 0
+            or end + WIDTH > len(self._data)
+            or INT.unpack(self._data[end : end + WIDTH])[0] != found
+        ):
             return None
         self.at = end + WIDTH
         return self._data[begin:end]
@@ -120,7 +138,9 @@ class _TextRecords(Records):
         first, characters, last = (int(count or 0) for count in shape.group(1, 2, 3))
         begin = self.at + len(line) + len(self._line_end)
         room = self._data[begin : begin + _ROOM + (_LONG + 1) * first]
-        body, mark, _ = room.partition(self._line_end + _MARK)  # a title may hold line ends
+        body, mark, _ = room.partition(
+            self._line_end + _MARK
+        )  # a title may hold line ends
         if not mark and not body.endswith(self._line_end):
             return None
         body = body.removesuffix(b"" if mark else self._line_end)
@@ -129,7 +149,9 @@ class _TextRecords(Records):
             return bytes(WIDTH * last)
         return self._packed(body.removesuffix(self._name), first, characters, last)
 
-    def _packed(self, body: bytes, first: int, characters: int, last: int) -> bytes | None:
+    def _packed(
+        self, body: bytes, first: int, characters: int, last: int
+    ) -> bytes | None:
         """Make one record what it is in binary; None where it does not hold what its shape says."""
         if not characters:
             body = body.replace(self._line_end, b"")
@@ -138,7 +160,11 @@ class _TextRecords(Records):
         begin, end = first * width, len(body) - last * _SHORT
         title = body[begin:end].ljust(RUN - WIDTH if is_run else characters)
         try:
-            return _binary(body[:begin], first, width) + title + _binary(body[end:], last, _SHORT)
+            return (
+                _binary(body[:begin], first, width)
+                + title
+                + _binary(body[end:], last, _SHORT)
+            )
         except (ValueError, struct.error):
             return None
 
@@ -147,13 +173,22 @@ class _TextRecords(Records):
         return len(self._mark(count)) + count * _REAL + lines * len(self._line_end)
 
     def place(self, number: int) -> int:
-        return len(self._mark(1)) + number * _REAL + number // _PER_LINE * len(self._line_end)
+        return (
+            len(self._mark(1))
+            + number * _REAL
+            + number // _PER_LINE * len(self._line_end)
+        )
 
     def marks(self, count: int) -> list[tuple[int, bytes]]:
         return [(0, self._mark(count))]
 
     def _mark(self, count: int) -> bytes:
-        return _MARK + (b"%5d" % count if count < 10**_SHORT else _STARS) + b"R" + self._line_end
+        return (
+            _MARK
+            + (b"%5d" % count if count < 10**_SHORT else _STARS)
+            + b"R"
+            + self._line_end
+        )
 
     def values(self, fields: Bytes) -> Samples:
         values = decode(fields.view(f"S{_REAL}").ravel(), _DECIMALS)
@@ -166,13 +201,18 @@ class _TextRecords(Records):
         last = times[-_JUDGED:]
         with np.errstate(over="ignore"):
             singles = last.astype(np.float32).tolist()
-        alike = (f"{a:.{_DECIMALS}e}" == f"{b:.{_DECIMALS}e}" for a, b in zip(last.tolist(), singles, strict=True))
+        alike = (
+            f"{a:.{_DECIMALS}e}" == f"{b:.{_DECIMALS}e}"
+            for a, b in zip(last.tolist(), singles, strict=True)
+        )
         return DIGITS[WIDTH] if all(alike) else 1 + _DECIMALS
 
 
 def integers(record: bytes) -> tuple[int, ...]:
     """Give the integers that a record in binary form consists of."""
-    return tuple(number for (number,) in INT.iter_unpack(record[: len(record) // WIDTH * WIDTH]))
+    return tuple(
+        number for (number,) in INT.iter_unpack(record[: len(record) // WIDTH * WIDTH])
+    )
 
 
 def _binary(text: bytes, count: int, width: int) -> bytes:
@@ -180,4 +220,6 @@ def _binary(text: bytes, count: int, width: int) -> bytes:
     if len(text) != count * width:
         raise ValueError
     fields = (text[at : at + width] for at in range(0, len(text), width))
-    return struct.pack(f">{count}i", *(1 if field == _STARS else int(field) for field in fields))
+    return struct.pack(
+        f">{count}i", *(1 if field == _STARS else int(field) for field in fields)
+    )

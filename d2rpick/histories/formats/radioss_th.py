@@ -19,7 +19,16 @@ from d2rpick.base.tuples import NamedTuple
 from d2rpick.histories.contact_forces import ContactForce
 from d2rpick.histories.content import Content, content_of
 from d2rpick.histories.database import Database
-from d2rpick.histories.formats.radioss_records import INT, RUN, WIDTH, Records, integers, is_binary, is_text, records_of
+from d2rpick.histories.formats.radioss_records import (
+    INT,
+    RUN,
+    WIDTH,
+    Records,
+    integers,
+    is_binary,
+    is_text,
+    records_of,
+)
 from d2rpick.histories.names import Part, Selection, plain_text
 
 if TYPE_CHECKING:
@@ -76,7 +85,9 @@ class _Head(NamedTuple):
     version: str
     globals: tuple[str, ...]
     parts: tuple[Part, ...]
-    columns: dict[tuple[int, str], int]  # number of a part's variable among those of all parts
+    columns: dict[
+        tuple[int, str], int
+    ]  # number of a part's variable among those of all parts
     counts: tuple[int, ...]  # of numbers in the records of one state
     groups: tuple[_Group, ...]  # whose records are the last ones
 
@@ -102,7 +113,9 @@ def open_legs(sources: Sequence[Source], _: Selection) -> list[TimeHistory]:
     for history in histories:
         if history not in legs:
             note = f"{history.source} was left out: without global values it is no leg of the run but an additional"
-            legs[0].notes += (f"{note} time history (/ATFILE); name it alone to use its parts",)
+            legs[0].notes += (
+                f"{note} time history (/ATFILE); name it alone to use its parts",
+            )
     return legs
 
 
@@ -131,8 +144,12 @@ class TimeHistory(Database):
         self._head = head = _HeadRecords(self._records, len(self._data), source).head()
         self.title, self.version, self.channels = head.title, head.version, head.globals
         known = {id_ for id_, _ in head.columns}
-        self.parts = tuple(part for part in head.parts if part.id in known)  # those of a card /TH/PART
-        *self._begins, self._stride = accumulate(map(self._records.size, self._head.counts), initial=0)
+        self.parts = tuple(
+            part for part in head.parts if part.id in known
+        )  # those of a card /TH/PART
+        *self._begins, self._stride = accumulate(
+            map(self._records.size, self._head.counts), initial=0
+        )
         self._states, stop = self._whole_states()
         self.complete = not stop
         self.notes = (*stop, *self._silent_parts())
@@ -150,7 +167,9 @@ class TimeHistory(Database):
     def channel(self, name: str) -> Samples:
         """One global variable, shape (n,)."""
         if name not in self.channels:
-            raise FormatError(f"{self.source}: no global {name}, there are {listing(self.channels, most=30)}")
+            raise FormatError(
+                f"{self.source}: no global {name}, there are {listing(self.channels, most=30)}"
+            )
         return self._columns(1, [self.channels.index(name)])[:, 0]
 
     @cached_property
@@ -168,14 +187,24 @@ class TimeHistory(Database):
     def _force_of(self, record: int, group: _Group, place: int) -> ContactForce:
         number, title = group.named[place]
         axes = [axes for axes in _IMPULSES if {*axes} <= {*group.variables}]
-        places = [place * len(group.variables) + group.variables.index(axis) for triple in axes for axis in triple]
-        impulses = self._columns(record, places).reshape(self._states, len(axes), 3).sum(axis=1)
+        places = [
+            place * len(group.variables) + group.variables.index(axis)
+            for triple in axes
+            for axis in triple
+        ]
+        impulses = (
+            self._columns(record, places)
+            .reshape(self._states, len(axes), 3)
+            .sum(axis=1)
+        )
         name = f"{_TOUCHING[group.kind]} {number}{f' {title!r}' if title else ''}"
         return ContactForce.of_impulses(name, self.time, impulses)
 
     def size_until(self, time: float) -> int:
         """Bytes of the head and of the states up to a time [time]."""
-        return self._records.at + self._stride * int(np.searchsorted(self.time, time, side="right"))
+        return self._records.at + self._stride * int(
+            np.searchsorted(self.time, time, side="right")
+        )
 
     @cached_property
     def part_time(self) -> Samples:
@@ -198,13 +227,19 @@ class TimeHistory(Database):
         if place is None:
             known = [name for part, name in self._head.columns if part == id_]
             parts = listing([part.id for part in self.parts]) or "none"
-            there = f"only {listing(known)}" if known else f"parts with variables: {parts}"
-            raise FormatError(f"{self.source}: no {quantity} of part {id_}, {there}; ask for it with /TH/PART")
+            there = (
+                f"only {listing(known)}" if known else f"parts with variables: {parts}"
+            )
+            raise FormatError(
+                f"{self.source}: no {quantity} of part {id_}, {there}; ask for it with /TH/PART"
+            )
         return place
 
     def _columns(self, record: int, places: Sequence[int]) -> Samples:
         """Some numbers of one record of each state, shape (n, places)."""
-        offsets = [self._begins[record] + self._records.place(place) for place in places]
+        offsets = [
+            self._begins[record] + self._records.place(place) for place in places
+        ]
         addresses = self._addresses(self._states, offsets)
         found = self._data.fields(addresses, self._records.width)
         self._data.check()
@@ -212,7 +247,10 @@ class TimeHistory(Database):
 
     def _addresses(self, states: int, offsets: Sequence[int]) -> Addresses:
         """Where some bytes of each of the first states lie, shape (states * offsets,)."""
-        return np.add.outer(self._records.at + self._stride * np.arange(states), np.array(offsets, np.int64)).ravel()
+        return np.add.outer(
+            self._records.at + self._stride * np.arange(states),
+            np.array(offsets, np.int64),
+        ).ravel()
 
     def _whole_states(self) -> tuple[int, tuple[str, ...]]:
         """Count the states; the file may stop inside one, but nothing else may stand between them.
@@ -257,20 +295,26 @@ class _HeadRecords:
         self._records = records
         self._most = file_size
         self._source = source
-        self._title = 0  # bytes of a title, the same in all records; 0 until the first was seen
+        self._title = (
+            0  # bytes of a title, the same in all records; 0 until the first was seen
+        )
 
     def head(self) -> _Head:
         """Read everything up to the first state."""
         run = self._next(RUN)
         version = plain_text(self._next(80))
         hierarchy = self._next()
-        if len(hierarchy) == WIDTH:  # newer codes put records between, as many as this one says
+        if (
+            len(hierarchy) == WIDTH
+        ):  # newer codes put records between, as many as this one says
             for _ in range(self._count(INT.unpack(hierarchy)[0])):
                 self._next()
             hierarchy = self._next()
         if len(hierarchy) != 6 * WIDTH:
             raise self._broken("a record of 6 counts")
-        parts, materials, properties, subsets, groups, variables = (self._count(n) for n in integers(hierarchy))
+        parts, materials, properties, subsets, groups, variables = (
+            self._count(n) for n in integers(hierarchy)
+        )
         if self._integers(variables) != tuple(range(1, variables + 1)):
             raise self._broken("a numbering of the global variables")
         described, columns, part_values = self._parts(parts)
@@ -278,18 +322,29 @@ class _HeadRecords:
             self._titled(1)
         subset_values = sum(self._subset() for _ in range(subsets))
         described_groups = tuple(self._group() for _ in range(groups))
-        values = [1, variables, part_values, subset_values, *(group.values for group in described_groups)]
+        values = [
+            1,
+            variables,
+            part_values,
+            subset_values,
+            *(group.values for group in described_groups),
+        ]
         return _Head(
             title=plain_text(run[WIDTH:]),
             version=" ".join(version.split()),
-            globals=(*_GLOBALS[:variables], *(f"global_{n + 1}" for n in range(len(_GLOBALS), variables))),
+            globals=(
+                *_GLOBALS[:variables],
+                *(f"global_{n + 1}" for n in range(len(_GLOBALS), variables)),
+            ),
             parts=described,
             columns=columns,
             counts=tuple(count for count in values if count),
             groups=described_groups,
         )
 
-    def _parts(self, count: int) -> tuple[tuple[Part, ...], dict[tuple[int, str], int], int]:
+    def _parts(
+        self, count: int
+    ) -> tuple[tuple[Part, ...], dict[tuple[int, str], int], int]:
         """Parts: id, title, subset, material, property and number of variables; then the variables."""
         described: dict[int, Part] = {}
         columns: dict[tuple[int, str], int] = {}
@@ -301,18 +356,25 @@ class _HeadRecords:
             codes = self._integers(self._count(variables))
             # A group of elements with a history is listed like a part, but without material and property.
             if material or properties:
-                known_codes = [code for code in codes if code]  # a solver may write 0 for every variable
+                known_codes = [
+                    code for code in codes if code
+                ]  # a solver may write 0 for every variable
                 if id_ in described or len(set(known_codes)) < len(known_codes):
                     raise self._broken("a part, and a variable of it, only once")
                 described[id_] = Part(id_, plain_text(record[WIDTH : -4 * WIDTH]))
-                known = ((_PART_VARIABLES.get(code), place) for place, code in enumerate(codes, start=values))
+                known = (
+                    (_PART_VARIABLES.get(code), place)
+                    for place, code in enumerate(codes, start=values)
+                )
                 columns.update({(id_, name): place for name, place in known if name})
             values += variables
         return tuple(described.values()), columns, values
 
     def _subset(self) -> int:
         """Pass over a subset and its lists of children, parts and variables; the number of variables."""
-        children, parts, variables = (self._count(n) for n in integers(self._titled(5)[2 * WIDTH : 5 * WIDTH]))
+        children, parts, variables = (
+            self._count(n) for n in integers(self._titled(5)[2 * WIDTH : 5 * WIDTH])
+        )
         for count in (children, parts, variables):
             self._integers(count)
         return variables
@@ -320,12 +382,17 @@ class _HeadRecords:
     def _group(self) -> _Group:
         """Read a group, its elements and its list of variables."""
         record = self._titled(5)
-        kind, elements, variables = (INT.unpack_from(record, WIDTH * place)[0] for place in (1, 3, 4))
+        kind, elements, variables = (
+            INT.unpack_from(record, WIDTH * place)[0] for place in (1, 3, 4)
+        )
         for number in (elements, variables):
             self._count(number)
         members = [self._titled(1) for _ in range(elements)]
         forces = members if kind in _TOUCHING else []
-        named = tuple((INT.unpack_from(member)[0], plain_text(member[WIDTH:])) for member in forces)
+        named = tuple(
+            (INT.unpack_from(member)[0], plain_text(member[WIDTH:]))
+            for member in forces
+        )
         return _Group(kind, elements, named, self._integers(variables))
 
     def _titled(self, numbers: int) -> bytes:

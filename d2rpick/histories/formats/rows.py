@@ -28,7 +28,9 @@ class ReadColumns(NamedTuple):
     notes: tuple[str, ...]
 
 
-def read_columns(text: Text, begin: int, layout: Layout, used: Sequence[int]) -> ReadColumns:
+def read_columns(
+    text: Text, begin: int, layout: Layout, used: Sequence[int]
+) -> ReadColumns:
     """Read the columns ``used`` of the rows from byte ``begin`` on, that of the times first.
 
     Between the rows may be comments and blank lines, behind them words, such as a total, and the same table again.
@@ -40,9 +42,15 @@ def read_columns(text: Text, begin: int, layout: Layout, used: Sequence[int]) ->
         With the line that is wrong.
     """
     curve = _Curve(text.name, layout, used)
-    tables = [table for _, table in _read_tables(text, begin, curve)] or [np.empty((0, len(used)))]
+    tables = [table for _, table in _read_tables(text, begin, curve)] or [
+        np.empty((0, len(used)))
+    ]
     return ReadColumns(
-        [np.concatenate([table[:, place] for table in tables]) for place in range(len(used))], curve.notes
+        [
+            np.concatenate([table[:, place] for table in tables])
+            for place in range(len(used))
+        ],
+        curve.notes,
     )
 
 
@@ -55,12 +63,18 @@ def find_line(text: Text, begin: int, layout: Layout, time: int, state: int) -> 
     raise AssertionError("there is such a state")
 
 
-def _read_tables(text: Text, begin: int, curve: _Curve) -> Iterator[tuple[Sequence[int], Samples]]:
+def _read_tables(
+    text: Text, begin: int, curve: _Curve
+) -> Iterator[tuple[Sequence[int], Samples]]:
     """Numbers of lines and their values piece by piece: line by line only where they are not all alike."""
     number = curve.layout.start + 1
     for piece in text.pieces(begin, large=text.is_large):
         table = plain_rows(piece, curve.layout, curve.used, is_large=text.is_large)
-        if table is not None and np.isfinite(table).all() and not curve.stops_before(float(table[0, 0])):
+        if (
+            table is not None
+            and np.isfinite(table).all()
+            and not curve.stops_before(float(table[0, 0]))
+        ):
             rows = len(table)
             yield range(number, number + rows), table
             curve.add(table)
@@ -103,7 +117,9 @@ class _Curve:
             return ()
         found = f"line {self._below.line} ({shorten(self._below.text)}) and what follows are below the table"
         if self._repeated:
-            return (f"{found}, with the same table again from line {self._repeated_from} on; they were left out",)
+            return (
+                f"{found}, with the same table again from line {self._repeated_from} on; they were left out",
+            )
         return (f"{found} and were left out",)
 
     def add(self, table: Samples) -> None:
@@ -122,7 +138,9 @@ class _Curve:
         starts_again = self._gap and self._before is not None and time <= self._before
         return self._ended or starts_again or self._below is not None
 
-    def states(self, rows: Sequence[str], first: int) -> Iterator[tuple[int, list[float]]]:
+    def states(
+        self, rows: Sequence[str], first: int
+    ) -> Iterator[tuple[int, list[float]]]:
         """Give line and values of each state in rows of which ``first`` is the number of the first."""
         for number, row in enumerate(rows, first):
             if is_skipped(row):
@@ -151,17 +169,27 @@ class _Curve:
         cells = _cells(where, row, self.layout)
         if not any(cells[column] for column in self.used) and self._before is not None:
             return None
-        return [_value(where, self.layout, column, cells[column]) for column in self.used]
+        return [
+            _value(where, self.layout, column, cells[column]) for column in self.used
+        ]
 
     def _is_below(self, row: str) -> bool:
         """Return True if a line that is no row may stand below the table: it begins with a word, and has no time."""
         cells = split(row, self.layout.separator)
         time = cells[self.used[0]] if len(cells) > self.used[0] else ""
-        return self._before is not None and cells[0][:1].isalpha() and self.layout.number(time) is None
+        return (
+            self._before is not None
+            and cells[0][:1].isalpha()
+            and self.layout.number(time) is None
+        )
 
     def _check_goes_on(self, number: int, time: float) -> None:
         if self.stops_before(time):
-            found = "a curve continues after empty cells" if self._ended else "the time starts again after a gap"
+            found = (
+                "a curve continues after empty cells"
+                if self._ended
+                else "the time starts again after a gap"
+            )
             what = f"{self._name}:{number}: {found}, one curve was expected"
             raise FormatError(f"{what}; repair it or put each curve into its own file")
 
@@ -174,12 +202,18 @@ class _Curve:
         assert below is not None  # a line below the table comes first
         is_first = np.array_equal(table[0], state)
         place = 0 if is_first else self._repeated
-        if place < len(table) and (place or is_first) and np.array_equal(table[place], state):
+        if (
+            place < len(table)
+            and (place or is_first)
+            and np.array_equal(table[place], state)
+        ):
             self._repeated_from = self._repeated_from or number
             self._repeated = place + 1
             return
         is_header = is_time(split(below.text, self.layout.separator)[0])
-        if is_header or state[0] > float(table[-1, 0]):  # if the table goes on, the line between is damaged
+        if is_header or state[0] > float(
+            table[-1, 0]
+        ):  # if the table goes on, the line between is damaged
             raise below.error
         found = f"{self._name}:{number}: another table begins here, behind line {below.line} ({shorten(below.text)})"
         raise FormatError(f"{found}; one was expected; put each into its own file")
@@ -190,16 +224,22 @@ def _cells(where: str, row: str, layout: Layout) -> list[str]:
     if len(cells) == layout.columns + 1 and not cells[-1]:
         cells.pop()
     if layout.names and is_time(cells[0]) and is_time(layout.names[0]):
-        raise FormatError(f"{where}: a second header, another curve begins here; put each curve into its own file")
+        raise FormatError(
+            f"{where}: a second header, another curve begins here; put each curve into its own file"
+        )
     if len(cells) != layout.columns:
         found = "1 value" if len(cells) == 1 else f"{len(cells)} values"
-        raise FormatError(f"{where}: {found}, {layout.columns} were expected as in the other rows; repair the line")
+        raise FormatError(
+            f"{where}: {found}, {layout.columns} were expected as in the other rows; repair the line"
+        )
     return cells
 
 
 def _value(where: str, layout: Layout, column: int, cell: str) -> float:
     value = layout.number(cell)
     if value is None or not np.isfinite(value):
-        found = f"{where}: {layout.name(column)!r} is {cell[:60]!r}, a number was expected"
+        found = (
+            f"{where}: {layout.name(column)!r} is {cell[:60]!r}, a number was expected"
+        )
         raise FormatError(f"{found}; repair or delete the line")
     return value

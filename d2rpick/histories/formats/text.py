@@ -35,15 +35,21 @@ class Text:
     # How much is looked at together.
     top = HEAD  # lines that tell its form
     piece = 1 << 17  # bytes: their cells stay in the processor's cache
-    short = 1 << 16  # a text of no more bytes is looked at as a whole to judge the printed format
+    short = (
+        1 << 16
+    )  # a text of no more bytes is looked at as a whole to judge the printed format
     some = 100  # of others so many lines from the start, the end and between
-    large = 1 << 22  # bytes of a large text: each call of pandas or scipy takes milliseconds
+    large = (
+        1 << 22
+    )  # bytes of a large text: each call of pandas or scipy takes milliseconds
 
     def __init__(self, source: Source) -> None:
         self.name = source.name
         self._data, self._encoding = _plain(source, self.piece)
         self._check_lines()
-        self._end = self._data.rfind(b"\n", 0, len(self._data)) + 1  # behind the last line that counts
+        self._end = (
+            self._data.rfind(b"\n", 0, len(self._data)) + 1
+        )  # behind the last line that counts
         self.unended = self._text(self._data[self._end :])
 
     @property
@@ -105,7 +111,11 @@ class Text:
         """Lines behind byte ``begin`` from the start, the end and evenly between; all of a short text."""
         data, end, count = self._data, self._end, self.some
         if end - begin <= self.short:
-            return [] if begin >= end else self._text(data[begin:end]).removesuffix("\n").split("\n")
+            return (
+                []
+                if begin >= end
+                else self._text(data[begin:end]).removesuffix("\n").split("\n")
+            )
         starts, first, last = [], begin, end
         for _ in range(count):
             starts.append(first)
@@ -124,7 +134,9 @@ class Text:
     def _check_lines(self) -> None:
         at = long_line(self._data)
         if at >= 0:
-            raise FormatError(f"{self.name}:{line_at(self._data, at)}: the line has {beyond('LINE')}")
+            raise FormatError(
+                f"{self.name}:{line_at(self._data, at)}: the line has {beyond('LINE')}"
+            )
 
     def _text(self, data: bytes) -> str:
         return data.decode(self._encoding)
@@ -135,13 +147,17 @@ def _plain(source: Source, piece: int) -> tuple[Content, str]:
     data = source.data
     if not isinstance(data, bytes):
         pieces = (data[at : at + piece] for at in range(0, len(data), piece))
-        if all(one.isascii() and b"\r" not in one and b"\0" not in one for one in pieces):
+        if all(
+            one.isascii() and b"\r" not in one and b"\0" not in one for one in pieces
+        ):
             return data, "latin-1"  # of which ASCII is a part
     data = bytes(data)
     if data.startswith(UTF16):
         data = data.decode("utf-16", errors="replace").encode()
     elif b"\0" in data:
-        raise FormatError(f"{source.name}: binary data, a text table was expected; export the history as CSV")
+        raise FormatError(
+            f"{source.name}: binary data, a text table was expected; export the history as CSV"
+        )
     data = data.removeprefix(_UTF8)
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
@@ -169,7 +185,9 @@ _PLAIN = r"[+-]?(?:0|[1-9]\d+)\.\d+"  # compiled where it is needed
 _FULL = 15
 
 
-def precisions(time: Sequence[str], energy: Sequence[str], moments: Samples) -> tuple[Precision, Precision]:
+def precisions(
+    time: Sequence[str], energy: Sequence[str], moments: Samples
+) -> tuple[Precision, Precision]:
     """How finely time and energy were written, from a sample of their fields.
 
     One writer uses one format: the most significant digits seen in any field hold for both columns, since
@@ -199,8 +217,12 @@ def precisions(time: Sequence[str], energy: Sequence[str], moments: Samples) -> 
     time_decimals, energy_decimals = _fixed_decimals(time), _fixed_decimals(energy)
     time_fixed = time_decimals and not _is_finer_than_its_grid(time_decimals, moments)
     return (
-        Precision(digits=general.digits, decimals=time_decimals) if time_fixed else general,
-        Precision(digits=general.digits, decimals=energy_decimals) if energy_decimals else general,
+        Precision(digits=general.digits, decimals=time_decimals)
+        if time_fixed
+        else general,
+        Precision(digits=general.digits, decimals=energy_decimals)
+        if energy_decimals
+        else general,
     )
 
 
@@ -220,17 +242,25 @@ def is_whole(field: str, above: Sequence[str]) -> bool:
     >>> is_whole("0.30000000000000004", ["0.1"]), is_whole("3.0000000000000004", ["0.1"])
     (True, False)
     """
-    if above and _significant(field) == _LONGEST == max(_LONGEST, *map(_significant, above)):
+    if above and _significant(field) == _LONGEST == max(
+        _LONGEST, *map(_significant, above)
+    ):
         return re.fullmatch(_PLAIN, field, re.ASCII) is not None
     parts = [_PARTS.fullmatch(text) for text in (field, *above)]
-    shapes = {(len(part[2]), len((part[3] or "").lstrip("+-"))) for part in parts if part}
+    shapes = {
+        (len(part[2]), len((part[3] or "").lstrip("+-"))) for part in parts if part
+    }
     if None in parts or len(shapes) != 1:
         return False
     decimals, width = shapes.pop()
     padded = any(part[2].endswith("0") for part in parts[1:] if part)
     longest_start = 32  # no double has an exponent beyond 324
     exponent = parts[0][3] if parts[0] else None
-    doubtful = width == 2 and exponent is not None and 10 <= abs(int(exponent)) <= longest_start
+    doubtful = (
+        width == 2
+        and exponent is not None
+        and 10 <= abs(int(exponent)) <= longest_start
+    )
     return decimals > 1 and padded and not doubtful
 
 
@@ -239,7 +269,9 @@ def _significant(field: str) -> int:
     if not parts:
         return 0
     digits = parts[1] + parts[2]
-    return len(digits.lstrip("0")) or (len(digits) if parts[3] else 0)  # 0.00000E+00 has six
+    return len(digits.lstrip("0")) or (
+        len(digits) if parts[3] else 0
+    )  # 0.00000E+00 has six
 
 
 def _fixed_decimals(fields: Sequence[str]) -> int | None:
@@ -254,4 +286,6 @@ def _is_finer_than_its_grid(decimals: int, moments: Samples) -> bool:
         return False
     steps = np.diff(moments)
     coarser = float(steps[0]) * 10.0 ** (decimals - 1)
-    return bool(np.ptp(steps) <= 1e-9 * abs(steps[0])) and abs(coarser - round(coarser)) <= 1e-6 * abs(coarser)
+    return bool(np.ptp(steps) <= 1e-9 * abs(steps[0])) and abs(
+        coarser - round(coarser)
+    ) <= 1e-6 * abs(coarser)

@@ -19,15 +19,28 @@ KINETIC = np.round(5000 - ENERGY, 3)
 
 
 def written(value: float, decimal: str = ".", thousands: str = "") -> str:
-    return f"{value:,.3f}".replace(",", "\0").replace(".", decimal).replace("\0", thousands)
+    return (
+        f"{value:,.3f}".replace(",", "\0")
+        .replace(".", decimal)
+        .replace("\0", thousands)
+    )
 
 
 def table(
-    head: str, separator: str = ",", decimal: str = ".", thousands: str = "", *, quote: str = "", kinetic: bool = True
+    head: str,
+    separator: str = ",",
+    decimal: str = ".",
+    thousands: str = "",
+    *,
+    quote: str = "",
+    kinetic: bool = True,
 ) -> str:
     columns = [TIME, ENERGY, KINETIC] if kinetic else [TIME, ENERGY]
     rows = zip(*columns, strict=True)
-    lines = [separator.join(f"{quote}{written(v, decimal, thousands)}{quote}" for v in row) for row in rows]
+    lines = [
+        separator.join(f"{quote}{written(v, decimal, thousands)}{quote}" for v in row)
+        for row in rows
+    ]
     return "\n".join([head, *lines, ""])
 
 
@@ -40,13 +53,20 @@ def lines(head: str, form: str) -> str:
     return "\n".join([head, *rows, ""]) if head else "\n".join([*rows, ""])
 
 
-REPORT = lines("\n            X               ALLIE           ALLKE     \n", "      {t}      {e}      {k}")
+REPORT = lines(
+    "\n            X               ALLIE           ALLKE     \n",
+    "      {t}      {e}      {k}",
+)
 EXTREMES = "\n         Minimum     0.5     2600.\n            At X     0.      3.1\n         Maximum  2400.  5000.\n\n"
 RULE = "+------+------+"
 
 TABLES: dict[str, str | bytes] = {
-    "a column of errors": lines("Time (ms),Internal energy (mJ),ratio", "{t},{e},#DIV/0!"),
-    "German errors": lines("Zeit;Innere Energie;Quotient", "{t};{e};#NV").replace(".", ","),
+    "a column of errors": lines(
+        "Time (ms),Internal energy (mJ),ratio", "{t},{e},#DIV/0!"
+    ),
+    "German errors": lines("Zeit;Innere Energie;Quotient", "{t};{e};#NV").replace(
+        ".", ","
+    ),
     "not available": lines("time,IE,x", "{t},{e},#N/A"),
     "errors in front": lines("ratio,time,IE", "#DIV/0!,{t},{e}"),
     "an empty column": lines("time,,IE", "{t},,{e}"),
@@ -61,17 +81,31 @@ TABLES: dict[str, str | bytes] = {
     "shares": lines("time,IE,share", "{t},{e},{i}%"),
     "truth": lines("time,IE,contact", "{t},{e},True"),
     "remarks in quotes": lines("time,IE,remark", '{t},{e},"a, b"'),
-    "quoted decimal commas": table("Time (ms),Internal energy (mJ)", ",", ",", quote='"', kinetic=False),
-    "three quoted columns": table("Time (ms),Internal energy (mJ),KE (mJ)", ",", ",", quote='"'),
+    "quoted decimal commas": table(
+        "Time (ms),Internal energy (mJ)", ",", ",", quote='"', kinetic=False
+    ),
+    "three quoted columns": table(
+        "Time (ms),Internal energy (mJ),KE (mJ)", ",", ",", quote='"'
+    ),
     "quoted points": table("time,IE,KE", quote='"'),
     "quoted thousands": table("time,IE,KE", thousands=",", quote='"'),
     "German thousands": table("Zeit;Innere Energie;Kinetische Energie", ";", ",", "."),
-    "French thousands": table("temps;énergie interne;énergie cinétique", ";", ",", "\N{NARROW NO-BREAK SPACE}"),
-    "no-break thousands": table("temps;énergie interne;énergie cinétique", ";", ",", "\N{NO-BREAK SPACE}"),
-    "blanks for thousands": table("Zeit;Innere Energie;Kinetische Energie", ";", ",", " "),
+    "French thousands": table(
+        "temps;énergie interne;énergie cinétique", ";", ",", "\N{NARROW NO-BREAK SPACE}"
+    ),
+    "no-break thousands": table(
+        "temps;énergie interne;énergie cinétique", ";", ",", "\N{NO-BREAK SPACE}"
+    ),
+    "blanks for thousands": table(
+        "Zeit;Innere Energie;Kinetische Energie", ";", ",", " "
+    ),
     "Swiss thousands": table("Zeit;Innere Energie;Kinetische Energie", ";", ".", "'"),
     "thousands between tabs": table("time\tIE\tKE", "\t", ".", ","),
-    "two rows of heads": table(";Lauf 12;;\n;Innere Energie;Kinetische Energie;\nt in ms;in mJ;in mJ;", ";", ","),
+    "two rows of heads": table(
+        ";Lauf 12;;\n;Innere Energie;Kinetische Energie;\nt in ms;in mJ;in mJ;",
+        ";",
+        ",",
+    ),
     "merged heads": table("Time,Energy,\n,internal,kinetic"),
     "levels": table("Time,Energy,Energy\n,internal,kinetic"),
     "a level of models": table(",Model,Model\ntime,IE,KE"),
@@ -79,7 +113,9 @@ TABLES: dict[str, str | bytes] = {
     "units above": table("ms,mJ,mJ\ntime,internal energy,kinetic energy"),
     "words above": table("Report of run 12\nAuthor: me, date: today\n\ntime,IE,KE"),
     "many words above": table("some text about the run\n" * 150 + "time,IE,KE"),
-    "keys and values above": table("Key;value 7\n" * 12 + "Zeit [ms];Innere Energie [mJ]", ";", ",", kinetic=False),
+    "keys and values above": table(
+        "Key;value 7\n" * 12 + "Zeit [ms];Innere Energie [mJ]", ";", ",", kinetic=False
+    ),
     "numbers of rows": lines(",time,IE", "{i},{t},{e}"),
     "numbers of rows before X": lines(",X,ALLIE", "{i},{t},{e}"),
     "named numbers of rows": lines("index,X,ALLIE", "{i},{t},{e}"),
@@ -97,10 +133,13 @@ TABLES: dict[str, str | bytes] = {
     "Markdown": lines("| time | internal energy |\n|------|------|", "| {t} | {e} |"),
     "psql": lines(" time | internal energy \n------+-----------------", " {t} | {e} "),
     "a box": lines(f"{RULE}\n| time | IE |\n{RULE}", "| {t} | {e} |") + f"{RULE}\n",
-    "rules of blanks": lines("====== ======\ntime   IE\n====== ======", "{t} {e}") + "====== ======\n",
+    "rules of blanks": lines("====== ======\ntime   IE\n====== ======", "{t} {e}")
+    + "====== ======\n",
     "fixed width": lines(f"{'time':>10}{'internal energy':>20}", "{t:>10}{e:>20}"),
     "UTF-16": table("time\tIE\tKE", "\t").encode("utf-16"),
-    "cp1252": table("Zeit [ms];Innere Energie Türe [mJ]", ";", ",", kinetic=False).encode("cp1252"),
+    "cp1252": table(
+        "Zeit [ms];Innere Energie Türe [mJ]", ";", ",", kinetic=False
+    ).encode("cp1252"),
     "old line ends": table("time,IE,KE").replace("\n", "\r"),
     "blank lines between": table("time,IE,KE").replace("\n", "\r\n\r\n"),
     "exponents of Fortran": lines("time IE", "{t}D+00 {e}D+00"),
@@ -109,7 +148,9 @@ TABLES: dict[str, str | bytes] = {
     "the energy first": lines("internal energy;time", "{e};{t}"),
     "a separator at the end of rows": lines("time;IE", "{t};{e};"),
     "a separator at the end of names": lines("time;IE;", "{t};{e}"),
-    "holes in another column": lines("time,IE,KE", "{t},{e},{k}").replace(f",{written(KINETIC[7])}", ","),
+    "holes in another column": lines("time,IE,KE", "{t},{e},{k}").replace(
+        f",{written(KINETIC[7])}", ","
+    ),
 }
 
 
@@ -131,8 +172,12 @@ def notes(text: str) -> str:
 
 def test_columns_without_numbers_are_left_out_with_a_note() -> None:
     text = lines("time,IE,ratio,", "{t},{e},#DIV/0!,")
-    assert "column 3 'ratio' holds no numbers ('#DIV/0!') and was left out" in notes(text)
-    assert "holds no numbers" not in notes(lines("time,,IE", "{t},,{e}"))  # nothing stands there
+    assert "column 3 'ratio' holds no numbers ('#DIV/0!') and was left out" in notes(
+        text
+    )
+    assert "holds no numbers" not in notes(
+        lines("time,,IE", "{t},,{e}")
+    )  # nothing stands there
 
 
 @pytest.mark.parametrize("hole", ["#NV", "", "n/a", "-"])
@@ -147,16 +192,24 @@ def test_a_quantity_with_a_hole_is_left_out_with_its_line(hole: str) -> None:
 
 
 def test_a_hole_in_the_energy_is_refused_with_its_line() -> None:
-    with pytest.raises(FormatError, match="table:22: 'IE' is '#NV', a number was expected"):
+    with pytest.raises(
+        FormatError, match="table:22: 'IE' is '#NV', a number was expected"
+    ):
         read(lines("time,IE,KE", "{t},{e},{k}").replace(written(ENERGY[20]), "#NV"))
 
 
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("time;IE\n0,001;1.234\n0,002;1.235\n0,003;1.236\n", "1.234"),  # thousands, or another decimal sign?
+        (
+            "time;IE\n0,001;1.234\n0,002;1.235\n0,003;1.236\n",
+            "1.234",
+        ),  # thousands, or another decimal sign?
         ("time;IE\n1.001;12,5\n1.002;12,6\n1.003;12,7\n", "1.001|12,5"),
-        ("time,IE\n0.0 ms,0.5 mJ\n0.1 ms,0.6 mJ\n", "table:2: '0.0 ms,0.5 mJ' and no rows"),
+        (
+            "time,IE\n0.0 ms,0.5 mJ\n0.1 ms,0.6 mJ\n",
+            "table:2: '0.0 ms,0.5 mJ' and no rows",
+        ),
         ("IE,KE\n0.5,1\n0.6,2\n", "no column has the name of a time"),
     ],
 )
@@ -167,13 +220,18 @@ def test_what_cannot_be_told_for_sure_is_refused(text: str, reason: str) -> None
 
 def test_another_table_below_is_refused_with_both_lines() -> None:
     other = REPORT.replace(written(ENERGY[20]), "7")
-    with pytest.raises(FormatError, match=r"table:72: another table begins here, behind line 45 \('Minimum"):
+    with pytest.raises(
+        FormatError,
+        match=r"table:72: another table begins here, behind line 45 \('Minimum",
+    ):
         read(REPORT + EXTREMES + "\n" + other.lstrip("\n"))
 
 
 def test_a_damaged_row_is_refused_though_it_begins_with_a_word() -> None:
     text = lines("time,IE,KE", "{t},{e},{k}").replace("\n5.000,", "\nx.000,")
-    with pytest.raises(FormatError, match=r"table:22: 'time' is 'x\.000', a number was expected"):
+    with pytest.raises(
+        FormatError, match=r"table:22: 'time' is 'x\.000', a number was expected"
+    ):
         read(text)
 
 
@@ -187,8 +245,22 @@ def test_what_stands_below_is_named() -> None:
 
 GLOBALS = (
     "time",
-    *("INTERNAL ENERGY", "KINETIC ENERGY", "X-MOMENTUM", "Y-MOMENTUM", "Z-MOMENTUM", "MASS", "TIME STEP"),
-    *("ROTATION ENERGY", "EXTERNAL WORK", "SPRING ENERGY", "CONTACT ENERGY", "HOURGLASS ENERGY"),
+    *(
+        "INTERNAL ENERGY",
+        "KINETIC ENERGY",
+        "X-MOMENTUM",
+        "Y-MOMENTUM",
+        "Z-MOMENTUM",
+        "MASS",
+        "TIME STEP",
+    ),
+    *(
+        "ROTATION ENERGY",
+        "EXTERNAL WORK",
+        "SPRING ENERGY",
+        "CONTACT ENERGY",
+        "HOURGLASS ENERGY",
+    ),
 )
 BEHIND = ("PLASTIC WORK", "box IE", "box KE")
 
@@ -196,11 +268,15 @@ BEHIND = ("PLASTIC WORK", "box IE", "box KE")
 def th_to_csv(names: Sequence[str], columns: int) -> str:
     head = ",".join(f'"{name}"' for name in names)
     rows: Iterator[Samples] = (np.array([t, *range(1, columns)]) + 0.0 for t in TIME)
-    return "\n".join([head, *(",".join(f"{value:e}" for value in row) for row in rows), ""])
+    return "\n".join(
+        [head, *(",".join(f"{value:e}" for value in row) for row in rows), ""]
+    )
 
 
 @pytest.mark.parametrize("columns", [15, 17])
-def test_the_globals_of_th_to_csv_are_sure_below_a_name_too_many_or_too_few(columns: int) -> None:
+def test_the_globals_of_th_to_csv_are_sure_below_a_name_too_many_or_too_few(
+    columns: int,
+) -> None:
     history = read(th_to_csv([*GLOBALS, *BEHIND], columns))
     assert (history.energy[0], history.channel) == (1.0, "INTERNAL ENERGY")
     assert history.balance is not None

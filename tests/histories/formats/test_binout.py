@@ -16,7 +16,9 @@ from tests.reading import run_of
 
 
 def opened(*files: LsdaWriter | bytes) -> Binout:
-    contents = [bytes(file.data) if isinstance(file, LsdaWriter) else file for file in files]
+    contents = [
+        bytes(file.data) if isinstance(file, LsdaWriter) else file for file in files
+    ]
     return Binout([(f"binout{i:04d}", content) for i, content in enumerate(contents)])
 
 
@@ -27,7 +29,9 @@ def expected(name: str, states: Sequence[int]) -> list[float]:
 STYLES = [
     Style(order, length, offset, command, type_id, real)
     for order, (length, offset, command, type_id), real in product(
-        "<>", [(8, 8, 1, 1), (4, 4, 1, 1), (8, 4, 2, 4), (4, 8, 8, 2), (2, 4, 1, 1)], ("f4", "f8")
+        "<>",
+        [(8, 8, 1, 1), (4, 4, 1, 1), (8, 4, 2, 4), (4, 8, 8, 2), (2, 4, 1, 1)],
+        ("f4", "f8"),
     )
 ]
 
@@ -35,11 +39,19 @@ STYLES = [
 @pytest.mark.parametrize("style", STYLES, ids=str)
 @pytest.mark.parametrize("relative", [False, True])
 @pytest.mark.parametrize("matsum_every", [1, 3])
-def test_any_style_gives_the_numbers_that_were_written(style: Style, relative: bool, matsum_every: int) -> None:
+def test_any_style_gives_the_numbers_that_were_written(
+    style: Style, relative: bool, matsum_every: int
+) -> None:
     states = range(1, 13)
     # 2-byte lengths cannot hold a symbol table of both branches.
     run = opened(
-        made_binout(states, style=style, relative=relative, matsum_every=matsum_every, tables=style.length > 2)
+        made_binout(
+            states,
+            style=style,
+            relative=relative,
+            matsum_every=matsum_every,
+            tables=style.length > 2,
+        )
     )
     assert run.complete
     assert not run.notes
@@ -51,7 +63,9 @@ def test_any_style_gives_the_numbers_that_were_written(style: Style, relative: b
     late = [state for state in states if state % matsum_every == 0]
     assert run.part_time.tolist() == expected("time", late)
     energies = run.part_channel("internal_energy", [3, 7])
-    assert energies.tolist() == [[values("internal_energy", state, id_) for id_ in (3, 7)] for state in late]
+    assert energies.tolist() == [
+        [values("internal_energy", state, id_) for id_ in (3, 7)] for state in late
+    ]
 
 
 def test_a_branch_that_is_written_seldom_keeps_its_states() -> None:
@@ -62,7 +76,9 @@ def test_a_branch_that_is_written_seldom_keeps_its_states() -> None:
 
 
 def test_metadata() -> None:
-    run = opened(made_binout([1], parts=(7, 3), titles={3: "box", 9: "unused", 7: "step"}))
+    run = opened(
+        made_binout([1], parts=(7, 3), titles={3: "box", 9: "unused", 7: "step"})
+    )
     assert [(part.id, part.title) for part in run.parts] == [(7, "step"), (3, "box")]
     assert (run.title, run.version) == ("made for tests", "smp s R12")
 
@@ -80,15 +96,23 @@ def test_a_number_left_out_inside_a_file_says_that_records_are_lost() -> None:
     """What then seems to be one state may be made of two."""
     run = opened(made_binout([1, 2, 3, 5, 6]))
     assert not run.complete
-    with pytest.raises(FormatError, match="glstat goes from state 3 to 5; records are lost or out of place"):
+    with pytest.raises(
+        FormatError,
+        match="glstat goes from state 3 to 5; records are lost or out of place",
+    ):
         run.channel("internal_energy")
 
 
 def test_states_written_again_by_a_restart_replace_the_older_leg() -> None:
     run = run_of(binout, bytes(made_binout([1, 2, 3, 4, 5, 3, 4]).data))
     assert run.databases[0].time.tolist() == expected("time", [1, 2, 3, 4])
-    assert "time steps back once (restart); where legs overlap the newer one counts" in run.notes[0]
-    assert run.history(Selection()).energy.tolist() == expected("internal_energy", [1, 2, 3, 4])
+    assert (
+        "time steps back once (restart); where legs overlap the newer one counts"
+        in run.notes[0]
+    )
+    assert run.history(Selection()).energy.tolist() == expected(
+        "internal_energy", [1, 2, 3, 4]
+    )
 
 
 @pytest.mark.parametrize("again", [4, 3])
@@ -96,11 +120,17 @@ def test_a_restart_that_numbers_its_states_anew_goes_on_in_time(again: int) -> N
     """Its first state is the one after, or the same as, the last one of the leg before."""
     first, second = made_binout([1, 2, 3]), made_binout([1, 2, 3], shift=again - 1)
     (leg,) = binout.open_legs(
-        [Source("binout0001", bytes(second.data)), Source("binout0000", bytes(first.data))], Selection()
+        [
+            Source("binout0001", bytes(second.data)),
+            Source("binout0000", bytes(first.data)),
+        ],
+        Selection(),
     )
     run = Run(("binout*",), (Legs([leg]),))
     assert run.databases[0].complete
-    assert run.history(Selection()).time.tolist() == expected("time", range(1, again + 3))
+    assert run.history(Selection()).time.tolist() == expected(
+        "time", range(1, again + 3)
+    )
     assert run.part_energies(run.parts)[:, 1].tolist() == [
         values("internal_energy", state, 3) for state in range(1, again + 3)
     ]
@@ -121,19 +151,36 @@ def test_a_missing_member_of_a_family_is_noted() -> None:
 
 
 def test_parts_that_change_are_read_by_id_or_refused() -> None:
-    run = opened(made_binout(range(1, 13), parts_of=lambda state: (7, 3) if state < 5 else (3, 9, 7)))
+    run = opened(
+        made_binout(
+            range(1, 13), parts_of=lambda state: (7, 3) if state < 5 else (3, 9, 7)
+        )
+    )
     assert [part.id for part in run.parts] == [7, 3, 9]
     energies = run.part_channel("internal_energy", [3, 7])
-    assert energies.tolist() == [[values("internal_energy", s, id_) for id_ in (3, 7)] for s in range(1, 13)]
-    with pytest.raises(FormatError, match="part 9 is listed 0 times, not once; it is there in some states only"):
+    assert energies.tolist() == [
+        [values("internal_energy", s, id_) for id_ in (3, 7)] for s in range(1, 13)
+    ]
+    with pytest.raises(
+        FormatError,
+        match="part 9 is listed 0 times, not once; it is there in some states only",
+    ):
         run.part_channel("internal_energy", [9])
-    with pytest.raises(FormatError, match="part 5 is listed 0 times, not once; there are 7, 3, 9"):
+    with pytest.raises(
+        FormatError, match="part 5 is listed 0 times, not once; there are 7, 3, 9"
+    ):
         run.part_channel("internal_energy", [5])
 
 
 def test_another_order_of_parts_of_the_same_count_is_followed() -> None:
-    run = opened(made_binout(range(1, 41), parts_of=lambda state: (7, 3) if state % 3 else (3, 7)))
-    assert run.part_channel("x_momentum", [7])[:, 0].tolist() == [values("x_momentum", s, 7) for s in range(1, 41)]
+    run = opened(
+        made_binout(
+            range(1, 41), parts_of=lambda state: (7, 3) if state % 3 else (3, 7)
+        )
+    )
+    assert run.part_channel("x_momentum", [7])[:, 0].tolist() == [
+        values("x_momentum", s, 7) for s in range(1, 41)
+    ]
 
 
 def test_a_new_list_of_ids_in_the_metadata_holds_for_the_states_after_it() -> None:
@@ -146,7 +193,9 @@ def test_a_new_list_of_ids_in_the_metadata_holds_for_the_states_after_it() -> No
             made.put("time", [state], "f8")
             made.put("internal_energy", [100 * state + id_ for id_ in ids], "f8")
     run = opened(made)
-    assert run.part_channel("internal_energy", [7])[:, 0].tolist() == [100 * s + 7 for s in range(1, 7)]
+    assert run.part_channel("internal_energy", [7])[:, 0].tolist() == [
+        100 * s + 7 for s in range(1, 7)
+    ]
 
 
 def test_values_that_do_not_fit_the_ids_are_refused() -> None:
@@ -158,7 +207,9 @@ def test_values_that_do_not_fit_the_ids_are_refused() -> None:
         made.put("time", [state], "f4")
         made.put("internal_energy", range(count), "f4")
     made.table()
-    with pytest.raises(FormatError, match="state 2: 3 values of internal_energy where 1, 2 would fit"):
+    with pytest.raises(
+        FormatError, match="state 2: 3 values of internal_energy where 1, 2 would fit"
+    ):
         opened(made).part_channel("internal_energy", [1])
 
 
@@ -175,7 +226,9 @@ def test_a_variable_that_appears_late_is_no_channel() -> None:
     assert run.channels == ("internal_energy",)
     assert run.channel("internal_energy").tolist() == [2, 4, 6, 8, 10]
     assert any("added_mass in some states only" in note for note in run.notes)
-    with pytest.raises(FormatError, match="state 1: no added_mass, only time, internal_energy"):
+    with pytest.raises(
+        FormatError, match="state 1: no added_mass, only time, internal_energy"
+    ):
         run.channel("added_mass")
 
 
@@ -195,7 +248,9 @@ def test_no_states_is_a_legal_file() -> None:
     assert any("holds no state yet" in note for note in run.notes)
 
 
-@pytest.mark.parametrize("head", [b"", b"\x08", b"$ LS-DYNA", bytes([8, 8, 8, 1, 1, 1, 3, 0])])
+@pytest.mark.parametrize(
+    "head", [b"", b"\x08", b"$ LS-DYNA", bytes([8, 8, 8, 1, 1, 1, 3, 0])]
+)
 def test_something_else_is_not_recognised_and_refused(head: bytes) -> None:
     assert not recognises(head)
     with pytest.raises(FormatError, match="the header of a binout was expected"):

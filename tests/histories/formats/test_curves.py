@@ -66,9 +66,15 @@ def read(text: str, *energy: str, time: str | None = None) -> History:
 def test_each_curve_has_its_own_times(form: str, end: str) -> None:
     text = TEXTS[form].replace("\n", end)
     first, second = CHANNELS[form]
-    assert run_of(csv_table, text, selection=Selection(energy=("2",))).databases[0].channels == (first, second)
+    assert run_of(csv_table, text, selection=Selection(energy=("2",))).databases[
+        0
+    ].channels == (first, second)
     history = read(text, "1")
-    assert (history.channel, states_of(history), history.complete) == (first, FIRST, True)
+    assert (history.channel, states_of(history), history.complete) == (
+        first,
+        FIRST,
+        True,
+    )
     assert states_of(read(text, second.upper())) == states_of(read(text, "2")) == SECOND
     with pytest.raises(FormatError, match="has other times than the first curve"):
         read(text, "1", "2")
@@ -81,15 +87,24 @@ def test_the_internal_energy_is_taken_by_default(form: str) -> None:
 
 @pytest.mark.parametrize("form", TEXTS)
 def test_a_single_curve_needs_no_name(form: str) -> None:
-    ends = {"Curveplot": "Kinetic Energy #pts", "T/HIS": "CONTINUE", "DYNAFORM": "2 'Kin"}
-    history = read(TEXTS[form].partition(ends[form])[0].replace("Internal Energy", "Heat"))
+    ends = {
+        "Curveplot": "Kinetic Energy #pts",
+        "T/HIS": "CONTINUE",
+        "DYNAFORM": "2 'Kin",
+    }
+    history = read(
+        TEXTS[form].partition(ends[form])[0].replace("Internal Energy", "Heat")
+    )
     assert states_of(history) == FIRST
 
 
 def test_what_the_labels_say() -> None:
     history = read(CURVEPLOT, "1")
     assert history.time_unit == "ms"
-    assert (history.time_precision, history.energy_precision) == (Precision(digits=11), Precision(digits=11))
+    assert (history.time_precision, history.energy_precision) == (
+        Precision(digits=11),
+        Precision(digits=11),
+    )
     assert (
         "'Displacement'; it was taken for the time"
         in read(CURVEPLOT.replace("Time (ms)", "Displacement"), "1").notes[0]
@@ -99,7 +114,9 @@ def test_what_the_labels_say() -> None:
 
 def test_a_curve_has_its_own_times_and_no_others() -> None:
     assert states_of(read(CURVEPLOT, "1", time="Time")) == FIRST
-    with pytest.raises(FormatError, match="each curve has its own times; leave `time` '2' out"):
+    with pytest.raises(
+        FormatError, match="each curve has its own times; leave `time` '2' out"
+    ):
         read(CURVEPLOT, "1", time="2")
 
 
@@ -118,7 +135,10 @@ def test_a_text_cut_anywhere_never_yields_a_wrong_number(form: str) -> None:
     assert counts >= {("1", 1), ("1", 2), ("1", 3), ("2", 1)}
 
 
-@given(st.text(alphabet="01.,eE+- \n'$CONTIUE#pts=curve", max_size=120), st.sampled_from([*TEXTS]))
+@given(
+    st.text(alphabet="01.,eE+- \n'$CONTIUE#pts=curve", max_size=120),
+    st.sampled_from([*TEXTS]),
+)
 def test_no_text_raises_anything_else(text: str, form: str) -> None:
     with contextlib.suppress(FormatError):
         read(TEXTS[form][:90] + text + TEXTS[form][90:])
@@ -130,7 +150,11 @@ PAIRS = [(0.0, 1.5), (0.25, 2.75), (0.625, -3.125)]
 
 def test_pairs_below_their_count_are_a_curve() -> None:
     history = read(COUNTED)
-    assert (states_of(history), history.channel, history.complete) == (PAIRS, "curve 1", True)
+    assert (states_of(history), history.channel, history.complete) == (
+        PAIRS,
+        "curve 1",
+        True,
+    )
     assert states_of(read(COUNTED + COUNTED.replace("1.5", "7"), "2"))[0] == (0.0, 7.0)
     history = read(COUNTED.replace("3\n", "4\n"))
     assert (states_of(history), history.complete) == (PAIRS, False)
@@ -147,27 +171,59 @@ def test_pairs_below_their_count_are_a_curve() -> None:
         ),
         (CURVEPLOT, ["3"], "no '3'; there are: A12"),
         (CURVEPLOT, ["A21: Internal Energy"], "did you mean 'A12: Internal Energy'"),
-        (CURVEPLOT.replace("pts=3", "pts=4"), ["1"], "curves:12: 3 pairs, 4 were expected in the curve 'A12'"),
+        (
+            CURVEPLOT.replace("pts=3", "pts=4"),
+            ["1"],
+            "curves:12: 3 pairs, 4 were expected in the curve 'A12'",
+        ),
         (
             CURVEPLOT.replace("-3.2500000000e+00", ""),
             ["1"],
             "curves:10: '1.0000000000e.00', a pair of numbers was expected",
         ),
-        (CURVEPLOT.replace("-3.2500000000e+00", "NaN"), ["1"], "curves:10: 'NaN' of 'A12: Internal Energy'"),
-        (T_HIS.replace("1.0 -3.25", "1.0 -3.25 7"), ["1"], "curves:7: '1.0 -3.25 7', a pair of numbers"),
-        (DYNAFORM.replace("1.0, -3.25", "1.0; -3.25"), ["1"], "curves:4: '1.0;' of 'Internal Energy'"),
-        (COUNTED.replace("3\n", "2\n"), [], "curves:4: 3 pairs, 2 were expected in the curve 1"),
+        (
+            CURVEPLOT.replace("-3.2500000000e+00", "NaN"),
+            ["1"],
+            "curves:10: 'NaN' of 'A12: Internal Energy'",
+        ),
+        (
+            T_HIS.replace("1.0 -3.25", "1.0 -3.25 7"),
+            ["1"],
+            "curves:7: '1.0 -3.25 7', a pair of numbers",
+        ),
+        (
+            DYNAFORM.replace("1.0, -3.25", "1.0; -3.25"),
+            ["1"],
+            "curves:4: '1.0;' of 'Internal Energy'",
+        ),
+        (
+            COUNTED.replace("3\n", "2\n"),
+            [],
+            "curves:4: 3 pairs, 2 were expected in the curve 1",
+        ),
         ("5\n0 1\n1 2\n2\n0 1\n1 2\n", [], "curves:4: 2 pairs, 5 were expected"),
         ("1" * 5000 + "\n0 1\n1 2\n", [], "curves:1: a count of 5000 digits"),
         ("1" * 5000 + "\n1 'IE'\n0 1\n1 2\n", [], "curves:1: a count of 5000 digits"),
-        ("Curveplot\nt\nTime\nIE\nA #pts=" + "1" * 5000 + "\n0 1\n", [], "curves:5: a count of 5000 digits"),
-        ("3\n0 1\n1e999 2\n1e999 3\n", [], "curves:3: '1e999' of 'curve 1', a number was expected"),
+        (
+            "Curveplot\nt\nTime\nIE\nA #pts=" + "1" * 5000 + "\n0 1\n",
+            [],
+            "curves:5: a count of 5000 digits",
+        ),
+        (
+            "3\n0 1\n1e999 2\n1e999 3\n",
+            [],
+            "curves:3: '1e999' of 'curve 1', a number was expected",
+        ),
         (
             "Curveplot\nt\nTime\nEnergy Ratio\nC\nEnergy Ratio #pts=2\n0 1\n1 1\nendcurve\n",
             [],
             "'Energy Ratio', by its name",
         ),
-        ("4\n0 1\n1 2\n0 3\n1 4\n", [], "curves:4, 'curve 1': time steps back from 1 to 0"),
+        (
+            "4\n0 1\n1 2\n0 3\n1 4\n",
+            [],
+            "curves:4, 'curve 1': time steps back from 1 to 0",
+        ),
     ],
 )
 def test_refused(text: str, energy: list[str], reason: str) -> None:
@@ -198,7 +254,10 @@ Whole model
 @pytest.mark.parametrize("title", ["Drop of a case\n", "\n"])
 def test_labels_of_the_oasys_programs_have_types_and_factors(title: str) -> None:
     history = read(OASYS.replace("Drop of a case\n", title))
-    assert (history.channel, history.time_unit) == ("Whole model: Internal energy", "ms")
+    assert (history.channel, history.time_unit) == (
+        "Whole model: Internal energy",
+        "ms",
+    )
     assert states_of(history) == FIRST
     assert history.balance is not None
     assert history.balance.kinetic is not None

@@ -46,7 +46,9 @@ def holds(run: Run, expected: list[State], ids: tuple[int, ...] = (7, 3)) -> Non
 
     same(database.time, [state.time for state in expected])
     same(database.channel("kinetic_energy"), [sum(state.kinetic) for state in expected])
-    same(database.channel("internal_energy"), [sum(state.internal) for state in expected])
+    same(
+        database.channel("internal_energy"), [sum(state.internal) for state in expected]
+    )
     same(database.channel("z_velocity"), [state.model[2] for state in expected])
     assert tuple(part.id for part in database.parts) == ids
     for name, values in {
@@ -59,13 +61,17 @@ def holds(run: Run, expected: list[State], ids: tuple[int, ...] = (7, 3)) -> Non
         same(database.part_channel(name, ids), values)
         same(database.part_channel(name, ids[::-1]), np.asarray(values)[:, ::-1])
     momenta = [np.asarray(state.velocities)[:, 2] * state.masses for state in expected]
-    np.testing.assert_allclose(database.part_channel("z_momentum", ids), momenta, rtol=2e-7)
+    np.testing.assert_allclose(
+        database.part_channel("z_momentum", ids), momenta, rtol=2e-7
+    )
 
 
 @pytest.mark.parametrize("width", [4, 8])
 @pytest.mark.parametrize("order", "<>")
 @pytest.mark.parametrize("per_file", [1, 2, 5])
-def test_every_state_of_a_family_is_read(width: int, order: str, per_file: int, tmp_path: Path) -> None:
+def test_every_state_of_a_family_is_read(
+    width: int, order: str, per_file: int, tmp_path: Path
+) -> None:
     run = opened(tmp_path, D3plotWriter(width, order).written(STATES, per_file))
     holds(run, STATES)
     assert run.databases[0].complete
@@ -77,16 +83,23 @@ def test_every_state_of_a_family_is_read(width: int, order: str, per_file: int, 
 
 
 @pytest.mark.parametrize("width", [4, 8])
-def test_states_may_follow_the_titles_in_the_first_file(width: int, tmp_path: Path) -> None:
+def test_states_may_follow_the_titles_in_the_first_file(
+    width: int, tmp_path: Path
+) -> None:
     writer = D3plotWriter(width)
     files = {"d3plot": writer.together(STATES[:2]), "d3plot01": writer.file(STATES[2:])}
     holds(opened(tmp_path, files), STATES)
 
 
-def test_files_are_ordered_by_number_and_left_out_numbers_are_told(tmp_path: Path) -> None:
+def test_files_are_ordered_by_number_and_left_out_numbers_are_told(
+    tmp_path: Path,
+) -> None:
     writer = D3plotWriter()
     names = ["d3plot01", "d3plot02", "d3plot10", "d3plot11", "d3plot100"]
-    files = {"d3plot": writer.head(), **{name: writer.file([one]) for name, one in zip(names, STATES, strict=True)}}
+    files = {
+        "d3plot": writer.head(),
+        **{name: writer.file([one]) for name, one in zip(names, STATES, strict=True)},
+    }
     run = opened(tmp_path, files)
     holds(run, STATES)
     assert not run.databases[0].complete
@@ -95,8 +108,13 @@ def test_files_are_ordered_by_number_and_left_out_numbers_are_told(tmp_path: Pat
 
 @pytest.mark.parametrize("width", [4, 8])
 def test_a_family_cut_at_every_byte_gives_its_whole_states(width: int) -> None:
-    writer = D3plotWriter(width, control={"numnp": 1, "nel8": 0, "nel2": 0, "nelt": 0, "nv2d": 3})
-    length, content = len(writer.state(STATES[0])), writer.file(STATES[:3]).rstrip(b"\0")
+    writer = D3plotWriter(
+        width, control={"numnp": 1, "nel8": 0, "nel2": 0, "nelt": 0, "nv2d": 3}
+    )
+    length, content = (
+        len(writer.state(STATES[0])),
+        writer.file(STATES[:3]).rstrip(b"\0"),
+    )
     first = Source("d3plot", writer.head())
     for end in range(len(content)):
         (leg,) = open_legs([first, Source("d3plot01", content[:end])], Selection())
@@ -129,7 +147,10 @@ def test_a_state_cut_in_a_file_that_others_follow_is_left_out(tmp_path: Path) ->
 
 def test_a_run_that_still_writes_gives_more_each_time(tmp_path: Path) -> None:
     writer = D3plotWriter()
-    first, last = put(tmp_path, {"d3plot": writer.filled(writer.head())}), tmp_path / "d3plot01"
+    first, last = (
+        put(tmp_path, {"d3plot": writer.filled(writer.head())}),
+        tmp_path / "d3plot01",
+    )
     run = open_run([str(first)])
     assert run.databases[0].time.size == 0
     for count in range(1, len(STATES) + 1):
@@ -143,7 +164,11 @@ def test_a_run_that_still_writes_gives_more_each_time(tmp_path: Path) -> None:
 
 def test_a_restart_writes_states_anew_and_the_newer_count(tmp_path: Path) -> None:
     writer, later = D3plotWriter(), states([0.75, 2.0, 3.0])
-    files = {"d3plot": writer.head(), "d3plot01": writer.file(STATES[:3]), "d3plot02": writer.file(later)}
+    files = {
+        "d3plot": writer.head(),
+        "d3plot01": writer.file(STATES[:3]),
+        "d3plot02": writer.file(later),
+    }
     run = opened(tmp_path, files)
     assert run.databases[0].time.tolist() == [0.0, 0.5, 0.75, 2.0, 3.0]
     assert any("newer" in note for note in run.notes)
@@ -152,7 +177,9 @@ def test_a_restart_writes_states_anew_and_the_newer_count(tmp_path: Path) -> Non
 @pytest.mark.parametrize("name", ["R712", " R12"])
 def test_rigid_walls_have_their_forces(name: str, tmp_path: Path) -> None:
     """Of all releases that are named so the number says 960, and their walls have places all the same."""
-    run = opened(tmp_path, D3plotWriter(walls=2, name=name).written(states(TIMES, walls=2), 2))
+    run = opened(
+        tmp_path, D3plotWriter(walls=2, name=name).written(states(TIMES, walls=2), 2)
+    )
     holds(run, STATES)
     for wall in (1, 2):
         found = run.databases[0].channel(f"rigid_wall_{wall}_force")
@@ -161,7 +188,15 @@ def test_rigid_walls_have_their_forces(name: str, tmp_path: Path) -> None:
 
 def test_parts_that_were_deleted_keep_their_place(tmp_path: Path) -> None:
     """A deleted part has neither mass nor energy, whatever velocity is left of it."""
-    gone = State(2.5, [4.0, 0.0], [5.0, 0.0], [[1.0, 2.0, 3.0], [9.0, 9.0, 9.0]], [2.0, 0.0], [0.0, 0.0], [0, 0, 0])
+    gone = State(
+        2.5,
+        [4.0, 0.0],
+        [5.0, 0.0],
+        [[1.0, 2.0, 3.0], [9.0, 9.0, 9.0]],
+        [2.0, 0.0],
+        [0.0, 0.0],
+        [0, 0, 0],
+    )
     run = opened(tmp_path, D3plotWriter().written([*STATES, gone], 3))
     holds(run, [*STATES, gone])
     assert run.databases[0].part_channel("x_momentum", [3])[-1, 0] == 0
@@ -171,8 +206,16 @@ def test_parts_that_were_deleted_keep_their_place(tmp_path: Path) -> None:
 LAYOUTS = {
     "rigid shells": ({"ndim": 5, "maxint": 3}, {"control": [1, 2, 24, 20]}, -9),
     "fluid materials": ({"ialemat": 2}, {"control": [1, 2]}, 0),
-    "particles": ({"nmsph": 2}, {"control": [11, 1, 1, 6, 1, 1, 1, 1, 6, 1, 2], "ids": [1, 1, 2, 1]}, 2 * 22),
-    "older particles": ({"nmsph": 2}, {"control": [10, 1, 1, 6, 1, 1, 1, 1, 6, 1], "ids": [1, 1, 2, 1]}, 2 * 20),
+    "particles": (
+        {"nmsph": 2},
+        {"control": [11, 1, 1, 6, 1, 1, 1, 1, 6, 1, 2], "ids": [1, 1, 2, 1]},
+        2 * 22,
+    ),
+    "older particles": (
+        {"nmsph": 2},
+        {"control": [10, 1, 1, 6, 1, 1, 1, 1, 6, 1], "ids": [1, 1, 2, 1]},
+        2 * 20,
+    ),
     "airbags": (
         {"npefg": 4001},
         {"control": [4, 14, 3, 2, 1, *[1] * 20, *[65] * 160], "ids": [1, 3, 1, 1]},
@@ -183,7 +226,11 @@ LAYOUTS = {
     "ten nodes": ({"nel8": -2}, {"elements": [1] * 4}, 0),
     "ten nodes behind the ids": ({"nel8": -2}, {"ids": [1] * 4}, 0),
     "rigid bodies": ({"ndim": 8}, {"ids": [2, 1, 3, 1, 2, 3, 1, 1, 2, 0, 0]}, 2 * 24),
-    "few values of rigid bodies": ({"ndim": 9}, {"ids": [1, 1, 1, 1, 0, 1, 1, 1, 0, *[0] * 4, 9, 1, *[0] * 4]}, 18),
+    "few values of rigid bodies": (
+        {"ndim": 9},
+        {"ids": [1, 1, 1, 1, 0, 1, 1, 1, 0, *[0] * 4, 9, 1, *[0] * 4]},
+        18,
+    ),
     "a road": ({"ndim": 6}, {"ids": [2, 3, 1, 0, *[1] * 8, 9, 3, *[1] * 12]}, 6),
     "adapted elements": ({"nadapt": 2}, {"ids": [1] * 4}, 0),
     "shells of eight nodes": ({"nel48": 2}, {"ids": [1] * 10}, 0),
@@ -216,8 +263,18 @@ def test_a_d3thdt_is_read_by_itself_and_before_a_d3plot(tmp_path: Path) -> None:
 @pytest.mark.parametrize("release", [960.0, 971.0])
 def test_older_files_have_fewer_values(release: float, tmp_path: Path) -> None:
     """Before 971 a rigid wall has its force alone; still older files have no hourglass energy of parts."""
-    made = [State(**{**vars(one), "walls": [3.0, 4.0] if release < 971 else [3.0, 4.0, *[0.0] * 6]}) for one in STATES]
-    run = opened(tmp_path, D3plotWriter(walls=2, name="    ", release=release).written(made))
+    made = [
+        State(
+            **{
+                **vars(one),
+                "walls": [3.0, 4.0] if release < 971 else [3.0, 4.0, *[0.0] * 6],
+            }
+        )
+        for one in STATES
+    ]
+    run = opened(
+        tmp_path, D3plotWriter(walls=2, name="    ", release=release).written(made)
+    )
     assert run.databases[0].channel("rigid_wall_2_force").tolist() == [4.0] * 5
     made = [State(**{**vars(one), "hourglass": []}) for one in STATES]
     run = opened(tmp_path / "older", D3plotWriter(values_of_part=6).written(made))
@@ -229,18 +286,28 @@ def test_older_files_have_fewer_values(release: float, tmp_path: Path) -> None:
 def test_parts_without_a_list_of_ids_have_those_of_their_titles(tmp_path: Path) -> None:
     run = opened(tmp_path, D3plotWriter(numbered=False).written(STATES))
     holds(run, STATES)
-    run = opened(tmp_path / "untitled", D3plotWriter(numbered=False, titles=()).written(STATES))
+    run = opened(
+        tmp_path / "untitled", D3plotWriter(numbered=False, titles=()).written(STATES)
+    )
     assert [part.id for part in run.parts] == [1, 2]
 
 
-def test_values_that_fit_no_number_of_parts_are_not_given_to_parts(tmp_path: Path) -> None:
-    run = opened(tmp_path, D3plotWriter(control={"nglbv": 19}, more_of_state=-1).written(STATES))
+def test_values_that_fit_no_number_of_parts_are_not_given_to_parts(
+    tmp_path: Path,
+) -> None:
+    run = opened(
+        tmp_path, D3plotWriter(control={"nglbv": 19}, more_of_state=-1).written(STATES)
+    )
     assert run.databases[0].channel("kinetic_energy").size == 5
-    with pytest.raises(FormatError, match="13 values for 2 parts, which cannot be told apart"):
+    with pytest.raises(
+        FormatError, match="13 values for 2 parts, which cannot be told apart"
+    ):
         run.part_energies(())
 
 
-def test_states_of_another_length_than_the_head_says_are_refused(tmp_path: Path) -> None:
+def test_states_of_another_length_than_the_head_says_are_refused(
+    tmp_path: Path,
+) -> None:
     files = D3plotWriter(more_of_state=5).written(STATES, 5)
     reason = r"d3plot01: its states are \d+ bytes together, one of \d+ bytes each by the head; that layout is not known"
     with pytest.raises(FormatError, match=reason):
@@ -249,20 +316,31 @@ def test_states_of_another_length_than_the_head_says_are_refused(tmp_path: Path)
 
 def test_times_that_are_none_are_refused(tmp_path: Path) -> None:
     files = D3plotWriter(more_of_state=5).written(STATES, 5)
-    files["d3plot01"] = files["d3plot01"].rstrip(b"\0")[:-4]  # without the mark, which would tell
+    files["d3plot01"] = files["d3plot01"].rstrip(b"\0")[
+        :-4
+    ]  # without the mark, which would tell
     with pytest.raises(
-        FormatError, match=r"d3plot01: a state was expected at byte \d+, with a time above that of the one"
+        FormatError,
+        match=r"d3plot01: a state was expected at byte \d+, with a time above that of the one",
     ):
         opened(tmp_path, files)
 
 
-def test_a_geometry_that_does_not_end_where_the_head_says_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(FormatError, match=r"it has no end of the geometry at byte \d+, where its head says"):
+def test_a_geometry_that_does_not_end_where_the_head_says_is_refused(
+    tmp_path: Path,
+) -> None:
+    with pytest.raises(
+        FormatError,
+        match=r"it has no end of the geometry at byte \d+, where its head says",
+    ):
         opened(tmp_path, D3plotWriter(sections={"ids": [0, 0, 0]}).written(STATES))
 
 
 def test_ids_that_do_not_fit_their_section_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(FormatError, match=r"it has a section of ids of \d+ words, not of \d+; the file is damaged"):
+    with pytest.raises(
+        FormatError,
+        match=r"it has a section of ids of \d+ words, not of \d+; the file is damaged",
+    ):
         opened(tmp_path, D3plotWriter(control={"narbs": 40}).written(STATES))
 
 
@@ -273,11 +351,16 @@ def test_packed_families_are_named(tmp_path: Path) -> None:
 
 def test_a_file_behind_the_first_is_not_read_alone(tmp_path: Path) -> None:
     put(tmp_path, D3plotWriter().written(STATES))
-    with pytest.raises(FormatError, match=r"d3plot02: the first file of its family says what it holds; name .*d3plot,"):
+    with pytest.raises(
+        FormatError,
+        match=r"d3plot02: the first file of its family says what it holds; name .*d3plot,",
+    ):
         open_run([str(tmp_path / "d3plot02")])
 
 
-@pytest.mark.parametrize("names", [["d3plot*"], ["d3plot03", "d3plot", "d3plot01"], ["."]])
+@pytest.mark.parametrize(
+    "names", [["d3plot*"], ["d3plot03", "d3plot", "d3plot01"], ["."]]
+)
 def test_a_family_is_the_same_however_it_is_named(
     names: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -326,10 +409,18 @@ def test_in_a_folder_a_d3plot_gives_what_the_others_leave_out(tmp_path: Path) ->
 
 
 def test_in_a_folder_a_d3plot_that_cannot_be_read_stops_nothing(tmp_path: Path) -> None:
-    put(tmp_path, {**D3plotWriter(control={"nmmat": 76_893_465}).written(STATES), "glstat": GLSTAT})
+    put(
+        tmp_path,
+        {
+            **D3plotWriter(control={"nmmat": 76_893_465}).written(STATES),
+            "glstat": GLSTAT,
+        },
+    )
     run = open_run([str(tmp_path)])
     assert run.sources == (str(tmp_path / "glstat"),)
-    assert run.notes[0].endswith("name the glstat or binout of the run; it was not used")
+    assert run.notes[0].endswith(
+        "name the glstat or binout of the run; it was not used"
+    )
 
 
 def test_a_file_that_is_written_anew_meanwhile_is_refused(tmp_path: Path) -> None:
@@ -352,14 +443,27 @@ def test_more_files_than_a_process_may_have_open_are_read(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(("per_period", "is_told"), [(12, False), (4, True)])
-def test_a_level_that_too_few_states_show_is_told(per_period: int, is_told: bool, tmp_path: Path) -> None:
+def test_a_level_that_too_few_states_show_is_told(
+    per_period: int, is_told: bool, tmp_path: Path
+) -> None:
     time = np.arange(60.0)
     energy = 2 + np.cos(2 * np.pi * time / per_period + 0.3)
-    made = [State(t, [1.0], [e], [[1.0, 0, 0]], [2.0], [0.0], [0, 0, 0]) for t, e in zip(time, energy, strict=True)]
+    made = [
+        State(t, [1.0], [e], [[1.0, 0, 0]], [2.0], [0.0], [0, 0, 0])
+        for t, e in zip(time, energy, strict=True)
+    ]
     first = put(tmp_path, D3plotWriter(ids=(1,), titles=()).written(made, 10))
     suggestion = suggest(read(str(first)), td=40.5, after=3.0)
-    told = [caution.message for caution in suggestion.cautions if caution.code == "few-states"]
+    told = [
+        caution.message
+        for caution in suggestion.cautions
+        if caution.code == "few-states"
+    ]
     assert bool(told) == is_told
     if told:
-        assert told[0].startswith("38 states of the d3plot up to td = 40.5 do not show how the energy swings")
-        assert told[0].endswith("name what was written more often: d3thdt, glstat, matsum, binout")
+        assert told[0].startswith(
+            "38 states of the d3plot up to td = 40.5 do not show how the energy swings"
+        )
+        assert told[0].endswith(
+            "name what was written more often: d3thdt, glstat, matsum, binout"
+        )

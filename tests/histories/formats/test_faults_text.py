@@ -8,13 +8,24 @@ from hypothesis import given
 
 from d2rpick.base.errors import FormatError
 from d2rpick.histories.formats import glstat, matsum
-from tests.faults import FAULTS, Fault, cases, damage, glstat_states, is_within, matsum_states
+from tests.faults import (
+    FAULTS,
+    Fault,
+    cases,
+    damage,
+    glstat_states,
+    is_within,
+    matsum_states,
+)
 from tests.text_files import glstat_text, matsum_text
 
 IDS = [1, 12, 13]
 GLSTAT = glstat_text(np.arange(8) / 8, np.arange(8) ** 3 - 10)
 MATSUM = {
-    lines: matsum_text(np.arange(8) / 8, IDS, 10.0 * np.arange(8)[:, None] + np.array(IDS), lines) for lines in (3, 4)
+    lines: matsum_text(
+        np.arange(8) / 8, IDS, 10.0 * np.arange(8)[:, None] + np.array(IDS), lines
+    )
+    for lines in (3, 4)
 }
 
 
@@ -45,7 +56,9 @@ def check_glstat(faults: list[Fault]) -> bool:
 
 def check_matsum(faults: list[Fault], lines: int) -> bool:
     whole = MATSUM[lines]
-    text = damage(whole, faults, sorted(borders(whole, b" time =") + borders(whole, b" mat.#=")))
+    text = damage(
+        whole, faults, sorted(borders(whole, b" time =") + borders(whole, b" mat.#="))
+    )
     readable = 0
     for ids in ([12], IDS):
         try:
@@ -55,10 +68,17 @@ def check_matsum(faults: list[Fault], lines: int) -> bool:
             continue
         readable += 1
         for column, id_ in enumerate(ids):
-            found = [(time, row[column]) for time, row in zip(run.part_time.tolist(), energies, strict=True)]
+            found = [
+                (time, row[column])
+                for time, row in zip(run.part_time.tolist(), energies, strict=True)
+            ]
             states = matsum_states(text, id_)
             # Of a part read alone the lines are compared, not those of other parts that may bear its number.
-            assert is_within(found, states, most=1 if ids == IDS else 2), (id_, found, states)
+            assert is_within(found, states, most=1 if ids == IDS else 2), (
+                id_,
+                found,
+                states,
+            )
             assert len(found) >= len(states) - legs(text), (found, states)
         assert run.complete or run.notes
     return readable > 0
@@ -87,26 +107,38 @@ def test_a_first_line_longer_than_any_is_no_fault() -> None:
 
 
 @pytest.mark.parametrize("byte", [b"\0", b" ", b"*", b"\xff"])
-@pytest.mark.parametrize("line", [b" time step", b" kinetic", b" internal", b" total energy.", b" time per"])
+@pytest.mark.parametrize(
+    "line", [b" time step", b" kinetic", b" internal", b" total energy.", b" time per"]
+)
 def test_states_of_glstat_that_were_blanked_from_line_to_like_line_are_not_lost_silently(
     byte: bytes, line: bytes
 ) -> None:
     """What is left between two of the same lines is a state with all lines, one of them very long."""
     first, last = (borders(GLSTAT, line)[state] for state in (2, 5))
     for inside in (0, 20):
-        blank = GLSTAT[: first + inside] + byte * (last - first) + GLSTAT[last + inside :]
-        with pytest.raises(FormatError, match=r"missing, cut or doubled|a number in its columns"):
+        blank = (
+            GLSTAT[: first + inside] + byte * (last - first) + GLSTAT[last + inside :]
+        )
+        with pytest.raises(
+            FormatError, match=r"missing, cut or doubled|a number in its columns"
+        ):
             glstat.Glstat(blank, "glstat").channel("internal energy")
 
 
-@pytest.mark.parametrize("line", [b" mat.#=   12", b" x-rbv", b" y-mom", b" mat.#=   13"])
-def test_states_of_matsum_that_were_blanked_from_line_to_like_line_are_not_lost_silently(line: bytes) -> None:
+@pytest.mark.parametrize(
+    "line", [b" mat.#=   12", b" x-rbv", b" y-mom", b" mat.#=   13"]
+)
+def test_states_of_matsum_that_were_blanked_from_line_to_like_line_are_not_lost_silently(
+    line: bytes,
+) -> None:
     text = MATSUM[4]
     of_state = text[borders(text, b" time =")[0] :].index(line)
     first, last = (borders(text, b" time =")[state] + of_state for state in (2, 5))
     for inside in (0, 9):
         blank = text[: first + inside] + bytes(last - first) + text[last + inside :]
-        with pytest.raises(FormatError, match=r"missing, cut or doubled|a number in its columns"):
+        with pytest.raises(
+            FormatError, match=r"missing, cut or doubled|a number in its columns"
+        ):
             matsum.Matsum(blank, "matsum").part_channel("internal_energy", IDS)
 
 
@@ -117,7 +149,9 @@ def test_a_fragment_of_another_state_is_refused() -> None:
     torn = states[4][: energy + 27] + states[2][states[2].index(b" hourglass") :]
     doubled = states[4][:energy] + states[2][states[2].index(b" kinetic") :]
     for mixed in (torn, doubled):
-        run = glstat.Glstat(b" dt of cycle".join([*states[:4], mixed, *states[5:]]), "glstat")
+        run = glstat.Glstat(
+            b" dt of cycle".join([*states[:4], mixed, *states[5:]]), "glstat"
+        )
         with pytest.raises(FormatError, match="missing, cut or doubled"):
             run.channel("internal energy")
         with pytest.raises(FormatError, match="missing, cut or doubled"):

@@ -22,30 +22,51 @@ Sizes = dict[str, int]  # how many blocks and numbers are looked at together
 def damaged(draw: st.DrawFn, *, parts: bool) -> bytes:
     """States of which some numbers never change, with a few bytes replaced, lost or put in; maybe cut."""
     states = draw(st.integers(1, 12))
-    energies = np.random.default_rng(draw(st.integers(0, 99))).normal(size=(states, len(IDS)))
-    energies[draw(st.integers(0, states)) :, draw(st.integers(0, 2))] = draw(st.sampled_from([0.0, -0.0, 2.5]))
+    energies = np.random.default_rng(draw(st.integers(0, 99))).normal(
+        size=(states, len(IDS))
+    )
+    energies[draw(st.integers(0, states)) :, draw(st.integers(0, 2))] = draw(
+        st.sampled_from([0.0, -0.0, 2.5])
+    )
     time = np.arange(states) / 8
-    text = bytearray(matsum_text(time, IDS, energies) if parts else glstat_text(time, energies[:, 0]))
-    numbers = [one.end() - 6 for one in re.finditer(rb"(inten=|internal energy|time[. ]).*?E[+-]\d\d", text)]
+    text = bytearray(
+        matsum_text(time, IDS, energies) if parts else glstat_text(time, energies[:, 0])
+    )
+    numbers = [
+        one.end() - 6
+        for one in re.finditer(rb"(inten=|internal energy|time[. ]).*?E[+-]\d\d", text)
+    ]
     anywhere = st.integers(len(text) // 3, len(text))
     for place in draw(st.lists(st.sampled_from(numbers) | anywhere, max_size=3)):
         new = draw(st.sampled_from([b"*", b"7", b"", b"\n", b" 1 "]))
         text[place : place + len(new) + draw(st.sampled_from([0, 0, 0, 1]))] = new
-    return bytes(text[: draw(st.integers(len(text) // 2, len(text)))] if draw(st.booleans()) else text)
+    return bytes(
+        text[: draw(st.integers(len(text) // 2, len(text)))]
+        if draw(st.booleans())
+        else text
+    )
 
 
 def energies_of_model(data: bytes, sizes: Sizes) -> tuple[bytes, ...]:
     run = type("Sized", (Glstat,), sizes)(data, "glstat", ["internal energy"])
-    return run.time.tobytes(), run.channel("internal energy").tobytes(), run.channel("kinetic energy").tobytes()
+    return (
+        run.time.tobytes(),
+        run.channel("internal energy").tobytes(),
+        run.channel("kinetic energy").tobytes(),
+    )
 
 
 def energies_of_parts(data: bytes, sizes: Sizes) -> tuple[bytes, ...]:
     run = type("Sized", (Matsum,), sizes)(data, "matsum")
     asked = ([20], IDS, IDS[::-1])
-    return run.part_time.tobytes(), *(run.part_channel("internal_energy", ids).tobytes() for ids in asked)
+    return run.part_time.tobytes(), *(
+        run.part_channel("internal_energy", ids).tobytes() for ids in asked
+    )
 
 
-def answer(read: Callable[[bytes, Sizes], tuple[bytes, ...]], data: bytes, sizes: Sizes) -> object:
+def answer(
+    read: Callable[[bytes, Sizes], tuple[bytes, ...]], data: bytes, sizes: Sizes
+) -> object:
     """What is read; None where it is refused, for whichever of several damages."""
     try:
         return read(data, sizes)
@@ -82,23 +103,36 @@ def test_what_is_taken_ahead_is_not_fetched() -> None:
     data = Noted(glstat_text(states, states**2))
     run = Glstat(data, "glstat", ["internal energy"])
     assert run.channel("internal energy").tolist() == (states**2).tolist()
-    assert data.taken == 4  # of the springs, which never change, and of the last state, behind which no other begins
+    assert (
+        data.taken == 4
+    )  # of the springs, which never change, and of the last state, behind which no other begins
 
 
-def test_all_other_columns_are_read_in_one_pass_and_a_damaged_one_is_refused_alone() -> None:
+def test_all_other_columns_are_read_in_one_pass_and_a_damaged_one_is_refused_alone() -> (
+    None
+):
     states = np.arange(200.0)
     text = glstat_text(states, states)
-    sound, damaged = Noted(text), text.replace(b"work..................   7.0", b"work..................   *.0", 1)
+    sound, damaged = (
+        Noted(text),
+        text.replace(
+            b"work..................   7.0", b"work..................   *.0", 1
+        ),
+    )
     run = Glstat(sound, "glstat", ["internal energy"])
     run.channel("external work")
     once = sound.taken
     found = {name: run.channel(name).tolist() for name in run.channels}
     assert sound.taken == once
     hurt = Glstat(damaged, "glstat", ["internal energy"])
-    with pytest.raises(FormatError, match=r"'external work' is '\*\.00000E\+00', a number"):
+    with pytest.raises(
+        FormatError, match=r"'external work' is '\*\.00000E\+00', a number"
+    ):
         hurt.channel("external work")
     others = [name for name in hurt.channels if name != "external work"]
-    assert {name: hurt.channel(name).tolist() for name in others} == {name: found[name] for name in others}
+    assert {name: hurt.channel(name).tolist() for name in others} == {
+        name: found[name] for name in others
+    }
 
 
 def test_damage_to_a_number_taken_ahead_is_named_with_its_line() -> None:
@@ -107,7 +141,9 @@ def test_damage_to_a_number_taken_ahead_is_named_with_its_line() -> None:
     run = Glstat(text, "glstat", ["internal energy"])
     assert run.time.tolist() == states.tolist()
     line = 1 + text[: text.index(b"*25")].count(b"\n")
-    with pytest.raises(FormatError, match=rf"^glstat:{line}: 'internal energy' is '1.00\*25E\+02'"):
+    with pytest.raises(
+        FormatError, match=rf"^glstat:{line}: 'internal energy' is '1.00\*25E\+02'"
+    ):
         run.channel("internal energy")
 
 
@@ -125,13 +161,24 @@ def test_blocks_whose_length_varies_are_read(lengths: int) -> None:
 
 
 @given(st.lists(st.floats(-1e308, 1e308), min_size=1, max_size=50), st.integers(1, 9))
-def test_numbers_are_those_of_float_bit_for_bit(values: list[float], decimals: int) -> None:
+def test_numbers_are_those_of_float_bit_for_bit(
+    values: list[float], decimals: int
+) -> None:
     texts = [f"{value:.{decimals}E}" for value in values]
     fields = np.array([text.rjust(decimals + 10).encode() for text in texts])
-    assert decode(fields, decimals).tobytes() == np.array([float(text) for text in texts]).tobytes()
+    assert (
+        decode(fields, decimals).tobytes()
+        == np.array([float(text) for text in texts]).tobytes()
+    )
 
 
-@given(st.lists(st.text("0123456789+-.EeDd *Nna", min_size=14, max_size=14), min_size=1, max_size=20))
+@given(
+    st.lists(
+        st.text("0123456789+-.EeDd *Nna", min_size=14, max_size=14),
+        min_size=1,
+        max_size=20,
+    )
+)
 def test_odd_fields_are_float_or_nan(texts: list[str]) -> None:
     found = decode(np.array([text.encode() for text in texts]), 5)
     for text, value in zip(texts, found.tolist(), strict=True):

@@ -34,7 +34,9 @@ def line(label: str, value: object, suffix: str = "") -> str:
     return f" {label:.<31}{text:>14}{suffix}\n"
 
 
-def block(time: object, internal: object, *, controller: str = CONTROLLERS[0], gap: str = "\n") -> str:
+def block(
+    time: object, internal: object, *, controller: str = CONTROLLERS[0], gap: str = "\n"
+) -> str:
     return (
         f" dt of cycle      24 is controlled by {controller}\n"
         + gap
@@ -57,7 +59,9 @@ def block(time: object, internal: object, *, controller: str = CONTROLLERS[0], g
 
 
 STATES = ((0.0, 2e-20), (1.5e-3, 1.36945e-5), (2.75e-3, -8.05e2))
-WHOLE = HEAD + "".join(block(*state, controller=c) for state, c in zip(STATES, CONTROLLERS, strict=False))
+WHOLE = HEAD + "".join(
+    block(*state, controller=c) for state, c in zip(STATES, CONTROLLERS, strict=False)
+)
 
 
 def read(text: str | bytes, *energy: str) -> History:
@@ -69,33 +73,64 @@ SCENARIOS = {
     "as written": (WHOLE, STATES),
     "one state": (HEAD + block(0.0, 4.5), [(0.0, 4.5)]),
     "line ends of another system": (WHOLE.replace("\n", "\r\n"), STATES),
-    "no blank line behind the controller": (HEAD + block(0.0, 1.0, gap="") + block(1.0, 2.0, gap=""), [(0, 1), (1, 2)]),
+    "no blank line behind the controller": (
+        HEAD + block(0.0, 1.0, gap="") + block(1.0, 2.0, gap=""),
+        [(0, 1), (1, 2)],
+    ),
     "blocks without blank lines between": (re.sub("\n+", "\n", WHOLE), STATES),
     "title in latin-1": (WHOLE.replace("box", "Stoßfänger"), STATES),
     "every controller": (
-        HEAD + "".join(block(float(i), float(i), controller=c) for i, c in enumerate(CONTROLLERS)),
+        HEAD
+        + "".join(
+            block(float(i), float(i), controller=c) for i, c in enumerate(CONTROLLERS)
+        ),
         [(float(i), float(i)) for i in range(len(CONTROLLERS))],
     ),
     "Fortran's exponents": (
-        HEAD + block("1.00000D-03", "1.23457-100") + block("2.00000D-03", "-4.94066-300") + block(".3E+00", "+1.0E+00"),
+        HEAD
+        + block("1.00000D-03", "1.23457-100")
+        + block("2.00000D-03", "-4.94066-300")
+        + block(".3E+00", "+1.0E+00"),
         [(1e-3, 1.23457e-100), (2e-3, -4.94066e-300), (0.3, 1.0)],
     ),
-    "values before the first time line": (WHOLE[WHOLE.index(" time step") :], STATES[1:]),
+    "values before the first time line": (
+        WHOLE[WHOLE.index(" time step") :],
+        STATES[1:],
+    ),
     "trailing blanks": (WHOLE.replace("\n", "  \n"), STATES),
-    "a title like data": (WHOLE.replace(" Internal energy of a time box, 1.0E+00", line("time", 9.0)[:-1]), STATES),
+    "a title like data": (
+        WHOLE.replace(
+            " Internal energy of a time box, 1.0E+00", line("time", 9.0)[:-1]
+        ),
+        STATES,
+    ),
     "a line more in one state": (
-        WHOLE.replace(line("eroded internal energy", 77.0), " body row1= 0.1 0.2 0.3\n", 1),
+        WHOLE.replace(
+            line("eroded internal energy", 77.0), " body row1= 0.1 0.2 0.3\n", 1
+        ),
         STATES,
     ),
     "a line more in the last state": (WHOLE + line("percentage increase", 1.0), STATES),
     "no hourglass line": (WHOLE.replace(line("hourglass energy ", 0.0), ""), STATES),
     KILLED: (
-        HEAD + block(0.0, 1.0) + block(1.0, 9.0)[:500] + HEAD + block(1.0, 2.0) + block(2.0, 3.0),
+        HEAD
+        + block(0.0, 1.0)
+        + block(1.0, 9.0)[:500]
+        + HEAD
+        + block(1.0, 2.0)
+        + block(2.0, 3.0),
         [(0, 1), (1, 2), (2, 3)],
     ),
-    "equal times, the last counts": (HEAD + block(0.0, 1.0) + block(0.0, 2.0) + block(1.0, 3.0), [(0, 2), (1, 3)]),
+    "equal times, the last counts": (
+        HEAD + block(0.0, 1.0) + block(0.0, 2.0) + block(1.0, 3.0),
+        [(0, 2), (1, 3)],
+    ),
     "restart, the newer leg counts": (
-        HEAD + "".join(block(float(t), e) for t, e in ((0, 1.0), (1, 2.0), (2, 3.0), (1, 5.0), (2, 6.0))),
+        HEAD
+        + "".join(
+            block(float(t), e)
+            for t, e in ((0, 1.0), (1, 2.0), (2, 3.0), (1, 5.0), (2, 6.0))
+        ),
         [(0, 1), (1, 5), (2, 6)],
     ),
     "mass properties between": (
@@ -122,8 +157,13 @@ def test_scenario(name: str) -> None:
 def test_notes_say_what_was_left_out() -> None:
     assert read(WHOLE).notes == ()
     assert "no head" in read(WHOLE[WHOLE.index(" time step") :]).notes[0]
-    assert "same printed time" in read(HEAD + block(0.0, 1.0) + block(0.0, 2.0)).notes[0]
-    assert "a leg of the run ends within the state of line 29" in read(SCENARIOS[KILLED][0]).notes[0]
+    assert (
+        "same printed time" in read(HEAD + block(0.0, 1.0) + block(0.0, 2.0)).notes[0]
+    )
+    assert (
+        "a leg of the run ends within the state of line 29"
+        in read(SCENARIOS[KILLED][0]).notes[0]
+    )
     assert "kinetic" in read(WHOLE, "kinetic energy").notes[0]
 
 
@@ -131,7 +171,10 @@ def test_a_head_alone_is_a_legal_file_without_states() -> None:
     run = run_of(glstat, HEAD)
     assert run.databases[0].span is None
     assert run.databases[0].complete
-    assert run.databases[0].version == "ls-dyna smp d R16 R16.1_180_d50332d date 07/09/2025"
+    assert (
+        run.databases[0].version
+        == "ls-dyna smp d R16 R16.1_180_d50332d date 07/09/2025"
+    )
     assert run.databases[0].title == "Internal energy of a time box, 1.0E+00"
 
 
@@ -160,8 +203,14 @@ NO_NUMBER = "glstat:32: 'internal energy' is '{}', a number in its columns was e
 NOT_ONCE = "glstat:29: 'internal energy' is missing, cut or doubled in the state that begins here"
 REFUSED = {
     "no state": (HEAD, "no states"),
-    "no state, one controller": (HEAD + " dt of cycle       1 is controlled by dt2ms\n", "no states"),
-    "a time that is none": (HEAD + block(0.0, 1.0) + block("Infinity", 1.0), "'time' is 'Infinity'"),
+    "no state, one controller": (
+        HEAD + " dt of cycle       1 is controlled by dt2ms\n",
+        "no states",
+    ),
+    "a time that is none": (
+        HEAD + block(0.0, 1.0) + block("Infinity", 1.0),
+        "'time' is 'Infinity'",
+    ),
     "a state without its time": (
         WHOLE.replace(line("time", 1.5e-3), ""),
         "'internal energy' is missing, cut or doubled",
@@ -170,7 +219,10 @@ REFUSED = {
         HEAD + block(0.0, None) + block(1.0, None),
         "no internal energy; choose with `energy`: time",
     ),
-    "time at random": (HEAD + "".join(block(float(t), 1.0) for t in (5, 1, 4, 2, 3)), "glstat: time steps back"),
+    "time at random": (
+        HEAD + "".join(block(float(t), 1.0) for t in (5, 1, 4, 2, 3)),
+        "glstat: time steps back",
+    ),
     "line missing": (WHOLE.replace(GOOD, ""), NOT_ONCE),
     "line twice": (WHOLE.replace(GOOD, 2 * GOOD), NOT_ONCE),
     "wider than its column": (WHOLE.replace(GOOD, GOOD[:-1] + "1\n"), NOT_ONCE),
@@ -181,7 +233,16 @@ REFUSED = {
             WHOLE.replace("   1.36945E-05", f"{text:>14}"),
             NO_NUMBER.format(re.escape(text.strip())),
         )
-        for text in ("*" * 14, "NaN", "Infinity", "-1.#IND0E+00", "1.0_000E+00", "1.0E+999", "", "1.36945E-5 ")
+        for text in (
+            "*" * 14,
+            "NaN",
+            "Infinity",
+            "-1.#IND0E+00",
+            "1.0_000E+00",
+            "1.0E+999",
+            "",
+            "1.36945E-5 ",
+        )
     },
 }
 
@@ -196,8 +257,14 @@ def test_refused(name: str) -> None:
 @pytest.mark.parametrize(
     ("asked", "reason"),
     [
-        (("kinetik energy",), "did you mean 'kinetic energy'.*there are: time step, kinetic energy, internal energy"),
-        (("stonewall energy",), "no 'stonewall energy' .did you mean 'stonewall energy wall# [12]'"),
+        (
+            ("kinetik energy",),
+            "did you mean 'kinetic energy'.*there are: time step, kinetic energy, internal energy",
+        ),
+        (
+            ("stonewall energy",),
+            "no 'stonewall energy' .did you mean 'stonewall energy wall# [12]'",
+        ),
         (("internal energy", "Internal Energy"), "given twice"),
         (("time",), "no 'time'"),
     ],
@@ -208,7 +275,12 @@ def test_labels_that_cannot_be_taken(asked: list[str], reason: str) -> None:
 
 
 def test_other_lines_of_a_damaged_state_are_still_good() -> None:
-    assert read(WHOLE.replace("   1.36945E-05", "           NaN"), "kinetic energy").time.size == 3
+    assert (
+        read(
+            WHOLE.replace("   1.36945E-05", "           NaN"), "kinetic energy"
+        ).time.size
+        == 3
+    )
 
 
 @pytest.mark.parametrize("energy", ["internal energy", "added mass"])
@@ -234,7 +306,10 @@ def test_a_file_cut_anywhere_never_yields_a_wrong_number(energy: str) -> None:
 def test_a_last_state_counts_for_the_lines_that_are_there() -> None:
     cut = WHOLE[: WHOLE.rindex(" hourglass") + 40]
     assert states_of(read(cut)) == list(STATES)
-    assert read(cut).notes[-1] == "the file ends within its last state, after the lines that were needed"
+    assert (
+        read(cut).notes[-1]
+        == "the file ends within its last state, after the lines that were needed"
+    )
     assert read(cut, "stonewall energy wall# 2").time.size == 3
     assert read(cut, "hourglass energy").time.size == 2
     assert not read(cut).complete
@@ -242,7 +317,12 @@ def test_a_last_state_counts_for_the_lines_that_are_there() -> None:
     at_its_end = WHOLE[: WHOLE.rindex(energy) + len(energy)]
     assert read(at_its_end).time.size == 2  # no line follows
     assert read(at_its_end + " ").time.size == 3
-    assert run_of(glstat, cut, selection=Selection(energy=("no such line",))).databases[0].time.size == 2
+    assert (
+        run_of(glstat, cut, selection=Selection(energy=("no such line",)))
+        .databases[0]
+        .time.size
+        == 2
+    )
 
 
 @pytest.mark.parametrize("damage", ["", " ", "0", "_", "*", "\n", "time"])

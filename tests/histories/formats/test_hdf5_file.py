@@ -20,12 +20,23 @@ from d2rpick.histories.opening import Selection
 from d2rpick.histories.source import Source
 from tests.computed import stored, unpacked
 from tests.faults import FAULTS, Fault, cases, damage
-from tests.hdf5_files import ENERGY, KINETIC, LAYOUTS, PARTS, TIME, lasso, plain, written
+from tests.hdf5_files import (
+    ENERGY,
+    KINETIC,
+    LAYOUTS,
+    PARTS,
+    TIME,
+    lasso,
+    plain,
+    written,
+)
 from tests.reading import history_of
 
 
 def read(file: io.BytesIO, *energy: str, time: str | None = None) -> History:
-    return history_of(hdf5_file, file.getvalue(), selection=Selection(time, energy), name="run.h5")
+    return history_of(
+        hdf5_file, file.getvalue(), selection=Selection(time, energy), name="run.h5"
+    )
 
 
 def saved(file: io.BytesIO) -> SavedBinout:
@@ -56,7 +67,9 @@ def test_every_layout_gives_the_numbers_put_in(layout: str) -> None:
 
 @pytest.mark.parametrize("user_block", [0, 512])
 @pytest.mark.parametrize("chunks", [None, True])
-def test_columns_that_make_most_of_a_file_are_read_where_they_lie(user_block: int, chunks: bool | None) -> None:
+def test_columns_that_make_most_of_a_file_are_read_where_they_lie(
+    user_block: int, chunks: bool | None
+) -> None:
     content, rng = io.BytesIO(), np.random.default_rng(1)
     time, energy = np.arange(5000, dtype=">f8"), rng.random((5000, 1)).astype("f4")
     with h5py.File(content, "w", userblock_size=user_block) as file:
@@ -65,7 +78,10 @@ def test_columns_that_make_most_of_a_file_are_read_where_they_lie(user_block: in
     history = read(content)
     assert history.time.tolist() == time.tolist()
     assert history.energy.tolist() == energy.ravel().tolist()
-    assert (history.time.flags.writeable, history.energy.flags.writeable) == (False, False)
+    assert (history.time.flags.writeable, history.energy.flags.writeable) == (
+        False,
+        False,
+    )
 
 
 def test_lasso_branches_have_each_their_own_time_and_parts_by_number() -> None:
@@ -75,14 +91,30 @@ def test_lasso_branches_have_each_their_own_time_and_parts_by_number() -> None:
     assert run.channel("kinetic_energy").tolist() == KINETIC.tolist()
     assert run.time.tolist() == TIME.tolist()
     assert run.part_time.tolist() == (TIME + 1e-6).tolist()
-    assert [(part.id, part.title) for part in run.parts] == [(1, "ground"), (101, "box")]
-    assert run.part_channel("internal_energy", [101, 1]).tolist() == PARTS[:, ::-1].tolist()
-    with pytest.raises(FormatError, match="matsum has not exactly one part 7; choose from 1, 101"):
+    assert [(part.id, part.title) for part in run.parts] == [
+        (1, "ground"),
+        (101, "box"),
+    ]
+    assert (
+        run.part_channel("internal_energy", [101, 1]).tolist()
+        == PARTS[:, ::-1].tolist()
+    )
+    with pytest.raises(
+        FormatError, match="matsum has not exactly one part 7; choose from 1, 101"
+    ):
         run.part_channel("internal_energy", [7])
 
 
 def test_a_single_part_or_state_may_lack_its_axis() -> None:
-    run = saved(of({"matsum/time": TIME, "matsum/internal_energy": ENERGY, "matsum/ids": np.array([3])}))
+    run = saved(
+        of(
+            {
+                "matsum/time": TIME,
+                "matsum/internal_energy": ENERGY,
+                "matsum/ids": np.array([3]),
+            }
+        )
+    )
     assert run.part_channel("internal_energy", [3])[:, 0].tolist() == ENERGY.tolist()
     with pytest.raises(FormatError, match="no glstat in this saved binout"):
         run.channel("internal_energy")
@@ -99,8 +131,18 @@ def test_matrix_of_another_shape_is_refused() -> None:
 
 
 def test_several_candidates_are_listed() -> None:
-    two = of({"a/time": TIME, "a/internal_energy": ENERGY, "b/time": TIME[:3], "b/internal_energy": ENERGY[:3]})
-    with pytest.raises(FormatError, match=r"2 columns .* a/internal_energy \(4\), b/internal_energy \(3\)"):
+    two = of(
+        {
+            "a/time": TIME,
+            "a/internal_energy": ENERGY,
+            "b/time": TIME[:3],
+            "b/internal_energy": ENERGY[:3],
+        }
+    )
+    with pytest.raises(
+        FormatError,
+        match=r"2 columns .* a/internal_energy \(4\), b/internal_energy \(3\)",
+    ):
         read(two)
     assert read(two, "/b/internal_energy").time.tolist() == TIME[:3].tolist()
 
@@ -108,38 +150,67 @@ def test_several_candidates_are_listed() -> None:
 def test_explicit_paths_win() -> None:
     history = read(written(plain), "kinetic_energy", "internal_energy", time="/time")
     assert history.energy.tolist() == (KINETIC + ENERGY).tolist()
-    assert read(written(lasso), "glstat/kinetic_energy").energy.tolist() == KINETIC.tolist()
-    with pytest.raises(FormatError, match=r"no column for 'kinetic'.*give its path: .*kinetic_energy \(4\)"):
+    assert (
+        read(written(lasso), "glstat/kinetic_energy").energy.tolist()
+        == KINETIC.tolist()
+    )
+    with pytest.raises(
+        FormatError,
+        match=r"no column for 'kinetic'.*give its path: .*kinetic_energy \(4\)",
+    ):
         read(written(plain), "kinetic")
 
 
 def test_unnamed_columns_have_to_be_named_by_the_user() -> None:
     unnamed = of({"data": np.column_stack([TIME, ENERGY])})
-    with pytest.raises(FormatError, match=r"no column .* data\[0\] \(4\), data\[1\] \(4\)"):
+    with pytest.raises(
+        FormatError, match=r"no column .* data\[0\] \(4\), data\[1\] \(4\)"
+    ):
         read(unnamed)
     assert read(unnamed, "data[1]", time="data[0]").energy.tolist() == ENERGY.tolist()
 
 
 @pytest.mark.parametrize(
     ("energy", "message"),
-    [(ENERGY[:3], "has 3 values, time has 4"), (np.array([1, np.nan, 2, 3]), "is nan at state 2")],
+    [
+        (ENERGY[:3], "has 3 values, time has 4"),
+        (np.array([1, np.nan, 2, 3]), "is nan at state 2"),
+    ],
 )
 def test_what_makes_no_history_is_refused(energy: object, message: str) -> None:
     with pytest.raises(FormatError, match=message):
         read(of({"time": TIME, "internal_energy": energy}))
 
 
-@pytest.mark.parametrize(("time", "refused"), [([0, 2, 1, 3], False), ([0, 3, 2, 1], True), ([0, 1, 0, 1], True)])
-def test_times_that_step_back_are_those_of_one_restart(time: list[float], refused: bool) -> None:
+@pytest.mark.parametrize(
+    ("time", "refused"),
+    [([0, 2, 1, 3], False), ([0, 3, 2, 1], True), ([0, 1, 0, 1], True)],
+)
+def test_times_that_step_back_are_those_of_one_restart(
+    time: list[float], refused: bool
+) -> None:
     with (
-        pytest.raises(FormatError, match=r"steps back from .* one restart were expected") if refused else nullcontext()
+        pytest.raises(
+            FormatError, match=r"steps back from .* one restart were expected"
+        )
+        if refused
+        else nullcontext()
     ):
         read(of({"time": np.array(time, float), "internal_energy": ENERGY}))
 
 
 def test_links_into_other_files_are_not_followed() -> None:
     with pytest.raises(FormatError, match="no column for the internal energy"):
-        read(of({"time": TIME, "internal_energy": h5py.ExternalLink("other.h5", "/internal_energy")}))
+        read(
+            of(
+                {
+                    "time": TIME,
+                    "internal_energy": h5py.ExternalLink(
+                        "other.h5", "/internal_energy"
+                    ),
+                }
+            )
+        )
 
 
 def test_shape_far_too_large_for_the_file_is_refused() -> None:
@@ -152,7 +223,10 @@ def test_shape_far_too_large_for_the_file_is_refused() -> None:
         read(written(write), "internal_energy", time="t")
 
 
-SMALL = {layout: written(LAYOUTS[layout]).getvalue() for layout in ("plain", "compound", "lasso")}
+SMALL = {
+    layout: written(LAYOUTS[layout]).getvalue()
+    for layout in ("plain", "compound", "lasso")
+}
 
 
 def check(layout: str, faults: list[Fault]) -> None:
@@ -165,7 +239,9 @@ def check(layout: str, faults: list[Fault]) -> None:
             values = leg.channel(name)
             with h5py.File(io.BytesIO(data)) as file:
                 path, _, field = name.rpartition("/")
-                found = file[path][field] if layout == "compound" else file[group][name][()]
+                found = (
+                    file[path][field] if layout == "compound" else file[group][name][()]
+                )
             assert values.tolist() == np.ravel(found).astype(float).tolist()
         if leg.parts:
             leg.part_channel("internal_energy", [part.id for part in leg.parts])
@@ -186,12 +262,21 @@ def test_damaged_files(faults: list[Fault]) -> None:
 
 def chunked(file: h5py.File) -> None:
     file.create_dataset("time", data=np.arange(40.0), chunks=(8,))
-    file.create_dataset("internal_energy", data=np.arange(40.0) % 7, chunks=(8,), compression="gzip", fletcher32=True)
+    file.create_dataset(
+        "internal_energy",
+        data=np.arange(40.0) % 7,
+        chunks=(8,),
+        compression="gzip",
+        fletcher32=True,
+    )
 
 
 def test_bytes_behind_the_end_are_refused() -> None:
     content = written(plain).getvalue()
-    with pytest.raises(FormatError, match=f"{len(content) + 4} bytes, {len(content)} by its own header; it is damaged"):
+    with pytest.raises(
+        FormatError,
+        match=f"{len(content) + 4} bytes, {len(content)} by its own header; it is damaged",
+    ):
         history_of(hdf5_file, content + b"0000", name="run.h5")
 
 
@@ -224,7 +309,9 @@ def odd_integer() -> h5py.h5t.TypeIntegerID:
 
 
 @pytest.mark.parametrize("kind", [odd_float, odd_integer])
-def test_numbers_of_no_standard_type_are_refused(kind: Callable[[], h5py.h5t.TypeID]) -> None:
+def test_numbers_of_no_standard_type_are_refused(
+    kind: Callable[[], h5py.h5t.TypeID],
+) -> None:
     pair = h5py.h5t.create(h5py.h5t.COMPOUND, 32)
     pair.insert(b"t", 0, h5py.h5t.IEEE_F64LE)
     pair.insert(b"ie", 16, kind())
@@ -246,14 +333,30 @@ def test_numbers_of_no_standard_type_are_refused(kind: Callable[[], h5py.h5t.Typ
         write(file["matsum"], b"ids", kind())
 
     for damaged in (alone, together, saved_ids):
-        with pytest.raises(FormatError, match=r"numbers of [48] bytes that are no standard type of HDF5"):
+        with pytest.raises(
+            FormatError,
+            match=r"numbers of [48] bytes that are no standard type of HDF5",
+        ):
             read(written(damaged))
 
 
-@pytest.mark.parametrize("kind", [">f8", "<f4", ">f4", "<f2", "i1", ">i2", "<i4", ">i8", "u1", "<u2", ">u4", "<u8"])
+@pytest.mark.parametrize(
+    "kind",
+    [">f8", "<f4", ">f4", "<f2", "i1", ">i2", "<i4", ">i8", "u1", "<u2", ">u4", "<u8"],
+)
 def test_numbers_of_every_standard_type_are_read(kind: str) -> None:
-    history = read(of({"time": np.arange(9).astype(kind), "internal_energy": (np.arange(9) % 5).astype(kind)}))
-    assert (history.time.tolist(), history.energy.tolist()) == ([*range(9)], [i % 5 for i in range(9)])
+    history = read(
+        of(
+            {
+                "time": np.arange(9).astype(kind),
+                "internal_energy": (np.arange(9) % 5).astype(kind),
+            }
+        )
+    )
+    assert (history.time.tolist(), history.energy.tolist()) == (
+        [*range(9)],
+        [i % 5 for i in range(9)],
+    )
 
 
 def test_a_flipped_bit_in_data_with_a_checksum_is_refused() -> None:
@@ -281,13 +384,18 @@ class Endless(io.BytesIO):
 
 
 def test_a_crash_of_the_library_is_survived() -> None:
-    with pytest.raises(FormatError, match=r"run\.h5: the HDF5 library crashed on it \(signal 11\)"):
+    with pytest.raises(
+        FormatError, match=r"run\.h5: the HDF5 library crashed on it \(signal 11\)"
+    ):
         check_file(Fatal(written(plain).getvalue()), "run.h5")
 
 
 @pytest.mark.slow
 def test_a_library_that_comes_to_no_end_is_ended() -> None:
-    with pytest.raises(FormatError, match=r"run\.h5: the HDF5 library did not finish reading it; the file is damaged"):
+    with pytest.raises(
+        FormatError,
+        match=r"run\.h5: the HDF5 library did not finish reading it; the file is damaged",
+    ):
         check_file(Endless(written(plain).getvalue()), "run.h5", seconds=1)
 
 
@@ -299,7 +407,9 @@ def test_damaged_files_that_were_found_are_refused(name: str) -> None:
 
 def test_a_line_end_in_a_name_does_not_break_the_message() -> None:
     with pytest.raises(FormatError, match=r"internal_energ\\n \(21\)"):
-        read(io.BytesIO(unpacked(stored("faults/hdf5_newline_in_error.h5.gz"))), "energy")
+        read(
+            io.BytesIO(unpacked(stored("faults/hdf5_newline_in_error.h5.gz"))), "energy"
+        )
 
 
 def test_the_only_column_of_another_quantity_has_to_be_asked_for() -> None:
@@ -309,8 +419,12 @@ def test_the_only_column_of_another_quantity_has_to_be_asked_for() -> None:
     assert read(other, "kinetic_energy").energy.tolist() == KINETIC.tolist()
 
 
-def test_without_its_library_a_file_is_refused_with_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_its_library_a_file_is_refused_with_what_to_do(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     content = written(plain)
     monkeypatch.setitem(sys.modules, "h5py", None)
-    with pytest.raises(FormatError, match=r"run\.h5: HDF5 files need h5py; pip install h5py"):
+    with pytest.raises(
+        FormatError, match=r"run\.h5: HDF5 files need h5py; pip install h5py"
+    ):
         read(content)

@@ -10,11 +10,17 @@ from tests.text_files import HEAD, matsum_head, matsum_part, matsum_state, matsu
 
 TIMES = [0.0, 0.1, 0.25, 0.3]
 IDS = [10, 1, 123456]
-ENERGIES = np.array([[0.0, 1.0, 2.0], [3.0, -4.5, 5.0], [6.0, 7.0, 1e-22], [9.0, 10.0, 11.0]])
+ENERGIES = np.array(
+    [[0.0, 1.0, 2.0], [3.0, -4.5, 5.0], [6.0, 7.0, 1e-22], [9.0, 10.0, 11.0]]
+)
 TEXT = matsum_text(TIMES, IDS, ENERGIES)
-MASS = b"       Maximum mass increase in solid elements      =   0.2122E-07 ID=   36456\n"
+MASS = (
+    b"       Maximum mass increase in solid elements      =   0.2122E-07 ID=   36456\n"
+)
 LUMPED = matsum_part(0, 0.0, lines=3)
-STATES = [matsum_state(time, IDS, row) for time, row in zip(TIMES, ENERGIES, strict=True)]
+STATES = [
+    matsum_state(time, IDS, row) for time, row in zip(TIMES, ENERGIES, strict=True)
+]
 LONG = 150  # states, enough to remember what differs between them
 BEHIND_HEAD = TEXT.index(b"{BEGIN")
 
@@ -27,7 +33,10 @@ def assert_as_written(run: matsum.Matsum) -> None:
     assert run.part_time.tolist() == TIMES
     assert run.part_channel("internal_energy", IDS).tolist() == ENERGIES.tolist()
     for column, id_ in enumerate(IDS):
-        assert run.part_channel("internal_energy", [id_])[:, 0].tolist() == ENERGIES[:, column].tolist()
+        assert (
+            run.part_channel("internal_energy", [id_])[:, 0].tolist()
+            == ENERGIES[:, column].tolist()
+        )
 
 
 SAME = {
@@ -41,11 +50,16 @@ SAME = {
     "titles like data": TEXT.replace(b"Part 10 ", b"mat.#=   10  inten=   1.0000E+00 "),
     "mass increase lines": TEXT.replace(b" time =   2.5", MASS + b" time =   2.5"),
     "lumped masses": TEXT.replace(b" mat.#=   10", LUMPED + b" mat.#=   10"),
-    "old, no eroded energies": TEXT.replace(b"     eroded_ie=   0.0000E+00     eroded_ke=   0.0000E+00", b""),
-    "added mass": TEXT.replace(
-        b"hgeng=   0.0000E+00", b"hgeng=   0.0000E+00     +mass=   0.0000E+00     eroded_he=   0.0000E+00"
+    "old, no eroded energies": TEXT.replace(
+        b"     eroded_ie=   0.0000E+00     eroded_ke=   0.0000E+00", b""
     ),
-    "parts in another order in state 3": TEXT.replace(STATES[2], matsum_state(TIMES[2], IDS[::-1], ENERGIES[2][::-1])),
+    "added mass": TEXT.replace(
+        b"hgeng=   0.0000E+00",
+        b"hgeng=   0.0000E+00     +mass=   0.0000E+00     eroded_he=   0.0000E+00",
+    ),
+    "parts in another order in state 3": TEXT.replace(
+        STATES[2], matsum_state(TIMES[2], IDS[::-1], ENERGIES[2][::-1])
+    ),
 }
 
 
@@ -58,7 +72,9 @@ def test_every_form_gives_the_same_numbers(text: bytes) -> None:
 
 
 @pytest.mark.parametrize("order", [(2, 0, 1), (0, 2, 1)])
-def test_parts_swapped_within_blocks_of_one_size_are_not_shifted(order: tuple[int, ...]) -> None:
+def test_parts_swapped_within_blocks_of_one_size_are_not_shifted(
+    order: tuple[int, ...],
+) -> None:
     """States look alike from their time lines, and at both ends; only when a part is read does the difference show."""
     ids, places = [11, 12, 13, *range(20, 30)], [*order, *range(3, 13)]
     energies = np.arange(8 * 13.0).reshape(8, 13)
@@ -71,11 +87,22 @@ def test_parts_swapped_within_blocks_of_one_size_are_not_shifted(order: tuple[in
 
 
 def test_part_that_comes_or_goes_is_refused_and_the_others_are_read() -> None:
-    states = [*STATES[:2], *(matsum_state(t, IDS[1:], e[1:]) for t, e in zip(TIMES[2:], ENERGIES[2:], strict=True))]
+    states = [
+        *STATES[:2],
+        *(
+            matsum_state(t, IDS[1:], e[1:])
+            for t, e in zip(TIMES[2:], ENERGIES[2:], strict=True)
+        ),
+    ]
     run = read(matsum_head(IDS) + b"".join(states))
     assert run.notes == ("only some states have part 10",)
-    assert run.part_channel("internal_energy", [1])[:, 0].tolist() == ENERGIES[:, 1].tolist()
-    with pytest.raises(FormatError, match="matsum:51: inten of part 10 is missing, cut or doubled"):
+    assert (
+        run.part_channel("internal_energy", [1])[:, 0].tolist()
+        == ENERGIES[:, 1].tolist()
+    )
+    with pytest.raises(
+        FormatError, match="matsum:51: inten of part 10 is missing, cut or doubled"
+    ):
         run.part_channel("internal_energy", [10])
 
 
@@ -84,98 +111,154 @@ def test_part_replaced_by_one_of_the_same_size_is_refused() -> None:
     run = read(matsum_head([*IDS, 20]) + b"".join(states))
     with pytest.raises(FormatError, match=r"inten of part .* is missing"):
         run.part_channel("internal_energy", [10])
-    assert run.part_channel("internal_energy", [1])[:, 0].tolist() == ENERGIES[:, 1].tolist()
+    assert (
+        run.part_channel("internal_energy", [1])[:, 0].tolist()
+        == ENERGIES[:, 1].tolist()
+    )
 
 
 def test_part_of_the_legend_that_is_in_no_state() -> None:
     run = read(TEXT.replace(matsum_head(IDS), matsum_head([*IDS, 7])))
     assert_as_written(run)
     assert run.notes == ("no state has part 7 of the legend",)
-    with pytest.raises(FormatError, match="matsum: no part 7; choose from 10, 1, 123456"):
+    with pytest.raises(
+        FormatError, match="matsum: no part 7; choose from 10, 1, 123456"
+    ):
         run.part_channel("internal_energy", [7])
 
 
 def test_id_that_overflows_is_the_one_of_the_legend() -> None:
-    text = TEXT.replace(b"=  123456", b"=********").replace(b"   123456 ", b"123456789 ")
+    text = TEXT.replace(b"=  123456", b"=********").replace(
+        b"   123456 ", b"123456789 "
+    )
     run = read(text)
-    assert run.part_channel("internal_energy", [123456789])[:, 0].tolist() == ENERGIES[:, 2].tolist()
+    assert (
+        run.part_channel("internal_energy", [123456789])[:, 0].tolist()
+        == ENERGIES[:, 2].tolist()
+    )
     assert run.notes == ()
 
 
 def test_two_ids_that_overflow_are_left_out() -> None:
     ids = [10, 123456, 223456]
-    text = matsum_text(TIMES, ids, ENERGIES).replace(b"=  123456", b"=********").replace(b"=  223456", b"=********")
-    text = text.replace(b"   123456 ", b"123456789 ").replace(b"   223456 ", b"223456789 ")
+    text = (
+        matsum_text(TIMES, ids, ENERGIES)
+        .replace(b"=  123456", b"=********")
+        .replace(b"=  223456", b"=********")
+    )
+    text = text.replace(b"   123456 ", b"123456789 ").replace(
+        b"   223456 ", b"223456789 "
+    )
     run = read(text)
     assert [part.id for part in run.parts] == [10]
-    assert "parts whose number is damaged or too wide for its columns were left out" in run.notes
-    assert run.part_channel("internal_energy", [10])[:, 0].tolist() == ENERGIES[:, 0].tolist()
+    assert (
+        "parts whose number is damaged or too wide for its columns were left out"
+        in run.notes
+    )
+    assert (
+        run.part_channel("internal_energy", [10])[:, 0].tolist()
+        == ENERGIES[:, 0].tolist()
+    )
 
 
 def test_id_that_pushes_its_line() -> None:
     run = read(TEXT.replace(b"=  123456", b"=1234567890"))
-    assert run.part_channel("internal_energy", [1234567890])[:, 0].tolist() == ENERGIES[:, 2].tolist()
+    assert (
+        run.part_channel("internal_energy", [1234567890])[:, 0].tolist()
+        == ENERGIES[:, 2].tolist()
+    )
 
 
-@pytest.mark.parametrize("id_text", [b"=    1             i", b"=   10            i", b"=   1 0             i"])
+@pytest.mark.parametrize(
+    "id_text",
+    [b"=    1             i", b"=   10            i", b"=   1 0             i"],
+)
 def test_damaged_id_makes_no_other_part(id_text: bytes) -> None:
     """A digit or a blank lost, or one put in: the columns no longer fit."""
-    damaged = STATES[2].replace(b"=   10             i", id_text.replace(b"    1 ", b"   1 "))
+    damaged = STATES[2].replace(
+        b"=   10             i", id_text.replace(b"    1 ", b"   1 ")
+    )
     run = read(matsum_head(IDS) + b"".join([*STATES[:2], damaged, STATES[3]]))
     with pytest.raises(FormatError, match="inten of part 10 is missing"):
         run.part_channel("internal_energy", [10])
-    assert run.part_channel("internal_energy", [1])[:, 0].tolist() == ENERGIES[:, 1].tolist()
+    assert (
+        run.part_channel("internal_energy", [1])[:, 0].tolist()
+        == ENERGIES[:, 1].tolist()
+    )
 
 
 @pytest.mark.parametrize("changed", [None, 1, 64, LONG - 2, LONG - 1])
 @pytest.mark.parametrize("swapped", [False, True])
-def test_numbers_that_are_the_same_in_most_states(changed: int | None, swapped: bool) -> None:
+def test_numbers_that_are_the_same_in_most_states(
+    changed: int | None, swapped: bool
+) -> None:
     """Whether a number changes in no state, in one or in all, each state has its own."""
     times, ids = np.arange(LONG) / 8, [11, 12, 13, 14]
     energies = np.tile([0.0, -0.0, 2.5, 0.0], (LONG, 1))
     energies[:, 3] = np.arange(LONG)
     if changed is not None:
         energies[changed, :3] = [1e-22, 3.0, -0.0]
-    states = [matsum_state(time, ids, row) for time, row in zip(times, energies, strict=True)]
+    states = [
+        matsum_state(time, ids, row) for time, row in zip(times, energies, strict=True)
+    ]
     if swapped:
         states[100] = matsum_state(times[100], ids[::-1], energies[100, ::-1])
     run = read(matsum_head(ids) + b"".join(states))
-    for _ in range(2):  # the whole file is compared when it is asked for the second time, if not before
+    for _ in range(
+        2
+    ):  # the whole file is compared when it is asked for the second time, if not before
         for chosen in ([11], [12, 13], ids, ids[:3]):
             found = run.part_channel("internal_energy", chosen)
-            assert found.tobytes() == energies[:, [ids.index(id_) for id_ in chosen]].tobytes()
+            assert (
+                found.tobytes()
+                == energies[:, [ids.index(id_) for id_ in chosen]].tobytes()
+            )
         assert not run.part_channel("y_momentum", ids).any()
 
 
-def test_what_is_no_number_in_all_states_is_refused_with_the_line_of_the_first() -> None:
+def test_what_is_no_number_in_all_states_is_refused_with_the_line_of_the_first() -> (
+    None
+):
     text = matsum_text(np.arange(LONG), [11, 12], np.zeros((LONG, 2)))
     text = text.replace(b"y-mom=   0.0000E+00", b"y-mom=" + b"*" * 13)
     run = read(text)
     assert run.part_channel("internal_energy", [11, 12]).shape == (LONG, 2)
     line = 1 + text[: text.index(b"y-mom=*")].count(b"\n")
-    with pytest.raises(FormatError, match=rf"matsum:{line}: y-mom of part 11 is '\*+', a number in its columns"):
+    with pytest.raises(
+        FormatError,
+        match=rf"matsum:{line}: y-mom of part 11 is '\*+', a number in its columns",
+    ):
         run.part_channel("y_momentum", [11, 12])
 
 
-@pytest.mark.parametrize("field", [b"*************", b"          NaN", b"             ", b"   6.0000E+0 "])
+@pytest.mark.parametrize(
+    "field", [b"*************", b"          NaN", b"             ", b"   6.0000E+0 "]
+)
 def test_what_is_no_number_is_refused_with_its_line(field: bytes) -> None:
     run = read(TEXT.replace(b"   6.0000E+00", field))
     with pytest.raises(FormatError, match=r"^matsum:52: inten of part 10 is '"):
         run.part_channel("internal_energy", [1, 10])
-    assert run.part_channel("internal_energy", [1, 123456]).tolist() == ENERGIES[:, 1:].tolist()
+    assert (
+        run.part_channel("internal_energy", [1, 123456]).tolist()
+        == ENERGIES[:, 1:].tolist()
+    )
 
 
 def test_quantity_that_was_not_written_is_refused() -> None:
     run = read(matsum_text(TIMES, IDS, ENERGIES, lines=3))
     with pytest.raises(FormatError, match="hgeng of part 1 is missing"):
         run.part_channel("hourglass_energy", [1])
-    with pytest.raises(FormatError, match="no quantity 'mass' in a matsum, only internal_energy"):
+    with pytest.raises(
+        FormatError, match="no quantity 'mass' in a matsum, only internal_energy"
+    ):
         run.part_channel("mass", [1])
     with pytest.raises(FormatError, match="a matsum has parts only"):
         run.channel("internal energy")
 
 
-@pytest.mark.parametrize("text", [b"", b"\n", b"time,energy\n0,1\n", bytes(5000)], ids=range(4))
+@pytest.mark.parametrize(
+    "text", [b"", b"\n", b"time,energy\n0,1\n", bytes(5000)], ids=range(4)
+)
 def test_something_else_is_no_matsum(text: bytes) -> None:
     assert not matsum.recognises(text)
     with pytest.raises(FormatError, match="this is not a matsum"):
@@ -196,7 +279,12 @@ def test_cut_anywhere_gives_whole_states_only(lines: int, legend: bool) -> None:
         n = run.part_time.size
         assert run.part_time.tolist() == TIMES[:n]
         if n:
-            assert run.part_channel("internal_energy", IDS).tolist() == ENERGIES[:n].tolist(), end
+            assert (
+                run.part_channel("internal_energy", IDS).tolist()
+                == ENERGIES[:n].tolist()
+            ), end
         begun = sum(start + 20 < end for start in starts)
         assert begun - 1 <= n <= begun, end
-        assert run.complete == (n == begun and not text[:end].rpartition(b"\n")[2].strip()), end
+        assert run.complete == (
+            n == begun and not text[:end].rpartition(b"\n")[2].strip()
+        ), end

@@ -8,7 +8,9 @@ from d2rpick.histories.formats.plain_rows import exact_numbers
 from d2rpick.histories.history import Samples
 
 HARD = st.floats(-1e300, 1e300).map(repr) | st.from_regex(
-    r"-?[0-9]{1,25}(\.[0-9]{0,25})?([eE][+-]?[0-9]{1,2})?", fullmatch=True, alphabet=st.characters(codec="ascii")
+    r"-?[0-9]{1,25}(\.[0-9]{0,25})?([eE][+-]?[0-9]{1,2})?",
+    fullmatch=True,
+    alphabet=st.characters(codec="ascii"),
 )
 
 
@@ -20,16 +22,28 @@ def rounded(texts: list[list[str]]) -> Samples:
 @given(st.lists(st.tuples(HARD, HARD), min_size=1, max_size=40))
 def test_numbers_are_those_of_python(rows: list[tuple[str, str]]) -> None:
     cells = [[*row] for row in rows]
-    found = exact_numbers("".join(",".join(row) + "\n" for row in rows).encode(), ",", rounded(cells))
+    found = exact_numbers(
+        "".join(",".join(row) + "\n" for row in rows).encode(), ",", rounded(cells)
+    )
     assert found is not None
     assert found.tolist() == [[float(text) for text in row] for row in rows]
 
 
-@pytest.mark.parametrize("cell", ["1.5-003", "1d5", "1e", "2x", "1.2.3", "0x10", "1_0", "nan", "+1", "", " ", "1 2"])
+@pytest.mark.parametrize(
+    "cell",
+    ["1.5-003", "1d5", "1e", "2x", "1.2.3", "0x10", "1_0", "nan", "+1", "", " ", "1 2"],
+)
 @pytest.mark.parametrize("meant", [1.5e-3, 1e5, 7.0])
-def test_a_number_that_only_begins_like_one_is_not_trusted(cell: str, meant: float) -> None:
+def test_a_number_that_only_begins_like_one_is_not_trusted(
+    cell: str, meant: float
+) -> None:
     """Scipy reads 1.5-003, as Fortran writes 0.0015, as 1.5."""
-    assert exact_numbers(f"0,1\n1,{cell}\n".encode(), ",", np.array([[0.0, 1.0], [1.0, meant]])) is None
+    assert (
+        exact_numbers(
+            f"0,1\n1,{cell}\n".encode(), ",", np.array([[0.0, 1.0], [1.0, meant]])
+        )
+        is None
+    )
 
 
 @pytest.mark.parametrize("rows", ["1,2\n3\n", "1,2\n3,4\n5,6\n", "1;2\n3;4\n"])

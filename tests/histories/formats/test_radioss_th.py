@@ -25,41 +25,70 @@ FORMS: dict[str, Callable[[], T01Writer]] = {
 
 
 def opened(made: T01Writer | bytes) -> TimeHistory:
-    return TimeHistory(bytes(made.data) if isinstance(made, T01Writer) else made, "runT01")
+    return TimeHistory(
+        bytes(made.data) if isinstance(made, T01Writer) else made, "runT01"
+    )
 
 
 @pytest.mark.parametrize("globals_", [0, 12, 16, 22, 25])
-@pytest.mark.parametrize(("code", "title"), [(3040, 40), (3041, 80), (3050, 80), (4021, 100)])
+@pytest.mark.parametrize(
+    ("code", "title"), [(3040, 40), (3041, 80), (3050, 80), (4021, 100)]
+)
 @pytest.mark.parametrize("into", FORMS.values(), ids=FORMS.keys())
-def test_any_age_and_form_of_the_format(into: Callable[[], T01Writer], code: int, title: int, globals_: int) -> None:
-    parts = [MadePart(3, "box", material=123456), MadePart(12, "step"), MadePart(3, "half a box", is_group=True)]
+def test_any_age_and_form_of_the_format(
+    into: Callable[[], T01Writer], code: int, title: int, globals_: int
+) -> None:
+    parts = [
+        MadePart(3, "box", material=123456),
+        MadePart(12, "step"),
+        MadePart(3, "half a box", is_group=True),
+    ]
     made = t01(5, parts, globals_=globals_, code=code, title=title, made=into())
     written = printed if isinstance(made, T01TextWriter) else float
     assert recognises(bytes(made.data)[:300])
     run = opened(made)
     assert (run.complete, run.notes) == (True, ())
     assert run.time.tolist() == [state / 8 for state in range(5)]
-    assert (run.title, run.version) == ("made for tests", "Fri Nov 20 23:34:18 2026 RADIOSS OpenRadioss, linuxa64 gf")
+    assert (run.title, run.version) == (
+        "made for tests",
+        "Fri Nov 20 23:34:18 2026 RADIOSS OpenRadioss, linuxa64 gf",
+    )
     assert [(part.id, part.title) for part in run.parts] == [(3, "box"), (12, "step")]
     assert len(run.channels) == globals_
     for number, name in enumerate(run.channels, start=1):
-        assert run.channel(name).tolist() == [written(value(state, 0, number)) for state in range(5)]
-    for number, name in ((1, "internal_energy"), (5, "z_momentum"), (7, "hourglass_energy")):
-        expected = [[written(value(s, id_, number)) for id_ in (12, 3)] for s in range(5)]
+        assert run.channel(name).tolist() == [
+            written(value(state, 0, number)) for state in range(5)
+        ]
+    for number, name in (
+        (1, "internal_energy"),
+        (5, "z_momentum"),
+        (7, "hourglass_energy"),
+    ):
+        expected = [
+            [written(value(s, id_, number)) for id_ in (12, 3)] for s in range(5)
+        ]
         assert run.part_channel(name, [12, 3]).tolist() == expected
 
 
 @pytest.mark.parametrize("into", FORMS.values(), ids=FORMS.keys())
 def test_control_bytes_in_titles_are_blanks(into: Callable[[], T01Writer]) -> None:
-    made = bytes(t01(1, [MadePart(1, "part 7")], made=into()).data).replace(b"part 7", b"p\nrt\x007")
+    made = bytes(t01(1, [MadePart(1, "part 7")], made=into()).data).replace(
+        b"part 7", b"p\nrt\x007"
+    )
     assert opened(made).parts[0].title == "p rt 7"
 
 
-@pytest.mark.parametrize("path", [BOX, stored("rollover_r100_T02.gz"), stored("chain_referenceT01.gz")])
+@pytest.mark.parametrize(
+    "path", [BOX, stored("rollover_r100_T02.gz"), stored("chain_referenceT01.gz")]
+)
 def test_energies_of_the_parts_add_up_to_that_of_the_model(path: str) -> None:
     run = opened(unpacked(path))
-    total = run.part_channel("internal_energy", [part.id for part in run.parts]).sum(axis=1)
-    np.testing.assert_allclose(total, run.channel("internal_energy"), atol=1e-6 * total.max())
+    total = run.part_channel("internal_energy", [part.id for part in run.parts]).sum(
+        axis=1
+    )
+    np.testing.assert_allclose(
+        total, run.channel("internal_energy"), atol=1e-6 * total.max()
+    )
 
 
 def test_the_rollover_agrees_with_the_table_of_its_makers() -> None:
@@ -70,7 +99,9 @@ def test_the_rollover_agrees_with_the_table_of_its_makers() -> None:
     box = run.part_channel("internal_energy", [1])[at, 0]
     close = np.abs(run.time[at] - table["time_s"]) < 2e-6
     assert close.sum() > 500
-    np.testing.assert_allclose(box[close], table["boxIE_J"][close], rtol=1e-4, atol=1e-3)
+    np.testing.assert_allclose(
+        box[close], table["boxIE_J"][close], rtol=1e-4, atol=1e-3
+    )
 
 
 def test_legs_follow_one_another() -> None:
@@ -80,22 +111,31 @@ def test_legs_follow_one_another() -> None:
 
 
 def test_a_group_of_elements_is_no_part_and_its_energy_not_counted_twice() -> None:
-    run = opened(t01(2, [MadePart(1, "box"), MadePart(1, "half of the box", is_group=True)]))
+    run = opened(
+        t01(2, [MadePart(1, "box"), MadePart(1, "half of the box", is_group=True)])
+    )
     assert [(part.id, part.title) for part in run.parts] == [(1, "box")]
-    assert run.part_channel("internal_energy", [1])[:, 0].tolist() == [value(s, 1, 1) for s in range(2)]
+    assert run.part_channel("internal_energy", [1])[:, 0].tolist() == [
+        value(s, 1, 1) for s in range(2)
+    ]
 
 
 def test_a_part_without_variables_is_noted_and_refused() -> None:
     run = opened(t01(2, [MadePart(1, "box"), MadePart(2, "step", codes=())]))
     assert [part.id for part in run.parts] == [1]
     assert any("no variables of part 2 in the file" in note for note in run.notes)
-    with pytest.raises(FormatError, match="no internal_energy of part 2, parts with variables: 1;"):
+    with pytest.raises(
+        FormatError, match="no internal_energy of part 2, parts with variables: 1;"
+    ):
         run.part_channel("internal_energy", [2])
 
 
 def test_a_variable_that_was_not_asked_for_is_refused() -> None:
     run = opened(t01(2, [MadePart(1, "box", codes=(1, 2))]))
-    with pytest.raises(FormatError, match="no x_momentum of part 1, only internal_energy, kinetic_energy;"):
+    with pytest.raises(
+        FormatError,
+        match="no x_momentum of part 1, only internal_energy, kinetic_energy;",
+    ):
         run.part_channel("x_momentum", [1])
     with pytest.raises(FormatError, match="no global heat, there are internal_energy"):
         run.channel("heat")
@@ -110,7 +150,9 @@ def test_no_states_is_a_legal_file() -> None:
 @pytest.mark.parametrize("head", [b"", b"\0\0\0T", b"time,internal energy\n0,0\n"])
 def test_something_else_is_not_recognised_and_refused(head: bytes) -> None:
     assert not recognises(head)
-    with pytest.raises(FormatError, match="was expected in the head of the time history"):
+    with pytest.raises(
+        FormatError, match="was expected in the head of the time history"
+    ):
         opened(head)
 
 
@@ -120,7 +162,9 @@ def test_something_else_is_not_recognised_and_refused(head: bytes) -> None:
 def test_numbers_of_a_record_that_five_columns_do_not_count() -> None:
     parts = [MadePart(id_, "piece", tuple(range(1, 501))) for id_ in range(1, 202)]
     run = opened(t01(1, parts, made=T01TextWriter()))
-    assert run.part_channel("internal_energy", [201]).tolist() == [[printed(value(0, 201, 1))]]
+    assert run.part_channel("internal_energy", [201]).tolist() == [
+        [printed(value(0, 201, 1))]
+    ]
 
 
 @pytest.mark.parametrize("number", [-1.5e-120, 2.25e117, 0.0, -0.125])
@@ -131,12 +175,19 @@ def test_an_exponent_of_three_digits_stands_without_its_letter(number: float) ->
 
 
 @pytest.mark.parametrize(("single", "digits"), [(True, 7), (False, 9)])
-def test_numbers_have_the_digits_in_which_the_solver_computed(single: bool, digits: int) -> None:
+def test_numbers_have_the_digits_in_which_the_solver_computed(
+    single: bool, digits: int
+) -> None:
     made = t01(0, made=T01TextWriter())
     for time in np.arange(4) / 7:
-        made.state(float(np.float32(time)) if single else float(time), [0.0] * 22, [0.0] * 16)
+        made.state(
+            float(np.float32(time)) if single else float(time), [0.0] * 22, [0.0] * 16
+        )
     run = opened(made)
-    assert [precision.digits for precision in run.precisions(["mass"])] == [digits, digits]
+    assert [precision.digits for precision in run.precisions(["mass"])] == [
+        digits,
+        digits,
+    ]
 
 
 def test_legs_may_be_text_and_binary() -> None:
@@ -157,18 +208,27 @@ def test_legs_may_be_text_and_binary() -> None:
         (b"         7part 7", b"       1 7part 7"),
     ],
 )
-def test_a_head_that_does_not_hold_what_it_says_is_refused(line: bytes, damaged: bytes) -> None:
-    with pytest.raises(FormatError, match="was expected in the head of the time history near byte"):
+def test_a_head_that_does_not_hold_what_it_says_is_refused(
+    line: bytes, damaged: bytes
+) -> None:
+    with pytest.raises(
+        FormatError, match="was expected in the head of the time history near byte"
+    ):
         opened(SMALL.data.replace(line, damaged))
 
 
 CODED = "runT01\n00000318a title\nWed Apr 10 13:20:15 2024 RADIOSS Open\n0000000A0000000MZZZZZEOR\n"
 
 
-@pytest.mark.parametrize("text", [CODED, "ZZZZZEOR      84\n      3041a title\nZZZZZEOR      80\n"])
+@pytest.mark.parametrize(
+    "text", [CODED, "ZZZZZEOR      84\n      3041a title\nZZZZZEOR      80\n"]
+)
 def test_other_forms_of_text_are_refused_with_what_to_do(text: str) -> None:
     assert recognises(text.encode())
-    with pytest.raises(FormatError, match=r"runT01: .* as text, but not as /TFILE/3 writes it .*; let the run"):
+    with pytest.raises(
+        FormatError,
+        match=r"runT01: .* as text, but not as /TFILE/3 writes it .*; let the run",
+    ):
         opened(text.encode())
 
 
@@ -205,10 +265,17 @@ def test_a_number_that_is_none_is_refused() -> None:
 
 
 def test_an_additional_history_without_global_values_is_no_leg() -> None:
-    whole, additional = (bytes(t01(5, [MadePart(3, "box")], globals_=count).data) for count in (12, 0))
+    whole, additional = (
+        bytes(t01(5, [MadePart(3, "box")], globals_=count).data) for count in (12, 0)
+    )
     for order in (("RUNT01", "RUNT01a"), ("RUNT01a", "RUNT01")):
         contents = {"RUNT01": whole, "RUNT01a": additional}
-        legs = radioss_th.open_legs([Source(name, contents[name]) for name in order], Selection())
+        legs = radioss_th.open_legs(
+            [Source(name, contents[name]) for name in order], Selection()
+        )
         assert [leg.source for leg in legs] == ["RUNT01"]
-        assert "RUNT01a was left out: without global values it is no leg of the run" in legs[0].notes[-1]
+        assert (
+            "RUNT01a was left out: without global values it is no leg of the run"
+            in legs[0].notes[-1]
+        )
     assert radioss_th.open_legs([Source("RUNT01a", additional)], Selection())[0].parts

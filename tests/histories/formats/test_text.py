@@ -13,9 +13,10 @@ from d2rpick.histories.source import Source
 from tests.command import put
 from tests.reading import InPieces, on_disk
 
-CONTENTS = st.lists(st.sampled_from([b"0.125,17", b"\n", b"\r\n", b"\xc2\xb5s", b"\xb5", b""]), max_size=40).map(
-    b"".join
-)
+CONTENTS = st.lists(
+    st.sampled_from([b"0.125,17", b"\n", b"\r\n", b"\xc2\xb5s", b"\xb5", b""]),
+    max_size=40,
+).map(b"".join)
 
 
 class Small(Text):
@@ -55,7 +56,11 @@ def test_a_text_has_its_lines_from_a_disk_and_from_memory(
     lines = [*ended, last][skipped:] if rest and last else ended[skipped:]
     samples = []
     for found in (Small(Source("text", data)), on_a_disk(file)):
-        assert (found.unended, found.head, found.is_short) == (last, ended[:5], len(ended) <= 5)
+        assert (found.unended, found.head, found.is_short) == (
+            last,
+            ended[:5],
+            len(ended) <= 5,
+        )
         begin = found.place(skipped)
         if rest:
             found.take_rest()
@@ -78,8 +83,12 @@ def test_a_big_plain_text_is_not_taken_into_memory(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("new_files")
-@pytest.mark.parametrize("read", [lambda found: [*found.lines(0)], lambda found: found.sample(0)])
-def test_a_text_written_anew_since_it_was_opened_is_an_error(read: Callable[[Text], object], tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "read", [lambda found: [*found.lines(0)], lambda found: found.sample(0)]
+)
+def test_a_text_written_anew_since_it_was_opened_is_an_error(
+    read: Callable[[Text], object], tmp_path: Path
+) -> None:
     file = put(tmp_path / "text", b"0.125,17\n" * 50)
     found = on_a_disk(file)
     file.write_bytes(b"0.125,18\n" * 50)
