@@ -12,9 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from d2rpick.api import models
+from d2rpick.api import models, request
 from d2rpick.choice.quality import GRADES
-from d2rpick.cli import output
 from d2rpick.report.history_files import OSCILLATOR_WRITERS
 from tests.command import DECK, ENERGY, GLSTAT, ROOT, TIME_LIMIT
 
@@ -367,7 +366,7 @@ def test_no_garbage_is_looked_for_at_the_end() -> None:
 def test_the_command_line_offers_the_grades_and_the_formats_of_models_there_are() -> (
     None
 ):
-    assert output.GRADES == GRADES
+    assert request.GRADES == GRADES
     assert tuple(OSCILLATOR_WRITERS) == models.HISTORIES
 
 

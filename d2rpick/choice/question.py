@@ -69,6 +69,7 @@ class Settings:
     given instead of identified.  ``fit_window``: the oscillator is identified there.  ``replay`` False: judge by
     the energy level alone.  ``strict``: accept no tr of a flight that is not certain.
     ``keep_vibration``: grade the vibration by itself, however little its error is worth in the next contact.
+    ``min_quality``: least grade of a pair that is planned, and that a deck passes with.
     ``cost_share``, ``step_ratio``: of the switched parts in the cost of a step, and of the step while rigid to that
     while deformable; without the first nothing is said of the run time.
     ``bodies``: what the parts become while they are rigid, by a deck; None without one, empty where it does not tell.
@@ -89,6 +90,7 @@ class Settings:
     replay: bool = True
     strict: bool = False
     keep_vibration: bool = False
+    min_quality: str = "fair"
     cost_share: float | None = None
     step_ratio: float = 1.0
     bodies: tuple[RigidBody, ...] | None = None

@@ -10,7 +10,13 @@ import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.flights import longest_flight
-from d2rpick.choice.quality import LIKE_LEVELS, ROUNDING, candidates_at, like_quality
+from d2rpick.choice.quality import (
+    LIKE_LEVELS,
+    ROUNDING,
+    candidates_at,
+    certainty,
+    like_quality,
+)
 from d2rpick.choice.situation import Situation, looking
 from d2rpick.choice.warnings import mean_in_flight, shortfall
 from d2rpick.flight.flight import SOURCES
@@ -134,10 +140,11 @@ def choose_td(
     """Choose td in ``window``, for None in the longest flight up to the margin, for a tr not before ``since``.
 
     Of the pairs of all peaks of the energy those that are alike in quality count, and of these the one with the
-    longest rigid window wins.  Where deformations are known, a residual within 0.02 of the smallest is alike; on the
-    energy alone, a level within the tolerance of the best one, which is twice the mean energy.  td keeps the margin
-    from the contact, unless the whole window lies in it.  Without an acceptable peak the ends of the window are tried.
-    A td of ``times``, by default an even grid, whose pair beats that in both error and rigid time takes its place.
+    longest rigid window wins, of those that are most surely good.  Where deformations are known, a residual within
+    0.02 of the smallest is alike; on the energy alone, a level within the tolerance of the best one, which is twice
+    the mean energy.  td keeps the margin from the contact, unless the whole window lies in it.  Without an acceptable
+    peak the ends of the window are tried.  A td of ``times``, by default an even grid, whose pair beats that in both
+    error and rigid time takes its place.
     Where nothing vibrates, any td is as good, and the last one saves the most.
 
     Raises
@@ -240,7 +247,8 @@ def _unbeaten(
     for there, _ in sorted(
         better, key=lambda one: (-one[1].rigid_time, as_printed(error_of(*one)))
     ):
-        if _beating(own, [look(there.td)]):
+        longer = look(there.td)
+        if _beating(own, [longer]) and _sureness(longer) >= _sureness(own[0]):
             return there.td
     return td
 
@@ -341,7 +349,15 @@ def _by_residual(
         situation
     )
     alike = [pair for pair in pairs if pair[1].error <= limit]
-    return _td(_longest(alike)), _td(_longest(pairs))
+    sure = [_sureness(there) for there, _ in alike]
+    surest = [pair for pair, its in zip(alike, sure, strict=True) if its == max(sure)]
+    return _td(_longest(surest)), _td(_longest(pairs))
+
+
+def _sureness(situation: Situation) -> int:
+    """How surely the pair that is recommended at a td is good, as `certainty` says; 0 without one."""
+    best = next(candidates_at([situation], in_flight=True)).chosen
+    return 0 if best is None else certainty(situation, best)
 
 
 def _by_modes(

@@ -63,7 +63,7 @@ def card(
     output.notes(read, all_cautions(found))
     output.notes(found.card.notes, ())
     output.content(text_bytes(found.card.text))
-    output.finish(objection=not found.verified)
+    output.finish(objection=not found.passed)
 
 
 def _windows(

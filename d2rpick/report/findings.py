@@ -355,7 +355,8 @@ def as_text(rule: Rule, width: int) -> str:
     from textwrap import wrap  # not above: findings do without it
 
     title = f"{rule.id} ({rule.severity}): {rule.summary}"
-    lines = [tables.wrapped(title, width), "", *wrap(rule.explanation, width)]
+    explained = wrap(rule.explanation, width, break_on_hyphens=False)
+    lines = [tables.wrapped(title, width), "", *explained]
     for title, examples in (("Passes", rule.passing), ("Fails", rule.failing)):
         for example in examples:
             lines += ["", *_example(title, example, width)]

@@ -17,6 +17,7 @@ from d2rpick.report import (
     trade_off,
     verdict,
 )
+from d2rpick.report.decision import rigid_for, statements
 from d2rpick.report.explorer import explorer, scripts, styles
 from d2rpick.report.page import (
     Explorer,
@@ -30,7 +31,7 @@ from d2rpick.report.page import (
     tag,
 )
 from d2rpick.report.situation import what_was_read
-from d2rpick.report.tables import Cell, known, measure, short, unstarred
+from d2rpick.report.tables import Cell, known, short, unstarred
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -49,8 +50,6 @@ if TYPE_CHECKING:
 
 # More rows than one compares by eye; csv and json hold all.
 _MOST_ROWS = 20
-# What is said of the pair of ``suggest`` beside its times.
-_TOLD = ("quality", "keeps", "saves")
 
 
 def _of_run(record: page.PageContext, *sections: Markup) -> str:
@@ -124,23 +123,13 @@ def _choice(answer: Suggestion) -> Markup:
 
 
 def _recommended(answer: Suggestion) -> Markup:
-    pair, quality = answer.recommended, answer.quality
-    if pair is None or quality is None:
-        return page.refused("No tr can be recommended for this td.")
-    wrong = [("residual", measure(pair.residual))] if pair.residual is not None else []
-    told = pairs(
-        [
-            *(
-                (name, text)
-                for name, text in suggestion.verdict(answer)
-                if name in _TOLD
-            ),
-            *wrong,
-        ]
+    best, decision = answer.chosen, answer.decision
+    if best is None or decision is None:
+        return page.refused(f"No tr can be recommended for this td: {answer.why_none}")
+    times = best.tr, answer.td
+    return page.decided(
+        "", decision, times, answer.situation.history, suggestion.facts(answer)
     )
-    title = suggestion.headline(answer).capitalize()
-    class_ = "card refused" if quality.grade == "poor" else "card chosen"
-    return page.pair(title, (pair.tr, pair.td), told, answer.situation.history, class_)
 
 
 def _candidates(answer: Suggestion) -> Iterator[Markup]:
@@ -160,36 +149,23 @@ def verdict_page(answer: Verdict, record: page.PageContext) -> str:
 def _of_verdict(answer: Verdict, record: page.PageContext) -> Iterator[Markup]:
     situation, candidate = answer.situation, answer.candidate
     times = candidate.tr, situation.td
-    poor = answer.quality is not None and answer.quality.grade == "poor"
-    off = candidate.residual
-    left_over = (
-        "judged by its energy level alone"
-        if off is None
-        else f"residual {measure(off)}"
+    card = page.decided(
+        "", answer.decision, times, situation.history, verdict.facts(answer)
     )
-    card = page.pair(
-        f"{answer.word.capitalize()}{', but of poor quality' * poor}",
-        times,
-        tag("p", left_over, "; ", page.rigid_for(times, situation.history)),
-        situation.history,
-        "card chosen" if answer.verified and not poor else "card refused",
-    )
-    yield page.front([card], remarks(answer.cautions, answer.reasons))
+    remarked = [one for one in answer.reasons if one not in answer.decision.reason]
+    yield page.front([card], remarks(answer.cautions, remarked))
     yield explorer(record.explorer)
     caption = "Internal energy with its level at td, and the pair"
     yield _figures("pair-", caption, "verdict", answer, page=True)
-    measures = _told(verdict.MEASURES.plain(answer).items())
-    yield section(
-        "Measures",
-        pairs((name.replace("_", " "), short(value)) for name, value in measures),
-    )
+    measures = verdict.measured(answer)
+    yield section("Measures", pairs((name, short(value)) for name, value in measures))
     yield page.parts(candidate)
     if answer.switched:
         yield _switched(
             answer.switched, record.switched.files if record.switched else ()
         )
     yield from page.evidence(situation, answer.health, record)
-    if answer.verified:
+    if record.card:
         yield page.solver_input(times, record)
 
 
@@ -266,7 +242,13 @@ def plan_page(
         page.front(
             cards,
             remarks(found.cautions),
-            pairs([("plan", plan.sentence(found)), *plan.outlook(found)]),
+            pairs(
+                [
+                    ("plan", plan.sentence(found)),
+                    *plan.next_steps(found),
+                    *plan.outlook(found),
+                ]
+            ),
         ),
         explorer(explored),
         _figures("plan-", caption, "plan", found, page=True),
@@ -288,18 +270,11 @@ def plan_page(
 
 def _window(row: Planned, found: Plan) -> Markup:
     assert row.window is not None
-    assert row.quality is not None
-    saves = page.rigid_for(row.window, found.history)
-    told = pairs(
-        [
-            ("saves", saves),
-            ("quality", row.quality.told),
-            ("error", plan.error(row) or "-"),
-        ]
-    )
-    return page.pair(
-        f"Flight {row.number}", row.window, told, found.history, "card chosen"
-    )
+    assert row.candidate is not None
+    assert row.decision is not None
+    facts = [("rigid for", rigid_for(row.candidate)), *statements(row.decision)]
+    title = f"Flight {row.number}: "
+    return page.decided(title, row.decision, row.window, found.history, facts)
 
 
 def study_page(answer: Study, command: Sequence[str]) -> str:
@@ -403,7 +378,7 @@ def _set(best: PartSet | None) -> Markup:
         "span",
         tag("i", "saves about"),
         f"{best.saving:.0%}",
-        tag("i", " of the run time"),
+        tag("i", " of the processor time"),
     )
     listed = tag("p", f"parts {parts.ranges(best.parts)}")
     return tag(
@@ -468,11 +443,8 @@ _LOOKS: Final[
     ),
     "suggestion": (suggestion.verdict, lambda one: suggestion.table(one, _FEW_ROWS)),
     "verdict": (
-        lambda one: [
-            ("", verdict.told(one)),
-            *(("but", reason) for reason in one.reasons),
-        ],
-        lambda one: (("measure", "value"), _told(verdict.MEASURES.plain(one).items())),
+        verdict.verdict,
+        lambda one: (("measure", "value"), verdict.measured(one)),
     ),
     "trade_off": (
         lambda one: [("", trade_off.answer(one))],

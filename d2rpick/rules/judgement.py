@@ -232,11 +232,14 @@ class HistoryJudge:
 def faults_of(verdict: Verdict) -> Iterator[Fault]:
     """Translate a verdict into rules: any pair that does not verify has at least one fault of severity error."""
     found = [*_of_flight(verdict), *_of_error(verdict)]
-    if not verdict.verified and not found:
+    if not verdict.admissible and not found:
         found = [Fault("D2R201", False, "; ".join(verdict.reasons))]
     yield from found
-    situation = verdict.situation
-    if (
+    situation, decision = verdict.situation, verdict.decision
+    if verdict.admissible and not decision.reaches(situation.settings.min_quality):
+        what = f"{decision.verdict}: {decision.reason}; {decision.cure}"
+        yield Fault("D2R209", False, what)
+    elif (
         situation.kinetic_share is not None
         and situation.kinetic_share > POOR_KINETIC_SHARE
     ):

@@ -24,7 +24,7 @@ def test_the_same_as_the_command() -> None:
         "parts": found.recommended.parts,
         "cost_share": found.recommended.cost_share,
     }
-    assert d2.plan(d2.read(MATSUM), replay=False, **by_set).windows
+    assert d2.plan(d2.read(MATSUM), **by_set).windows
 
 
 def test_weights_may_be_given_as_they_are(tmp_path: Path) -> None:
