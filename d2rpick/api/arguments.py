@@ -10,8 +10,9 @@ import os
 from collections.abc import Iterable, Mapping, Set
 from typing import TYPE_CHECKING, Any, Final, NoReturn, TypedDict
 
-from d2rpick.api.request import GRADES, OPTIONS, TIME, Number
+from d2rpick.api.request import OPTIONS, TIME, Number
 from d2rpick.base.errors import DeckError
+from d2rpick.choice.grades import GRADES
 
 if TYPE_CHECKING:
     from typing import Literal

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import ArgumentError
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.choice.grades import GRADES
 from d2rpick.histories.formats import READERS
 
 if TYPE_CHECKING:
@@ -124,12 +125,6 @@ LIMITS: Final = (
     *("fit_window", "no_verify", "strict", "keep_vibration"),
 )
 CHOOSING: Final = (*LIMITS, "min_quality", "cost_share", "step_ratio")
-GRADES: Final = (
-    "poor",
-    "fair",
-    "good",
-)  # of d2rpick.choice.quality; a test holds them together
-POOR, FAIR, _ = GRADES
 _NOT_TYPED: Final = ("history", "given", "run_folder", "deck_in_folder")
 # Stands for a file that there is not: typed as it is, the command line is refused instead of taking other weights.
 _IN_MEMORY: Final = "<weights in memory>"

@@ -14,6 +14,7 @@ from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.aftermath import Kept, kept_mean_energy
 from d2rpick.choice.candidates import Candidate, Candidates, Pair, judge
 from d2rpick.choice.decision import Decision, decide
+from d2rpick.choice.grades import POOR
 from d2rpick.choice.health import (
     OF_THE_MODEL,
     assess,
@@ -23,7 +24,6 @@ from d2rpick.choice.health import (
 )
 from d2rpick.choice.quality import (
     EQUALLY_GOOD,
-    GRADES,
     ROUNDING,
     Quality,
     candidates_at,
@@ -77,13 +77,13 @@ class Verdict(OfTd):
         """Whether the pair is admissible and not poor, and its vibration is not wrong by more than a half."""
         residual = self.candidate.residual
         kept = residual is None or residual <= POOR_RESIDUAL
-        return kept and self.decision.grade != GRADES[0]
+        return kept and self.decision.grade != POOR
 
     @cached_property
     def decision(self) -> Decision:
         """Whether to use the pair, why, and what would be better."""
         found = self._decide(None)
-        return self._decide(self.better) if found.grade == GRADES[0] else found
+        return self._decide(self.better) if found.grade == POOR else found
 
     def _decide(self, better: Pair | None) -> Decision:
         unknown = () if self.reasons else ("nothing shows that tr suits this td",)
@@ -363,7 +363,7 @@ def find_better_pair(situation: Situation) -> Pair | None:
 def way_out(situation: Situation) -> Pair | None:
     """Give a pair that is not poor: the recommended tr of this td, else the pair of the nearest better td."""
     answer = suggest_at(situation)
-    if answer.decision and answer.decision.grade != GRADES[0]:
+    if answer.decision and answer.decision.grade != POOR:
         return answer.recommended
     better = answer.better_pair
     if better is None or better.residual is None or better.residual > POOR_RESIDUAL:

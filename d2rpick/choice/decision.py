@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Final
 
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.aftermath import kept_mean_energy
-from d2rpick.choice.quality import GRADES, quality_of
+from d2rpick.choice.grades import GOOD, GRADES, POOR, VERDICTS
+from d2rpick.choice.quality import quality_of
 from d2rpick.vibration.measures import wrong_sign
 
 if TYPE_CHECKING:
@@ -20,13 +21,6 @@ if TYPE_CHECKING:
     from d2rpick.choice.quality import Quality
     from d2rpick.choice.situation import Situation
 
-USE: Final = "use"
-USE_WITH_CARE: Final = "use with care"
-DO_NOT_USE: Final = "do not use"
-# Of the grades from the worst to the best.
-VERDICTS: Final = dict(
-    zip(GRADES, (DO_NOT_USE, USE_WITH_CARE, USE), strict=True),
-)
 # Of the vibration [-]: a worst case within this of what is expected is the same to people.
 _ALIKE: Final = 5e-3
 
@@ -114,7 +108,7 @@ class Decision(NamedTuple):
     @property
     def cure(self) -> str:
         """What would make the pair better; empty if it is good."""
-        if self.grade == GRADES[-1]:
+        if self.grade == GOOD:
             return ""
         cures = dict.fromkeys(cause.cure for cause in self.quality.causes)
         if self.objections or not cures:
@@ -134,7 +128,7 @@ def decide(
     """Decide on a tr in a situation; ``objections`` are why it is not admissible, ``better`` is a better pair."""
     quality = quality_of(situation, candidate)
     return Decision(
-        grade=GRADES[0] if objections else quality.grade,
+        grade=POOR if objections else quality.grade,
         quality=quality,
         objections=tuple(objections),
         at_rest=situation.at_rest,
@@ -156,7 +150,7 @@ def _worst_residual(situation: Situation, candidate: Candidate) -> float:
 
 def _why_good(quality: Quality, residual: float | None) -> str:
     """Say why a pair is good: its vibration is kept, or hardly matters."""
-    if quality.alone.grade == GRADES[-1]:
+    if quality.alone.grade == GOOD:
         off = "" if residual is None else f": it is wrong by {residual:.1%}"
         return f"the flight is certain, and the vibration after td is kept{off}"
     share = quality.worth.share if quality.worth else 0.0

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from d2rpick.base.errors import D2RPickError
 from d2rpick.choice.answers import verify_of
-from d2rpick.choice.decision import DO_NOT_USE
+from d2rpick.choice.grades import DO_NOT_USE
 from d2rpick.deck.printed_card import PrintedCard, Printing, Times
 from d2rpick.deck.printing import DEFAULT, SOLVERS, cards, solver_of
 

@@ -11,6 +11,7 @@ from d2rpick.base.errors import listing
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.aftermath import worth_of_error
 from d2rpick.choice.candidates import Candidates, judged_of
+from d2rpick.choice.grades import GRADES
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, POOR_RESIDUAL
 from d2rpick.histories.digits import above
 from d2rpick.vibration.identify import MIN_PLASTIC, MIN_SAMPLES_PER_PERIOD
@@ -119,8 +120,6 @@ def over_limits(situation: Situation, candidate: Candidate) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-# From the worst to the best.
-GRADES: Final = ("poor", "fair", "good")
 # Of the vibration [-]: a good pair keeps what the tolerance on tr asks for by default.
 _MOST_GOOD = 0.2
 # What a further mode may make of it at most in a good pair: a good grade is a promise.
@@ -300,12 +299,12 @@ def _of_record(situation: Situation) -> list[Cause]:
     return causes
 
 
-def certainty(situation: Situation, best: Candidate) -> int:
-    """How surely the vibration after td is good: 1 if it is, 2 if tr is known within its tolerance as well, else 0."""
-    if _fair(situation, best):
-        return 0
+def certainty(best: Candidate) -> int:
+    """How well tr is known: 2 within its timing tolerance, 1 well enough for a good pair, else 0."""
     if best.tr_high is None or best.timing_tolerance is None:
         return 2
+    if _is_loose(best):
+        return 0
     return 2 if best.tr_high - best.tr <= best.timing_tolerance else 1
 
 

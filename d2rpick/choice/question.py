@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.choice.grades import FAIR
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
 from d2rpick.vibration.measures import run_time_share
@@ -90,7 +91,7 @@ class Settings:
     replay: bool = True
     strict: bool = False
     keep_vibration: bool = False
-    min_quality: str = "fair"
+    min_quality: str = FAIR
     cost_share: float | None = None
     step_ratio: float = 1.0
     bodies: tuple[RigidBody, ...] | None = None

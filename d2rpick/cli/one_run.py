@@ -10,12 +10,10 @@ import click
 from d2rpick.api.cards import Cards, JudgedCard, all_cautions
 from d2rpick.api.request import (
     CHOOSING,
-    FAIR,
     FRACTION,
     LIMITS,
     MIN_MEAN_ENERGY,
     NOT_NEGATIVE,
-    POOR,
     READING,
     Option,
     Request,
@@ -148,7 +146,7 @@ def suggest(
         asked = ask(run, request, merge=cards.merge)
     answer = suggested(asked, wanted)
     # a td that was given is answered, however poor it is
-    least = request.min_quality or (POOR if td is not None else FAIR)
+    least = request.min_quality or ("poor" if td is not None else "fair")
     passed = answer.decision is not None and answer.decision.reaches(least)
     told = [
         one

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from d2rpick.choice.quality import GRADES
+from d2rpick.choice.grades import GOOD
 
 if TYPE_CHECKING:
     from d2rpick.choice.candidates import Candidate
@@ -62,14 +62,14 @@ def _further(grade: Grade, decision: Decision) -> str:
 
 def in_short(decision: Decision) -> str:
     """Give the verdict, and why it is none better."""
-    if decision.grade == GRADES[-1]:
+    if decision.grade == GOOD:
         return decision.verdict
     return f"{decision.verdict}: {decision.reason}"
 
 
 def in_full(decision: Decision) -> str:
     """Give the verdict, why it is none better, and what would make it better."""
-    if decision.grade == GRADES[-1]:
+    if decision.grade == GOOD:
         return f"{decision.verdict}: {decision.reason}"
     return f"{decision.verdict}: {decision.reason}. To improve: {decision.cure}"
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
-from d2rpick.choice.decision import DO_NOT_USE, USE, USE_WITH_CARE
+from d2rpick.choice.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.report.fields import Field, kind_of, many, maybe, one_of, row
 from d2rpick.vibration import MODELS
 

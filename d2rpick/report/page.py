@@ -12,7 +12,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base import __version__
-from d2rpick.choice.decision import DO_NOT_USE, USE, USE_WITH_CARE
+from d2rpick.choice.grades import DO_NOT_USE, USE, USE_WITH_CARE
 from d2rpick.report.decision import headed
 from d2rpick.report.situation import heading, measures_of
 from d2rpick.report.tables import Cell, shell_line, short

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import printable
-from d2rpick.choice.decision import USE
+from d2rpick.choice.grades import USE
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import in_full, saved
 from d2rpick.report.fields import (
@@ -145,11 +145,15 @@ def sentence(plan: Plan) -> str:
 def _how_to_use(plan: Plan) -> str:
     """Say how many windows can be used now, and which of them with care."""
     decisions = [(row.number, row.decision) for row in plan.supported if row.decision]
-    if len(plan.flights) == len(decisions) == 1:
-        return decisions[0][1].verdict
+    if len(decisions) == 1:
+        number, decision = decisions[0]
+        which = f"flight {number}: " if len(plan.flights) > 1 else ""
+        return f"{which}{decision.verdict}"
     careful = [str(number) for number, one in decisions if one.verdict != USE]
-    which = f", in flight {' and '.join(careful)} with care" if careful else ""
-    return f"use {len(decisions)} of {len(plan.flights)} windows now{which}"
+    flights = f"flight{'s' * (len(careful) > 1)} {', '.join(careful)}"
+    which = f" ({flights} with care)" if careful else ""
+    open_ones = sum(row.status != "done" for row in plan.flights)
+    return f"use {len(decisions)} of {open_ones} windows now{which}"
 
 
 def next_steps(plan: Plan) -> list[tuple[str, str]]:

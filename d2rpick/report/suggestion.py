@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import name_units
-from d2rpick.choice.decision import DO_NOT_USE
+from d2rpick.choice.grades import DO_NOT_USE
 from d2rpick.histories.digits import window_as_read
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import (

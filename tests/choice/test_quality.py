@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from d2rpick.choice.answers import suggest, verify
+from d2rpick.choice.grades import GRADES
 from d2rpick.choice.quality import (
     EQUALLY_GOOD,
-    GRADES,
     Grade,
     Quality,
     candidates_at,
