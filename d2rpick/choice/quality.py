@@ -11,7 +11,7 @@ from d2rpick.base.errors import listing
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.aftermath import worth_of_error
 from d2rpick.choice.candidates import Candidates, judged_of
-from d2rpick.choice.grades import GRADES
+from d2rpick.choice.grades import FAIR, GOOD, GRADES, POOR
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, POOR_RESIDUAL
 from d2rpick.histories.digits import above
 from d2rpick.vibration.identify import MIN_PLASTIC, MIN_SAMPLES_PER_PERIOD
@@ -167,6 +167,19 @@ class Grade(NamedTuple):
     def reasons(self) -> tuple[str, ...]:
         """Why it is none better."""
         return tuple(cause.reason for cause in self.causes)
+
+
+def grade_of_residual(residual: float) -> str:
+    """Give the grade that a residual alone has [-].
+
+    Examples
+    --------
+    >>> grade_of_residual(0.1), grade_of_residual(0.3), grade_of_residual(0.6)
+    ('good', 'fair', 'poor')
+    """
+    if residual > POOR_RESIDUAL:
+        return POOR
+    return FAIR if residual > _MOST_GOOD else GOOD
 
 
 class Quality(NamedTuple):

@@ -309,7 +309,7 @@ def pair(
 
 
 # The class of the card of a verdict, and of its badge.
-_CLASSES: Final = {USE: "use", USE_WITH_CARE: "care", DO_NOT_USE: "refused"}
+CLASSES: Final = {USE: "use", USE_WITH_CARE: "care", DO_NOT_USE: "refused"}
 
 
 def decided(
@@ -320,7 +320,7 @@ def decided(
     facts: Iterable[tuple[str, str]],
 ) -> Markup:
     """Show the verdict on a pair as a badge, its times large, and why; ``title`` stands before the verdict."""
-    kind = _CLASSES[decision.verdict]
+    kind = CLASSES[decision.verdict]
     badge = tag("span", decision.verdict, class_=f"badge {kind}")
     _, *why = headed(decision, *times)
     return pair(

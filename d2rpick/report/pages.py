@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.base.errors import if_written
+from d2rpick.choice.grades import POOR, VERDICTS
 from d2rpick.choice.study import Study, runs_of
 from d2rpick.report import (
     drive,
@@ -286,7 +287,9 @@ def study_page(answer: Study, command: Sequence[str]) -> str:
     return document(
         f"Switch times of {runs_of(len(answer.runs))}",
         page.front(
-            [_common(answer)], remarks(answer.cautions), pairs(study.outcome(answer))
+            [_common(answer)],
+            remarks(answer.cautions),
+            pairs([*study.outcome(answer), *study.reasons(answer)]),
         ),
         _figures("runs-", caption, "study", answer, page=True),
         section(
@@ -305,20 +308,24 @@ def _common(answer: Study) -> Markup:
         return tag(
             "div", title, tag("p", "None: ", answer.common.reason or ""), class_="card"
         )
-    times = (
-        tag("span", tag("i", name), text)
-        for name, text in (("tr", f"{tr:.6g}"), ("td", study.td_of(answer)))
-    )
+    times = [tag("span", tag("i", "tr"), f"{tr:.6g}")]
+    if answer.td is not None:
+        times.append(tag("span", tag("i", "td"), f"{answer.td:.6g}"))
     exact = f"in full: tr = {tr!r}" + (
         "" if answer.td is None else f", td = {answer.td!r}"
     )
-    rule = "Acceptable by the rules of d2rpick verify in every run that was judged."
+    verdict = VERDICTS[answer.grade or POOR]
+    (_, said), *_ = study.outcome(answer)
+    kind = page.CLASSES[verdict]
     lines = (
         tag("div", *times, class_="times"),
-        tag("p", rule),
+        tag("p", said),
         tag("p", exact, class_="soft"),
     )
-    return tag("div", title, *lines, class_="card chosen")
+    badge = tag(
+        "h2", "One tr for all runs: ", tag("span", verdict, class_=f"badge {kind}")
+    )
+    return tag("div", badge, *lines, class_=f"card {kind}")
 
 
 def _files(answer: Study) -> str:
@@ -354,7 +361,7 @@ def parts_page(found: Parts, command: Sequence[str]) -> str:
         page.front([_set(found.recommended)], remarks(found.cautions)),
         *sets,
         *(section(name, table(name, *cells)) for name, cells in tables.items()),
-        section("What it means", pairs(parts.outlook(found))),
+        section("What to know", pairs(parts.outlook(found))),
         section(
             "What was read",
             pairs(
@@ -383,7 +390,7 @@ def _set(best: PartSet | None) -> Markup:
     listed = tag("p", f"parts {parts.ranges(best.parts)}")
     return tag(
         "div",
-        tag("h2", best.name),
+        tag("h2", parts.set_name(best)),
         tag("div", saved, class_="times"),
         listed,
         class_="card chosen",
@@ -438,7 +445,7 @@ _LOOKS: Final[
     Mapping[str, tuple[Callable[[Any], list[tuple[str, str]]], Callable[[Any], Any]]]
 ] = {
     "overview": (
-        lambda seen: [("run", ", ".join(seen.source))],
+        overview.verdict,
         lambda seen: (("", ""), _told(overview.facts(seen)[1:])),
     ),
     "suggestion": (suggestion.verdict, lambda one: suggestion.table(one, _FEW_ROWS)),
@@ -452,10 +459,10 @@ _LOOKS: Final[
     ),
     "plan": (lambda one: [("", plan.sentence(one)), *plan.outlook(one)], plan.table),
     "parts": (
-        parts.outlook,
+        parts.verdict_on_set,
         lambda one: parts.table(one, next(iter(parts.TABLES.values()))),
     ),
-    "study": (lambda one: study.outcome(one)[::-1], study.table),
+    "study": (study.outcome, study.table),
 }
 
 

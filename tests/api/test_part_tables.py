@@ -37,7 +37,7 @@ def test_weights_may_be_given_as_they_are(tmp_path: Path) -> None:
         -1
     ].parts == (2,)
     page = found.report(tmp_path / "parts.html").read_text("utf-8")
-    assert "all that may" in page
+    assert "all eligible parts" in page
     assert "<h1>Parts to switch: rollover box</h1>" in page
     assert "<span>signature</span>" in page
 
