@@ -103,8 +103,8 @@ class StudyRow:
     why it is not "ok"; ``warnings`` are codes.
     ``quality`` to ``cure`` are what `suggest` says of its pair.  ``td`` is that of the run; ``acceptable`` are its
     windows of acceptable tr, shape (n, 2), ``alike`` those in which the error is at most 0.05 above that of its tr,
-    ``profile`` the errors, shape (2, m).  ``files`` is what was read, up to ``record_end``; ``curve`` an outline of the energy,
-    shape (2, k), where one was asked for.
+    ``profile`` the errors, shape (2, m).  ``files`` is what was read, up to ``record_end``; ``curve`` an outline of
+    the energy, shape (2, k), where one was asked for.
     """
 
     source: str
