@@ -38,7 +38,7 @@ class Swing(NamedTuple):
         )
 
 
-def swing_in(history: History, start: float, tr: float) -> Swing | None:
+def find_swing(history: History, start: float, tr: float) -> Swing | None:
     """Find how far the body that becomes rigid at ``tr`` may be out of place, in a flight since ``start`` [time].
 
     td is not known: it is taken for the state so far at which the parts stand farthest from where they are at tr.  None

@@ -18,7 +18,7 @@ from d2rpick.histories.source import expand, later_legs
 from d2rpick.running.evidence import Evidence, highest_energy, range_of_energy
 from d2rpick.running.inner_motion import InnerMotion, wait_of_deck
 from d2rpick.running.looks import Looks
-from d2rpick.running.swing import swing_in
+from d2rpick.running.swing import find_swing
 
 if TYPE_CHECKING:
     import os
@@ -167,7 +167,7 @@ def _switch(history: History, one: Quiet) -> Iterator[Event]:
 
 def _swings(history: History, one: Quiet, tr: float) -> str:
     """Say so where parts swing by more than they may in a flight that has lasted until now."""
-    swing = swing_in(history, one.start, tr) if one.parts else None
+    swing = find_swing(history, one.start, tr) if one.parts else None
     return f"; {swing.told}" if swing and swing.flight > tr - one.start else ""
 
 
