@@ -68,8 +68,8 @@ _OF_LS_DYNA: Final = (
 )
 # LS-DYNA: loads that act without a contact, and those of them that are gravity.
 _PUSHES, _OF_GRAVITY = ("LOAD_", "AIRBAG_"), ("LOAD_BODY", "LOAD_GRAVITY")
-# LS-DYNA: offset before a contact over the thickest shell.  It must be above the thickness of the contact, which is half
-# of the thickness of each shell.
+# LS-DYNA: offset before a contact over the thickest shell.  It must be above the thickness of the contact: half of the
+# thickness of each shell.
 _OFFSET_THICKNESSES: Final = 2
 
 
