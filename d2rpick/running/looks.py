@@ -1,4 +1,7 @@
-"""Read the files of a run again and again while it is computed: of a Radioss history only the new states."""
+"""Read the files of a run again and again while it is computed, and give the new states.
+
+Of a Radioss history only the new states are read.  Files of other formats are read as a whole each time.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ from d2rpick.choice.deck_of_run import in_deck
 from d2rpick.choice.question import Reference
 from d2rpick.histories.formats.radioss_th import TimeHistory, recognises
 from d2rpick.histories.opening import Source, open_run, open_sources
+from d2rpick.running.record import list_tables, skip_states
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,6 +21,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.histories.names import Selection
     from d2rpick.histories.run import Run
+    from d2rpick.running.record import Table
 
 _HEAD: Final = 8192  # bytes by which a Radioss history is recognised
 
@@ -39,6 +44,7 @@ class Looks:
         self._selection, self._inventory = selection, inventory
         self._read_parts: dict[str, _ReadPart] = {}
         self._last_time = float("-inf")
+        self._known_tables: list[Table] = []  # of files that are read as a whole
 
     @property
     def grow(self) -> bool:
@@ -48,7 +54,7 @@ class Looks:
     def new_states(self, names: Sequence[str]) -> tuple[History | None, bool]:
         """Read the new states, None if there are none, and whether they follow the states that were read before.
 
-        If they do not, since files were written anew or have another format, all states are read.
+        If they do not, since files were written anew, all states are given.
 
         Raises
         ------
@@ -68,10 +74,26 @@ class Looks:
         )
         if sources is None or not follows:
             self._read_parts.clear()
-            follows, history = False, self.whole(names)
+            history = self.whole(names)
+            if len(list_tables(history)) < len(self._known_tables):
+                return (
+                    None,
+                    True,
+                )  # its last state is being written and lacks quantities
+            new_states = self._skip_known(history)
+            follows = new_states is not None
+            history = history if new_states is None else new_states
         if history is not None and history.time.size:
             self._last_time = float(history.time[-1])
         return history, follows and self._last_time > float("-inf")
+
+    def _skip_known(self, history: History) -> History | None:
+        """Return the new states of files that were read as a whole; None if they do not follow those before."""
+        known_tables, self._known_tables = self._known_tables, []
+        if self._read_parts:
+            return None
+        self._known_tables = list_tables(history)
+        return skip_states(history, known_tables) if known_tables else None
 
     def whole(self, names: Sequence[str]) -> History:
         """Read all states of the files; errors as `new_states`."""

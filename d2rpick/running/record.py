@@ -11,6 +11,8 @@ from d2rpick.base.errors import HistoryError
 from d2rpick.histories.history import Given
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import Balance, History, Momenta
@@ -55,11 +57,7 @@ class GrowingRecord:
 
     def add(self, states: History) -> None:
         """Append states; HistoryError if they have other quantities than the states so far."""
-        # The energies of single parts are many numbers that are not needed here.
-        tables: list[Table] = [replace(states, part_energies=None, part_names=())]
-        tables += states.momenta
-        if states.balance:
-            tables.append(states.balance)
+        tables = list_tables(states)
         self._latest_tables = tables
         arrays = [_get_arrays(table) for table in tables]
         if not self._columns:
@@ -85,13 +83,56 @@ class GrowingRecord:
                     name: column.rows for name, column in columns.items()
                 }
                 tables.append(replace(table, **rows))
-            history, *evidence = tables
-            momenta_count = len(history.momenta)
-            momenta, balances = evidence[:momenta_count], evidence[momenta_count:]
-            balance = balances[0] if balances else None
-            written = Given(tuple(momenta), balance, history.masses)
-            self._history = replace(history, evidence=written)
+            self._history = _join_tables(tables)
         return self._history
+
+
+def list_tables(history: History) -> list[Table]:
+    """Return the history itself, each of its momenta, and its balance if there is one.
+
+    The energies of single parts, many numbers that are not needed here, are left out.
+    """
+    tables: list[Table] = [replace(history, part_energies=None, part_names=())]
+    tables += history.momenta
+    if history.balance:
+        tables.append(history.balance)
+    return tables
+
+
+def _join_tables(tables: Sequence[Any]) -> History:
+    """Return the history of which these are the tables, in the order of `list_tables`."""
+    history, *evidence = tables
+    momenta_count = len(history.momenta)
+    momenta, balances = evidence[:momenta_count], evidence[momenta_count:]
+    balance = balances[0] if balances else None
+    written = Given(tuple(momenta), balance, history.masses)
+    joined: History = replace(history, evidence=written)
+    return joined
+
+
+def skip_states(history: History, known: Sequence[Table]) -> History | None:
+    """Return the states of a history after those of ``known`` tables; None if it does not begin with these.
+
+    The times of all states are compared, and all values of the last known one.
+    """
+    tables = list_tables(history)
+    if len(tables) != len(known):
+        return None
+    new_tables: list[Any] = []
+    for table, known_table in zip(tables, known, strict=True):
+        arrays, known_arrays = _get_arrays(table), _get_arrays(known_table)
+        count = known_table.time.size
+        if not count or arrays.keys() != known_arrays.keys():
+            return None
+        if not np.array_equal(table.time[:count], known_table.time):
+            return None
+        for name, rows in arrays.items():
+            last, known_last = rows[count - 1], known_arrays[name][-1]
+            if not np.array_equal(last, known_last, equal_nan=True):
+                return None
+        new_rows: dict[str, Any] = {name: rows[count:] for name, rows in arrays.items()}
+        new_tables.append(replace(table, **new_rows))
+    return _join_tables(new_tables)
 
 
 def find_momenta(history: History, *, of_parts: bool) -> Momenta | None:
