@@ -10,7 +10,11 @@ import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.flight.contact_forces import Touches, is_deformed
-from d2rpick.flight.internal_energy import moves_as_a_whole, settled_from
+from d2rpick.flight.internal_energy import (
+    moves_as_a_whole,
+    rises_as_it_yields,
+    settled_from,
+)
 from d2rpick.flight.window import SHORTEST, all_windows, marks, unheld
 
 if TYPE_CHECKING:
@@ -407,6 +411,11 @@ def _keeping_level(
         if history.parts is not None:
             energy = np.interp(time, balance.time, balance.internal)
     start = settled_from(time, energy, damped, flight.start, flight.end, unseen)
+    if start is not None and start > flight.start and momenta is not None:
+        # without gravity the sum itself; with it the last one, less the work of gravity
+        whole = None if damped is None else damped[-1 if flight.gravity else 0]
+        if rises_as_it_yields(time, energy, whole, flight.start, start, flight.end):
+            start = flight.start
     if (
         start is None
         or start > td

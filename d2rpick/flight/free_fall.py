@@ -287,6 +287,7 @@ class Laws:
             or balance.kinetic is None
             or balance.internal is None
             or self.velocity
+            or not self.mass > 0
         ):
             return False
         kinetic = np.interp(self.fit.time, balance.time, balance.kinetic)

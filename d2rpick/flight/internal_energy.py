@@ -268,6 +268,59 @@ def settled_from(
     return None
 
 
+# A body yields in its first swing if its energy rises by 90 % of the way to its later level, and is within 10 % of its
+# minimum for no longer than it takes to rise from there (a harmonic swing: 0.7 of that).  Bodies of the model that hit
+# each other later in the flight leave the energy at its minimum for longer.
+_FLAT, _MOST_FLAT = 0.1, 1.0
+# The motion gives that energy: the sum of both rises by no more than this share of it.  It may fall, by damping.
+_NOT_FROM_MOTION: Final = 0.1
+
+
+def rises_as_it_yields(
+    time: Samples,
+    energy: Samples,
+    whole: Samples | None,
+    start: float,
+    settled: float,
+    end: float,
+) -> bool:
+    """Whether an internal energy rises at the start of a flight as a vibrating body yields.
+
+    What is deformed for good stays in the internal energy, so that it rises at once to the level that it keeps later.
+
+    Parameters
+    ----------
+    time, energy : array of shape (n,)
+    whole : array of shape (n,), or None
+        Kinetic and internal energy without the work of gravity; None if they are not written.
+    start, settled, end : float
+        Start and end of the flight, and the time in it from which the energy keeps its level [time].
+    """
+    rising, level = window(time, start, settled), window(time, settled, end)
+    before, kept = energy[rising], energy[level]
+    if before.size < 2 or not kept.size:
+        return False
+    lowest = float(before.min())
+    rise = float(kept.min()) - lowest
+    if rise <= 0 or float(before.max()) > float(kept.max()) + _FLAT * rise:
+        return False
+    if whole is not None:
+        grown = whole[rising] - np.minimum.accumulate(whole[rising])
+        if grown.max() > _NOT_FROM_MOTION * rise:
+            return False
+    high = int(np.argmax(before >= lowest + (1 - _FLAT) * rise))
+    first_swing = before[: high + 1]
+    if first_swing[-1] < lowest + (1 - _FLAT) * rise:
+        return False
+    times = time[rising][: high + 1]
+    flat = first_swing <= lowest + _FLAT * rise
+    if not flat.any():
+        return False
+    last_flat, first_flat = int(np.flatnonzero(flat)[-1]), int(np.argmax(flat))
+    rise_time = times[-1] - times[last_flat]
+    return bool(times[last_flat] - times[first_flat] <= _MOST_FLAT * rise_time)
+
+
 def _still_lost(damped: Samples) -> Samples:
     """Return what damping takes from each state to the mean of the last quarter, in the most damped energy, (n,)."""
     last = 3 * damped.shape[1] // 4
