@@ -42,10 +42,11 @@ from d2rpick.deck.switching import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
-    Contacts = Callable[[Collection[int]], tuple[tuple[float, float], ...] | None]
-
     from d2rpick.deck.card import Card
     from d2rpick.deck.radioss_rigid import Body
+    from d2rpick.deck.radioss_sensors import Forces, Spans
+
+    Contacts = Callable[[Collection[int]], Spans | None]
 
 
 @dataclass(eq=False, repr=False)
@@ -195,11 +196,14 @@ def in_order(legs: list[Leg]) -> bool:
     )
 
 
-def find_run_windows(run: Run, contacts: Contacts | None = None) -> RunWindows:
+def find_run_windows(
+    run: Run, contacts: Contacts | None = None, forces: Forces | None = None
+) -> RunWindows:
     """Follow every body that a leg or a sensor switches through the run.
 
     A body whose parts are not known is one unit, named by its main node.  Legs that are not in order have no windows.
-    ``contacts`` gives when something pushes some parts, for sensors of forces; None where no history shows it.
+    For sensors of forces ``contacts`` gives when something pushes some parts, and ``forces`` when an interface or wall
+    pushes anything; None where no history shows it.
     """
     sets = tuple(_switches(run.legs)) if in_order(run.legs) else ()
     starter = None if run.starter and run.starter.moved else run.starter
@@ -220,7 +224,10 @@ def find_run_windows(run: Run, contacts: Contacts | None = None) -> RunWindows:
                 windows += _follow(unit, node, sets, run.legs[0])
     for node in sorted(sensors):
         windows += _by_sensor(
-            run, bodies[node], parts, find_course(run, parts.get(node, ()), contacts)
+            run,
+            bodies[node],
+            parts,
+            find_course(run, parts.get(node, ()), contacts, forces),
         )
     for body in bodies.values():
         if body.part and not body.sensor and body.node.value not in switched:
@@ -274,7 +281,12 @@ def _follow(
     ]
 
 
-def find_course(run: Run, parts: Collection[int], contacts: Contacts | None) -> Course:
+def find_course(
+    run: Run,
+    parts: Collection[int],
+    contacts: Contacts | None,
+    forces: Forces | None = None,
+) -> Course:
     """Give what is known of the course of a run for sensors that switch some parts."""
     known = (
         contacts is not None
@@ -282,7 +294,7 @@ def find_course(run: Run, parts: Collection[int], contacts: Contacts | None) -> 
         and run.starter is not None
         and only_force(run.starter)
     )
-    return Course(run.resets, contacts(parts) if known and contacts else None)
+    return Course(run.resets, contacts(parts) if known and contacts else None, forces)
 
 
 def _by_sensor(

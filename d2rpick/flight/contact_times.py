@@ -2,7 +2,10 @@
 
 Between two states the momentum of what flies changes by gravity alone.  The longest flight shows by how much; where it
 changes by more than that, and by more than the numbers leave open, something pushes.  A force that comes and goes
-within one interval is one force.
+within one interval is one force.  Where the force of a contact is written, this tells it without momenta.
+
+A force begins and ends somewhere within an interval of the record.  The middle of that interval is the best estimate:
+it is off by half an interval at most.
 """
 
 from __future__ import annotations
@@ -15,7 +18,8 @@ from d2rpick.flight.momentum import all_flights
 from d2rpick.histories.samples import stretches, window
 
 if TYPE_CHECKING:
-    from d2rpick.histories.history import Momenta
+    from d2rpick.histories.contact_forces import ContactForce
+    from d2rpick.histories.history import Momenta, Samples
 
 # A force changes the momentum by so many times what digits and the solver's own errors do in the longest flight.
 _SEEN: Final = 4.0
@@ -24,10 +28,12 @@ _OF_WEIGHT: Final = 0.1
 # States at each end of the longest flight, in which the force before or after it may begin.
 _EDGE: Final = 1
 _FEWEST: Final = 2  # intervals between these ends
+# A force that comes and goes within one interval is taken to act in the middle third of it.
+_OF_ONE_INTERVAL: Final = 1 / 3
 
 
 class ContactTimes(NamedTuple):
-    """When something pushes: ``spans`` (from, to) [time], each known within ``interval``, that of the record there.
+    """When something pushes: ``spans`` (from, to) [time], each end known within half an ``interval`` of the record.
 
     ``speed``: how fast the parts move at the end of the longest flight [length/time]; None without masses.
     """
@@ -63,12 +69,55 @@ def find_contact_times(momenta: Momenta) -> ContactTimes | None:
         least, _OF_WEIGHT * float(np.linalg.norm(gravity)) * np.diff(time)
     )
     spans = tuple(
-        (float(time[part.start]), float(time[part.stop]))
+        _place_in_intervals(time, part.start, part.stop)
         for part in stretches(sizes > room)
     )
     mass = momenta.mass(members)
     speed = float(np.linalg.norm(momentum[last])) / mass if mass > 0 else None
     return ContactTimes(spans, float(np.diff(time).max()), speed)
+
+
+def find_force_times(force: ContactForce, least: float = 0.0) -> ContactTimes | None:
+    """Find when the force of a contact or rigid wall acts, by what the solver wrote of it.
+
+    Parameters
+    ----------
+    force : ContactForce
+        As read from a file.
+    least : float
+        Only a mean force of an interval above this counts [force]; 0 for any.
+
+    Returns
+    -------
+    ContactTimes or None
+        None where there are too few states, or where forces are asked for of which only the changes are known.
+    """
+    time, acts = force.time, force.acts
+    if time.size < _FEWEST:
+        return None
+    steps = np.diff(time)
+    if least > 0:
+        if not np.isfinite(force.impulses).all():
+            return None
+        acts = acts.copy()
+        acts[1:] &= np.linalg.norm(force.impulses[1:], axis=1) > least * steps
+    spans = tuple(
+        _place_in_intervals(time, part.start, part.stop) for part in stretches(acts[1:])
+    )
+    return ContactTimes(spans, float(steps.max()))
+
+
+def _place_in_intervals(time: Samples, first: int, stop: int) -> tuple[float, float]:
+    """Place the ends of a force that acts in the intervals from ``first`` to before ``stop`` of the record.
+
+    A force that acts in the first interval, or in the last one, is taken to act from its start, or to its end.
+    """
+    start, end = float(time[first]), float(time[stop])
+    most = _OF_ONE_INTERVAL * (end - start)
+    later, earlier = float(time[first + 1] - start) / 2, float(end - time[stop - 1]) / 2
+    begins = start if first == 0 else start + min(later, most)
+    ends = end if stop == time.size - 1 else end - min(earlier, most)
+    return begins, ends
 
 
 def _find_members(momenta: Momenta, parts: object) -> tuple[int, ...]:

@@ -16,7 +16,12 @@ from d2rpick.choice.question import Reference, Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, end_of_flight, end_of_load
 from d2rpick.deck import read_inventory
-from d2rpick.flight.contact_times import ContactTimes, find_contact_times
+from d2rpick.flight.contact_times import (
+    ContactTimes,
+    find_contact_times,
+    find_force_times,
+)
+from d2rpick.histories.contact_forces import find_force
 from d2rpick.histories.digits import above, first_as_read, in_the_record
 from d2rpick.histories.surroundings import UNKNOWN
 
@@ -174,6 +179,17 @@ class HistoryJudge:
             else None
         )
         return find_contact_times(momenta) if momenta else None
+
+    def find_force_spans(
+        self, kind: str, number: int, least: float = 0.0
+    ) -> tuple[tuple[float, float], ...] | None:
+        """Find when the force of a contact, interface or rigid wall acts [time]; None if the history has it not.
+
+        ``least``: only a force above it counts [force].
+        """
+        force = find_force(self.run.contact_forces, kind, number)
+        found = find_force_times(force, least) if force else None
+        return found and found.spans
 
     @property
     def _known(self) -> tuple[int, ...]:

@@ -147,15 +147,16 @@ def _never_back(case: Case) -> Iterator[Objection]:
     """
     if _unknown_members(case, to_rigid=False):
         return
-    opened = [
-        window.opened
+    opened = {
+        window.opened: window.tr
         for window in case.windows.windows
         if window.closed is None and window.unit not in case.windows.other_deformable
-    ]
-    for card, place, named in _by_card(opened):
+    }
+    for card, place, named in _by_card([*opened]):
+        times = [tr for event, tr in opened.items() if event.by is card]
         yield (
             place,
-            f"{named} made rigid at {card.time:g} and never switched back in this deck",
+            f"{named} made rigid at {min(times):g} and never switched back in this deck",
         )
 
 
