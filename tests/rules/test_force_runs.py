@@ -1,6 +1,7 @@
 """Sensors of a force in runs of OpenRadioss: plates that bounce on a contact, or on a rigid wall, 20 of them.
 
-Half of the histories have the force of the contact or wall, the others only the momenta of the plate.  Runs only where OPENRADIOSS_PATH names an installation of OpenRadioss; takes some minutes.
+Half of the histories have the force of the contact or wall, the others only the momenta of the plate.  Runs only where
+OPENRADIOSS_PATH names an installation of OpenRadioss; takes some minutes.
 """
 
 import random
