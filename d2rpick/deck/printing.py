@@ -338,7 +338,8 @@ def _force_of(printing: Printing) -> tuple[str, int, Pushes]:
         )
     if not printing.pushed:
         raise DeckError(
-            "a card for switches by force needs a history with momenta that show when something pushes"
+            "a card for switches by force needs a history with the force of that contact or wall, or with momenta of"
+            " the parts"
         )
     kind, number = (
         ("INTER", printing.contact)

@@ -77,6 +77,25 @@ def find_contact_times(momenta: Momenta) -> ContactTimes | None:
     return ContactTimes(spans, float(np.diff(time).max()), speed)
 
 
+def narrow_to_states(
+    time: Samples, tr: float, td: float | None
+) -> tuple[float, float | None]:
+    """Give the first state from ``tr`` on and the last one up to ``td`` [time], between which a window is judged.
+
+    A switch by a contact comes with its first or last force, which is somewhere between two states.  The flight is
+    known to the last state without a force.  Where there is no state between them, both times stay.
+
+    Examples
+    --------
+    >>> narrow_to_states(np.array([0.0, 1.0, 2.0, 3.0]), 0.5, 2.5)
+    (1.0, 2.0)
+    """
+    states = time[(time >= tr) & (time <= (np.inf if td is None else td))]
+    if states.size < _FEWEST:
+        return tr, td
+    return float(states[0]), None if td is None else float(states[-1])
+
+
 def find_force_times(force: ContactForce, least: float = 0.0) -> ContactTimes | None:
     """Find when the force of a contact or rigid wall acts, by what the solver wrote of it.
 

@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 from d2rpick.deck.ls_dyna_sensors import follow_control, read_controls
 from d2rpick.deck.reader import read_deck
 from d2rpick.rules.rule import HEAD, PARTS, automatic, deck
-from tests.command import answer, put
+from tests.command import answer, put, refused, run
 from tests.rules.test_by_force import windows
 
 END = 1.0
@@ -62,7 +62,7 @@ def write(folder: Path, *cards: str, switch_set: str = SET) -> str:
     return str(put(folder / "main.k", text))
 
 
-def history(folder: Path, spans: list[tuple[float, float]]) -> str:
+def history(place: Path, spans: list[tuple[float, float]]) -> str:
     """Write a run in which contact 7 pushes in some spans, and contact 8 all the time."""
     from tests.text_files import glstat_text
 
@@ -75,11 +75,11 @@ def history(folder: Path, spans: list[tuple[float, float]]) -> str:
         for contact, force in ((7, 3.0 * pushes), (8, 5.0))
         for side, sign in (("slave", 1), ("master", -1))
     ]
-    run = folder / "run"
-    run.mkdir()
-    (run / "rcforc").write_text(" made for tests\n\n" + "".join(lines))
-    (run / "glstat").write_bytes(glstat_text(TIMES, 1 + np.sin(40 * TIMES) ** 2))
-    return str(run)
+    folder = place / "run"
+    folder.mkdir()
+    (folder / "rcforc").write_text(" made for tests\n\n" + "".join(lines))
+    (folder / "glstat").write_bytes(glstat_text(TIMES, 1 + np.sin(40 * TIMES) ** 2))
+    return str(folder)
 
 
 def test_a_control_by_time_needs_no_history(tmp_path: Path) -> None:
@@ -97,10 +97,10 @@ def test_a_control_that_begins_on_is_rigid_from_the_start(tmp_path: Path) -> Non
 
 
 def test_a_control_by_force_follows_its_contact_among_others(tmp_path: Path) -> None:
-    run = history(tmp_path, [(0.1, 0.2), (0.5, 0.6), (0.605, 0.7)])
+    folder = history(tmp_path, [(0.1, 0.2), (0.5, 0.6), (0.605, 0.7)])
     cards = control("1 2", repeats=-1) + force_of()
     cards += by_force(1, "LT", 1e-3, duration=0.05) + by_force(2, "GT", 1e-3)
-    found = answer("check", write(tmp_path, cards), "--history", run)
+    found = answer("check", write(tmp_path, cards), "--history", folder)
     assert flat(found) == pytest.approx(
         [0.05, 0.105, 0.245, 0.505, 0.745, None], abs=0.011
     )
@@ -108,18 +108,20 @@ def test_a_control_by_force_follows_its_contact_among_others(tmp_path: Path) -> 
 
 
 def test_a_set_by_time_may_be_undone_by_a_sensor(tmp_path: Path) -> None:
-    run = history(tmp_path, [(0.5, 0.6)])
+    folder = history(tmp_path, [(0.5, 0.6)])
     sets = automatic(10, "0.1", rigid=["1"]) + automatic(
         20, "0.0", deformable=["1"], code=5
     )
     cards = control("1") + by_force(1, "GT", 1.0) + force_of()
-    found = answer("check", write(tmp_path, cards, switch_set=sets), "--history", run)
+    found = answer(
+        "check", write(tmp_path, cards, switch_set=sets), "--history", folder
+    )
     assert flat(found) == pytest.approx([0.1, 0.505], abs=0.006)
 
 
 def test_a_pair_waits_for_the_force_of_its_own_contact(tmp_path: Path) -> None:
     """No momenta are written, and contact 8 never lets go."""
-    run = history(tmp_path, [(0.1, 0.2), (0.5, 0.6)])
+    folder = history(tmp_path, [(0.1, 0.2), (0.5, 0.6)])
     found = {}
     for contact in (7, 8):
         there = automatic(20, "0.0", rigid=["1"], code=2, pair=(21, 1))
@@ -129,7 +131,7 @@ def test_a_pair_waits_for_the_force_of_its_own_contact(tmp_path: Path) -> None:
             for text in (there, back)
         )
         path = write(tmp_path, switch_set=pair)
-        found[contact] = answer("check", path, "--history", run)
+        found[contact] = answer("check", path, "--history", folder)
     assert flat(found[7]) == pytest.approx(
         [0.0, 0.105, 0.195, 0.505, 0.595, None], abs=0.011
     )
@@ -139,6 +141,21 @@ def test_a_pair_waits_for_the_force_of_its_own_contact(tmp_path: Path) -> None:
         assert any(
             f"by the contact forces of the history {times}" in one for one in told
         )
+
+
+def test_a_card_is_timed_by_the_force_of_the_named_contact(tmp_path: Path) -> None:
+    """The pair that is printed switches in the planned window: it is read back with the same history."""
+    run_folder = history(tmp_path, [(0.1, 0.2), (0.5, 0.6)])
+    card = ("card", "--tr", "0.25", "--td", "0.45", "--part", "1", "--no-deck")
+    options = ("--solver", "ls-dyna-contact", "--history", run_folder)
+    printed = run(*card, *options, "--contact", "7")
+    assert "after the end of the flight" not in printed.stderr  # it ends at the contact
+    path = write(tmp_path, switch_set=printed.stdout)
+    assert flat(answer("check", path, "--history", run_folder)) == pytest.approx(
+        [0.25, 0.505], abs=0.006
+    )  # no momenta show a speed, so there is no OFFSET
+    told = refused(*card, *options, "--contact", "9")
+    assert "needs a history with the force of that contact" in told
 
 
 @pytest.mark.parametrize(
