@@ -339,7 +339,7 @@ def _always(body: Body) -> Window:
 
 
 def rigid_parts(starter: Starter, bodies: Mapping[int, int]) -> dict[int, set[int]]:
-    """Parts that lie whole in the group of each body.
+    """Parts that lie whole in the group of each body: those that it names, and those all of whose nodes it has.
 
     Parameters
     ----------
@@ -354,12 +354,15 @@ def rigid_parts(starter: Starter, bodies: Mapping[int, int]) -> dict[int, set[in
         Parts by main node; empty where the members of the group are not known.
     """
     members = {node: starter.group_members(group) for node, group in bodies.items()}
-    named = {node: set(known[1]) if known else set() for node, known in members.items()}
-    of_nodes = {node: known[0] for node, known in members.items() if known and known[0]}
-    if of_nodes:
+    known = {node: found for node, found in members.items() if found}
+    named = {node: {*known[node][1]} if node in known else set() for node in bodies}
+    every = starter.parts.keys()
+    # another part may lie in the nodes of those that are named, as a skin does
+    asked = {node: found for node, found in known.items() if every - found[1]}
+    if asked:
         from d2rpick.deck.mesh import parts_within  # loads numpy
 
-        for node, parts in parts_within(starter, of_nodes).items():
+        for node, parts in parts_within(starter, asked).items():
             named[node] |= parts
     return named
 

@@ -98,6 +98,14 @@ THREE = body(1, 101, 1) + body(2, 102, 2) + body(3, 103, 3)
 TWICE = clock(5, 0.0, 0.002) + clock(6, 0.004) + logic("OR", 7, 5, 6)
 MIDDLE = [(0.002, 0.004)]
 ALONE = body(1, 101, 1, 5)
+
+
+def fourth(*nodes: int) -> str:
+    """Write a further part of one element, on nodes of the plates."""
+    return f"/PART/4\nfurther\n{wide(1, 1)}/SHELL/4\n{wide(4, *nodes)}"
+
+
+BOTH = f"/GRNOD/PART/9\nboth\n{wide(1, 2)}"
 LISTED = {
     "a merged body goes with the main one": Listed(
         THREE + merge((1, 1, 2, 1)),
@@ -146,6 +154,31 @@ LISTED = {
         body(1, 0, 1) + body(2, 102, 2),
         (OFF + "102 0", ON + "0 102", OFF + "102 104"),
         {1: [(0.0, 0.004)], 2: MIDDLE},
+    ),
+    "a skin on the nodes of a part is rigid with it": Listed(
+        fourth(11, 12, 13, 14) + body(1, 101, 1),
+        (OFF + "101", ON + "101", OFF + "101"),
+        {1: MIDDLE, 4: MIDDLE},
+    ),
+    "a part between two of a body is rigid with them": Listed(
+        fourth(12, 21, 24, 13) + BOTH + body(1, 101, 9),
+        (OFF + "101", ON + "101", OFF + "101"),
+        dict.fromkeys((1, 2, 4), MIDDLE),
+    ),
+    "a part beside one of a body is not": Listed(
+        fourth(12, 21, 24, 13) + body(1, 101, 1),
+        (OFF + "101", ON + "101", OFF + "101"),
+        {1: MIDDLE},
+    ),
+    "a group of a range of nodes": Listed(
+        f"/GRNOD/GENE/9\nrange\n{wide(11, 24)}" + body(1, 101, 9),
+        (OFF + "101", ON + "101", OFF + "101"),
+        {1: MIDDLE, 2: MIDDLE},
+    ),
+    "groups of materials and properties": Listed(
+        f"/GRNOD/MAT/9\nall\n{wide(1)}/GRNOD/PROP/8\nnone\n{wide(7)}" + body(1, 101, 9),
+        (OFF + "101", ON + "101", OFF + "101"),
+        dict.fromkeys((1, 2, 3), MIDDLE),
     ),
     "sensors of time join": Listed(body(1, 101, 1, 7) + TWICE, ("",), {1: MIDDLE}),
     "formats before 2023 know Tstop": Listed(
