@@ -170,7 +170,7 @@ def plates(folder: Path, more: str = "", off: str = "") -> Path:
     return put(folder / "BOX_0000.rad", f"{text}{more}/END\n")
 
 
-def with_body(*cards: str, off: int = MAIN) -> Callable[[Path], Path]:
+def with_body(*cards: str, off: int | str = MAIN) -> Callable[[Path], Path]:
     return lambda folder: plates(folder, "".join(cards), f"/RBODY/OFF\n{off}\n")
 
 
