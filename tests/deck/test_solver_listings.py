@@ -395,6 +395,18 @@ def test_a_body_that_nothing_switches_makes_its_parts_rigid(tmp_path: Path) -> N
     assert material.kind == "deformable"
 
 
+def test_main_nodes_of_rigid_parts_follow_the_order_of_the_deck(tmp_path: Path) -> None:
+    """Nodes 101 to 103 are the last of the deck; the body of an /RBODY comes before those of parts."""
+    legs = (OFF + "104 105 106", ON + "105", OFF + "105")
+    parts = {1: irigid(), 3: irigid()}
+    main = Path(place(tmp_path, Listed(body(9, 0, 2), legs, {}, 2612, parts)))
+    before, first, *others = main.read_text().partition("/PART/1\n")
+    middle, third, rest = others[0].partition("/PART/3\n")
+    block, groups, after = rest.partition("/GRNOD/")
+    main.write_text(before + third + block + first + middle + groups + after)
+    assert rigid_by_check(str(main)) == {3: MIDDLE}
+
+
 @pytest.mark.parametrize("name", ["rigid parts with a sensor", "sensors of time join"])
 def test_parts_that_a_sensor_switches_already_are_not_switched_again(
     tmp_path: Path, name: str
