@@ -38,7 +38,8 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_sensors import Course
     from d2rpick.deck.reader import Deck, Unread
     from d2rpick.deck.unswitchable import Unswitchable
-    from d2rpick.rules.by_force import Forced, Sensed
+    from d2rpick.rules.by_force import Forced
+    from d2rpick.rules.by_sensor import Sensed
     from d2rpick.rules.judgement import HistoryJudge
 
 
@@ -201,7 +202,9 @@ class Case:
         """Sets with CODE 5, with what their controls do: those of forces in the history, those of time without one."""
         if not any(header.code.value == BY_SENSOR for _, header in self.headers):
             return ()
-        from d2rpick.rules.by_force import follow_sensed_switches  # not above: start-up
+        from d2rpick.rules.by_sensor import (
+            follow_sensed_switches,  # not above: start-up
+        )
 
         ends = (self.end, self.judge.end if self.judge else None)
         end = min((time for time in ends if time is not None), default=math.inf)

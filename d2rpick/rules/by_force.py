@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 from d2rpick.deck.force_switching import ForceSwitch, follow_pair
 from d2rpick.deck.ls_dyna_parts import read_entities
-from d2rpick.deck.ls_dyna_sensors import Change, follow_control, read_controls
-from d2rpick.deck.switching import BY_SENSOR, Event, SwitchSet, Window
+from d2rpick.deck.switching import Event, SwitchSet, Window
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -97,12 +96,13 @@ def follow_forced_switches(
             continue
         back = _find_pair(there, by_card, waiting)
         windows: list[Window] = []
-        seen: _Seen | None = None
+        known: _Seen | None = None
         for event in by_card[there]:
             seen = _see_contacts(deck, there, event.unit, judge)
             seen_back = _see_contacts(deck, back, event.unit, judge) if back else seen
             if seen is None or seen_back is None:
                 continue
+            known = seen
             closing = _find_event(event.unit, by_card[back]) if back else None
             other = waiting[back] if back and closing else None
             spans = follow_pair(rigid, other, seen.contacts, end, seen_back.contacts)
@@ -110,10 +110,10 @@ def follow_forced_switches(
                 Window(event.unit, tr, td, event, closing if td is not None else None)
                 for tr, td in spans
             )
-        if seen:
+        if known:
             cards = (there.card, back.card) if back else (there.card,)
             yield Forced(
-                there.card, cards, tuple(windows), seen.contacts, "TIME3", seen.source
+                there.card, cards, tuple(windows), known.contacts, "TIME3", known.source
             )
 
 
@@ -122,13 +122,15 @@ def _see_contacts(
 ) -> _Seen | None:
     """Find the contacts that a set sees: by written forces, else by the momenta of a part if only one thing pushes.
 
-    A contact begins earlier for a set with OFFSET, by the time to fly so far.  None where the history does not show it.
+    A contact begins earlier for a set with OFFSET, by the time to fly so far.  None where the history does not show it,
+    and for a contact whose force triggers no switch (D2R008).
     """
     header = card.header
-    if header is None:
+    if header is None or not _can_trigger(deck, header):
         return None
     pushed = None if unit.part is None else judge.pushed([unit.part])
-    by_force = find_spans_of_entno(deck, header, judge)
+    kind, _ = _CODES[header.code.value]
+    by_force = find_spans_of_force(deck, judge, kind, header.entno.value)
     if by_force is not None:
         seen = _Seen(by_force, "contact forces")
     elif pushed is not None and _has_one_force(deck):
@@ -146,12 +148,11 @@ def _see_contacts(
     )
 
 
-def find_spans_of_entno(
-    deck: Deck, header: Header, judge: HistoryJudge
-) -> Spans | None:
-    """Find when the contact or rigid wall pushes that ENTNO names, by its written force [time]; None if unknown."""
+def _can_trigger(deck: Deck, header: Header) -> bool:
+    """Whether the contact or rigid wall that ENTNO names may switch parts, as far as the deck has it."""
     kind, _ = _CODES[header.code.value]
-    return find_spans_of_force(deck, judge, kind, header.entno.value)
+    entity = read_entities(deck, _KEYWORDS[kind]).named(header.entno.value)
+    return entity is None or kind != "contact" or entity.triggers
 
 
 def find_spans_of_force(
@@ -165,7 +166,9 @@ def find_spans_of_force(
     entities = read_entities(deck, _KEYWORDS[kind])
     entity = entities.named(number)
     if entity is None:
-        return None
+        # cards alone have none to name: their deck is not at hand
+        alone = not entities.found and number > 0
+        return judge.find_force_spans(kind, number, least) if alone else None
     name, is_order = entity.id or entity.number, kind == "rigid wall"
     if is_order and any(each.id not in (0, each.number) for each in entities.found):
         if len(entities.found) > 1:
@@ -227,46 +230,3 @@ def _find_pair(
 
 def _find_event(unit: Unit, events: Sequence[Event]) -> Event | None:
     return next((one for one in events if one.unit == unit), None)
-
-
-class Sensed(NamedTuple):
-    """A set with CODE 5 and its control: ``changes`` of that, or ``unknown``, why they are not known."""
-
-    by: SwitchSet
-    changes: tuple[Change, ...] = ()
-    unknown: str = ""
-
-    def events(self, events: Sequence[Event]) -> Iterator[tuple[float, Event]]:
-        """Give the switches of its parts [time]: made while the control is on, undone when it is off again."""
-        own = [event for event in events if event.by is self.by]
-        begins_off = self.changes[:1] == (Change(0.0, on=False),)  # nothing to undo
-        for change in self.changes[begins_off:]:
-            for event in own:
-                to_rigid = event.line.to_rigid == change.on
-                line = event.line._replace(to_rigid=to_rigid)
-                yield change.time, event._replace(line=line)
-
-
-def follow_sensed_switches(
-    deck: Deck,
-    headers: Sequence[tuple[SwitchSet, Header]],
-    judge: HistoryJudge | None,
-    end: float,
-) -> Iterator[Sensed]:
-    """Follow the controls of the sets with CODE 5 of a deck of LS-DYNA; without a history only those by time."""
-    controls = {control.switch_set: control for control in read_controls(deck)}
-
-    def find_spans(kind: str, number: int, least: float) -> Spans | None:
-        if judge is None:
-            return None
-        return find_spans_of_force(deck, judge, kind, number, least)
-
-    for card, header in headers:
-        control = controls.get(header.swset.value)
-        if header.code.problem or header.code.value != BY_SENSOR or control is None:
-            continue
-        followed = follow_control(deck, control, find_spans, end)
-        if isinstance(followed, str):
-            yield Sensed(card, unknown=followed)
-        else:
-            yield Sensed(card, tuple(followed))

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from d2rpick.deck.card import Card
-    from d2rpick.rules.by_force import Sensed
+    from d2rpick.rules.by_sensor import Sensed
 
 _MOST_LISTED: Final = 8
 _CURES: Final = {

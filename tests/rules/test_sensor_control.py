@@ -143,6 +143,20 @@ def test_a_pair_waits_for_the_force_of_its_own_contact(tmp_path: Path) -> None:
         )
 
 
+def test_a_contact_whose_force_triggers_no_switch_is_not_followed(
+    tmp_path: Path,
+) -> None:
+    folder = history(tmp_path, [(0.1, 0.2), (0.5, 0.6)])
+    there = automatic(20, "0.0", rigid=["1"], code=2).replace(
+        "0.0         0", f"0.0{7:10d}", 1
+    )
+    path = Path(write(tmp_path, switch_set=there))
+    path.write_text(path.read_text().replace("SURFACE_TO_SURFACE", "GENERAL"))
+    found = answer("check", str(path), "--history", folder)
+    assert windows(found) == []
+    assert "D2R008" in {one["rule"] for one in found["findings"]}
+
+
 def test_a_card_is_timed_by_the_force_of_the_named_contact(tmp_path: Path) -> None:
     """The pair that is printed switches in the planned window: it is read back with the same history."""
     run_folder = history(tmp_path, [(0.1, 0.2), (0.5, 0.6)])
