@@ -226,13 +226,15 @@ def landing_spread(history: History, flight: Flight) -> float | None:
     float or None
         :math:`\delta t` [time]; None if kinetic energy or momentum are not written, or other parts move as well.
 
-    Notes ----- ``T`` is the mean kinetic energy of the vibration, by equipartition the mean internal energy in the
-    flight above its lowest value [energy].  ``omega`` follows from the crossings of the energy with its mean, four per
-    period [1/time].  ``K`` is the kinetic energy before the contact [energy], including that of the rotation, which
-    moves the surface to the ground as well.  ``n`` is the direction in which gravity has changed the momentum ``p`` of
-    the flying parts, without gravity that of ``p``.  Source: the margin before a contact in docs (plan); computed
-    landings moved by at most this, or by 3 % of the flight, see tests/choice/test_windows.py.  No margin covers an
-    impact on an edge: 1 um of height moves the landing after it by 70 ms.
+    Notes
+    -----
+    ``T`` is the mean kinetic energy of the vibration, by equipartition the mean internal energy in the flight above its
+    lowest value [energy]. ``omega`` follows from the crossings of the energy with its mean, four per period [1/time].
+    ``K`` is the kinetic energy before the contact [energy], including that of the rotation, which moves the surface to
+    the ground as well. ``n`` is the direction in which gravity has changed the momentum ``p`` of the flying parts,
+    without gravity that of ``p``. Source: the margin before a contact in docs (plan); computed landings moved by at
+    most this, or by 3 % of the flight, see tests/choice/test_windows.py. No margin covers an impact on an edge: 1 um of
+    height moves the landing after it by 70 ms.
     """
     balance, momentum = history.balance, _momentum(history, flight)
     if (

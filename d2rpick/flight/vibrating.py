@@ -67,8 +67,10 @@ def kinetic_energy_of(
     time, energy : array of shape (n,), or None
         Within the flight [time], [energy]; None if no file contains it.
 
-    Notes ----- The kinetic energy of the centre of mass is a quadratic function of time under constant gravity; what
-    deviates from it, as under damping, is as slow.  Neither has a line.
+    Notes
+    -----
+    The kinetic energy of the centre of mass is a quadratic function of time under constant gravity; what deviates from
+    it, as under damping, is as slow. Neither has a line.
     """
     kinetic = history.evidence.kinetic_energy(flight.parts)
     if kinetic is None:
