@@ -31,8 +31,8 @@ EQUALLY_GOOD = 0.02
 LIKE_LEVELS = TOLERATED_GROWTH
 # Level error that rounding leaves of a crossing at most, of a level above this share of the highest energy.
 ROUNDING: Final = 1e-3
-# Errors are compared to so many decimals.  Pairs of equal error, as on all swings of one mode, differ in the last digits
-# by how the numbers were written: those would decide which pair comes first.
+# Errors are compared to so many decimals.  Pairs of equal error, as on all swings of one mode, differ in the last
+# digits by how the numbers were written: those would decide which pair comes first.
 _DECIMALS: Final = 4
 # Rigid times within this share of the longest are alike: there a body that stays in place is worth more.
 _LIKE_TIMES = 0.1
