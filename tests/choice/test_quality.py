@@ -367,9 +367,8 @@ def test_equal_errors_come_in_one_order_in_single_and_in_double_precision() -> N
 
     def places(rounding: float) -> list[int]:
         noise = rounding * rng.standard_normal(count)
-        return order(
-            group, error + noise, rigid, off, np.full(1, EQUALLY_GOOD)
-        ).tolist()
+        room = np.full(1, EQUALLY_GOOD)
+        return [*map(int, order(group, error + noise, rigid, off, room))]
 
     assert places(1e-16) == places(1e-7) == places(0.0)
     behind = [place for place in places(0.0) if error[place] > 1]
