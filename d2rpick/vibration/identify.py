@@ -273,7 +273,10 @@ class _Record(NamedTuple):
     @classmethod
     def scaled(cls, time: Samples, energy: Samples) -> _Record:
         start, end, scale = float(time[0]), float(time[-1]), float(np.ptp(energy))
-        return cls((time - start) / (end - start), energy / scale, start, end, scale)
+        # older versions of numpy report an overflow where they divide numbers this small, and divide rightly
+        with np.errstate(over="ignore"):
+            scaled = energy / scale
+        return cls((time - start) / (end - start), scaled, start, end, scale)
 
     def pencil(self, memory: Memory | None) -> fitting.Pencil:
         """Return the signal subspace of E, computed once for all fits that share a memory."""
