@@ -1,6 +1,7 @@
-"""Switches by the force of a contact or rigid wall, in a run whose history shows when something pushes.
+"""Evaluate switches by a contact or rigid-wall force over a history that shows when a contact force acts.
 
-Momenta show that something pushes, not what: a deck with several contacts and walls is not judged.
+Momenta show that a force acts on a part, not which contact exerts it. A deck with several contacts and walls is
+therefore not judged.
 """
 
 from __future__ import annotations
@@ -23,22 +24,24 @@ if TYPE_CHECKING:
 
     Spans = tuple[tuple[float, float], ...]  # of time
 
+# By CODE, True if the set waits for a force, False if it waits until there is none.
 _CODES: Final = {
     1: False,
     2: False,
     3: True,
     4: True,
-}  # whether a set waits for a force
-_NEVER: Final = 1e20
-# A window of so much of the longest one is none that anybody wants.
+}
+_NEVER: Final = 1e20  # TIME2 from which on there is no latest time
+# Windows below this fraction of the longest one are chatter, not flights.
 _SHORT: Final = 0.1
 
 
 class Forced(NamedTuple):
-    """A switch by force, or a pair of them, with its windows in the history, and when something pushes there [time].
+    """A switch by a force, or a pair of them, with its windows in the history and the spans of the contact force
+    [time].
 
-    ``place`` is the card that makes the parts rigid, ``cards`` are those of the pair; ``wait`` is what to call the time
-    that keeps it from switching.
+    ``place`` is the card that makes the parts rigid, ``cards`` are the cards of the pair. ``wait`` is the name of the
+    time that delays the next switch (TIME3, or Tdelay of the sensor).
     """
 
     place: Card
@@ -49,19 +52,20 @@ class Forced(NamedTuple):
 
     @property
     def times(self) -> list[tuple[float, float | None]]:
-        """Windows of its parts, each once, ascending."""
+        """Return the windows of its parts without duplicates, ascending."""
         return sorted(
-            {(one.tr, one.td) for one in self.windows}, key=lambda pair: pair[0]
+            {(window.tr, window.td) for window in self.windows},
+            key=lambda pair: pair[0],
         )
 
     @property
     def switches(self) -> int:
-        """How often it switches."""
+        """Return the number of switches in the history."""
         return sum(1 + (td is not None) for _, td in self.times)
 
     @property
     def lasting(self) -> list[tuple[float, float]]:
-        """Windows that are no chatter; the end of one that stays open is infinite."""
+        """Return the windows that are not chatter; a window that stays open ends at infinity."""
         closed = [(tr, math.inf if td is None else td) for tr, td in self.times]
         longest = max((td - tr for tr, td in closed if td < math.inf), default=0.0)
         return [(tr, td) for tr, td in closed if td - tr >= _SHORT * longest]
@@ -70,35 +74,42 @@ class Forced(NamedTuple):
 def follow_forced_switches(
     deck: Deck, events: Sequence[Event], judge: HistoryJudge, end: float
 ) -> Iterator[Forced]:
-    """Follow the sets of a deck of LS-DYNA that switch by force; none where the history does not show contacts."""
+    """Yield the switches by a force in an LS-DYNA deck with their windows; nothing if the history shows no contacts."""
     if not _has_one_force(deck):
         return
     by_card = {
-        event.by: [one for one in events if one.by is event.by] for event in events
+        event.by: [unit_event for unit_event in events if unit_event.by is event.by]
+        for event in events
     }
     waiting = {
-        card: made for card in by_card if (made := _read_waiting(card)) is not None
+        card: conditions
+        for card in by_card
+        if (conditions := _read_waiting(card)) is not None
     }
-    for there, rigid in waiting.items():
+    for rigid_card, rigid in waiting.items():
         if not rigid.to_rigid:
             continue
-        back = _find_pair(there, by_card, waiting)
+        back_card = _find_pair(rigid_card, by_card, waiting)
         windows: list[Window] = []
         contacts: Spans = ()
-        for event in by_card[there]:
+        for event in by_card[rigid_card]:
             pushed = (
                 None if event.unit.part is None else judge.pushed([event.unit.part])
             )
             if pushed is not None:
-                contacts = _shift_contacts(pushed, back)
-                windows += _follow_windows(event, back, by_card, waiting, contacts, end)
+                contacts = _shift_contacts(pushed, back_card)
+                windows += _follow_windows(
+                    event, back_card, by_card, waiting, contacts, end
+                )
         if windows:
-            cards = (there.card, back.card) if back else (there.card,)
-            yield Forced(there.card, cards, tuple(windows), contacts, "TIME3")
+            cards = (
+                (rigid_card.card, back_card.card) if back_card else (rigid_card.card,)
+            )
+            yield Forced(rigid_card.card, cards, tuple(windows), contacts, "TIME3")
 
 
 def _has_one_force(deck: Deck) -> bool:
-    """Whether a deck has one contact or rigid wall at most; cards alone have none."""
+    """Return True if a deck has at most one contact or rigid wall; a deck of switching cards alone has none."""
     return (
         len(read_entities(deck, "CONTACT").found)
         + len(read_entities(deck, "RIGIDWALL").found)
@@ -107,7 +118,9 @@ def _has_one_force(deck: Deck) -> bool:
 
 
 def _read_waiting(card: SwitchSet) -> ForceSwitch | None:
-    """Give what a set waits for; None for one that does not wait for a force, or says it in a way that is not read."""
+    """Return the conditions of a switch set; None if it does not wait for a force, or one of its fields is
+    unreadable.
+    """
     header, factor = card.header, card.card.transform.time
     if header is None or header.code.value not in _CODES or not card.switched:
         return None
@@ -133,11 +146,13 @@ def _read_waiting(card: SwitchSet) -> ForceSwitch | None:
     )
 
 
-def _shift_contacts(pushed: ContactTimes, back: SwitchSet | None) -> Spans:
-    """Give the contacts as the set sees them that makes parts deformable: earlier by the time to fly its OFFSET."""
+def _shift_contacts(pushed: ContactTimes, back_card: SwitchSet | None) -> Spans:
+    """Return the contacts as the set sees them that makes parts deformable: OFFSET lets it act before the contact
+    begins.
+    """
     offset = (
-        back.header.offset.value
-        if back and back.header and not back.header.offset.problem
+        back_card.header.offset.value
+        if back_card and back_card.header and not back_card.header.offset.problem
         else 0.0
     )
     lead = offset / pushed.speed if pushed.speed and offset > 0 else 0.0
@@ -145,12 +160,12 @@ def _shift_contacts(pushed: ContactTimes, back: SwitchSet | None) -> Spans:
 
 
 def _find_pair(
-    there: SwitchSet,
+    rigid_card: SwitchSet,
     by_card: dict[SwitchSet, list[Event]],
     waiting: dict[SwitchSet, ForceSwitch],
 ) -> SwitchSet | None:
-    """Give the set that makes the parts of another deformable again: its pair, or one that names the same parts."""
-    units = {event.unit for event in by_card[there]}
+    """Return the set that makes the same parts deformable again as the set ``there`` makes rigid, or None."""
+    units = {event.unit for event in by_card[rigid_card]}
     for card, switch in waiting.items():
         if not switch.to_rigid and units & {event.unit for event in by_card[card]}:
             return card
@@ -159,19 +174,20 @@ def _find_pair(
 
 def _follow_windows(
     event: Event,
-    back: SwitchSet | None,
+    back_card: SwitchSet | None,
     by_card: dict[SwitchSet, list[Event]],
     waiting: dict[SwitchSet, ForceSwitch],
     contacts: Spans,
     end: float,
 ) -> Iterator[Window]:
-    """Give the windows of a unit that an event makes rigid."""
+    """Yield the windows of the unit that an event makes rigid."""
     rigid = waiting[event.by]
-    closing = _find_event(event.unit, by_card[back]) if back else None
-    other = waiting[back] if back and closing else None
-    for tr, td in follow_pair(rigid, other, contacts, end):
+    closing = _find_event(event.unit, by_card[back_card]) if back_card else None
+    deformable = waiting[back_card] if back_card and closing else None
+    for tr, td in follow_pair(rigid, deformable, contacts, end):
         yield Window(event.unit, tr, td, event, closing if td is not None else None)
 
 
 def _find_event(unit: Unit, events: Sequence[Event]) -> Event | None:
-    return next((one for one in events if one.unit == unit), None)
+    """Return the event of a unit, or None."""
+    return next((event for event in events if event.unit == unit), None)

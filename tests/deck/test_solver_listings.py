@@ -331,7 +331,7 @@ def test_the_main_node_of_a_merged_body_is_none(tmp_path: Path) -> None:
     ).findings
     assert {one.rule for one in found} == {"D2R402"}
     assert (
-        "its body is merged into /RBODY 1, whose main node is 101" in found[0].message
+        "its body is merged into /RBODY 1: write main node 101" in found[0].message
     )
 
 

@@ -58,7 +58,7 @@ def test_a_deck_without_contacts_has_none_to_name(tmp_path: Path) -> None:
     ]
     assert (
         message
-        == "ENTNO is 7, but the deck has no contact, so the switch never comes; add one"
+        == "ENTNO is 7, but the deck has no contact, so the set never switches; add one"
     )
 
 

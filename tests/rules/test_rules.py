@@ -76,6 +76,8 @@ def test_every_rule_has_examples_and_an_explanation() -> None:
         assert rule.passing
         assert rule.failing
         assert rule.explanation.endswith(".")
+        assert rule.fix[:1].isupper()
+        assert rule.fix.endswith(".")
 
 
 SWAPPED = (
