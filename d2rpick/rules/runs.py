@@ -394,7 +394,7 @@ def _left_rigid(case: RunCase) -> Iterator[Objection]:
     A body is reported if it contains whole parts and no history shows whether these deform (D2R409 reports those that
     do). Source: Altair's help for /RBODY in engine files, and runs computed with OpenRadioss.
 
-    Fix: Add the main node to /RBODY/OFF of the first engine file. If the body is meant to be rigid, silence the finding
+    Fix: Add the main node to the /RBODY/OFF of every engine file. If the body is meant to be rigid, silence the finding
     with a comment.
     """
     left_bodies, deforming = _left_rigid_parts(case)
@@ -418,7 +418,7 @@ def _left_rigid_deforming(case: RunCase) -> Iterator[Objection]:
     and cannot deform in this run. If the history has their energy and it is zero, they are meant to be rigid, and
     nothing is reported.
 
-    Fix: Add the main node to /RBODY/OFF of the first engine file.
+    Fix: Add the main node to the /RBODY/OFF of every engine file.
     """
     left_bodies, deforming = _left_rigid_parts(case)
     if left_bodies and deforming:

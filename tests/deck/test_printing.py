@@ -274,11 +274,11 @@ ONE, LONE = [(0.02, 0.09)], Printing(node=(1,))
 @pytest.mark.parametrize(
     ("solver", "windows", "printing", "message"),
     [
-        ("ls-dyna", ONE, Printing(), "no id was given"),
+        ("ls-dyna", ONE, Printing(), "no id of a part or body"),
         ("ls-dyna", ONE, Printing(part=(0,)), "id 0 does not fit"),
         ("ls-dyna", ONE, Printing(part=(10**10,)), "id 10000000000 does not fit"),
         ("ls-dyna", ONE, PARTS._replace(merge=10**9), "id 1000000000 does not fit"),
-        ("ls-dyna", ONE, PARTS._replace(swset=(5, 5)), "both switch sets are 5"),
+        ("ls-dyna", ONE, PARTS._replace(swset=(5, 5)), "both switch sets have id 5"),
         ("ls-dyna", [(1.0000000001, 1.0000000002)], PARTS, "different times"),
         (
             "ls-dyna",
@@ -289,7 +289,7 @@ ONE, LONE = [(0.02, 0.09)], Printing(node=(1,))
         ("radioss", ONE, LONE._replace(end=0.05), "the run ends at 0.05"),
         ("radioss", ONE, LONE, "not given"),
         ("radioss", ONE, LONE._replace(end=float("inf")), "the run ends"),
-        ("radioss", ONE, Printing(end=1.0), "no id was given"),
+        ("radioss", ONE, Printing(end=1.0), "no id of a part or body"),
         ("radioss", ONE, LONE._replace(end=1.0, name="a/b"), "the name of the run"),
         (
             "radioss",

@@ -99,7 +99,7 @@ def test_as_many_nodes_are_taken_from_a_wall_as_the_starter_reports(
 ) -> None:
     (found,) = flaws(tmp_path, text)
     assert found.code == THROUGH_WALL
-    assert f"takes {taken} of" in found.message
+    assert f"removes {taken} of" in found.message
     assert found.place.file.endswith("strip_0000.rad")
 
 
@@ -251,7 +251,7 @@ def test_a_body_whose_nodes_are_not_known_is_said(tmp_path: Path) -> None:
     deck = starter().replace("/GRNOD/NODE/1\n", "/GRNOD/BOX/1\n")
     (found,) = flaws(tmp_path, velocity(7) + ALL, deck=deck)
     assert found.code == NOT_FOLLOWED
-    assert found.message.startswith("the nodes of group 1 of /RBODY 1 are not known")
+    assert found.message.startswith("the nodes of group 1 of /RBODY 1 are unknown")
 
 
 def test_no_body_rests_for_certain_where_an_include_is_missing(tmp_path: Path) -> None:

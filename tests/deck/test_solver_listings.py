@@ -318,7 +318,7 @@ def test_a_main_node_that_the_starter_makes_is_named_by_its_number(
     (finding,) = check_deck(main).findings
     assert finding.rule == "D2R408"
     assert (
-        "name main node 104 in the /RBODY/OFF of every leg (the starter makes node 104: see its listing)"
+        "list main node 104 in the /RBODY/OFF of every engine file (the starter makes node 104: see its listing)"
         in finding.message
     )
 
@@ -330,9 +330,7 @@ def test_the_main_node_of_a_merged_body_is_none(tmp_path: Path) -> None:
         )
     ).findings
     assert {one.rule for one in found} == {"D2R402"}
-    assert (
-        "its body is merged into /RBODY 1: write main node 101" in found[0].message
-    )
+    assert "its body is merged into /RBODY 1: write main node 101" in found[0].message
 
 
 @pytest.mark.parametrize("name", ["rigid parts", "a body beside merged ones is apart"])

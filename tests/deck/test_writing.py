@@ -60,7 +60,7 @@ def test_included_files_go_with_the_deck(tmp_path: Path) -> None:
     assert windows(written[0]) == [(1, tr, td) for tr, td in WINDOWS]
 
 
-IS_CUT = r"main\.k: the .* is it cut\? The cards behind it would hide that: .*"
+IS_CUT = r"main\.k: the .* may be truncated\. The added cards would hide this: .*"
 OTHER_SET = THERE.replace(
     "         1         0  ", "       901         0  ", 1
 ).replace("         1         0      PART", "         2         0      PART")
@@ -74,15 +74,15 @@ OTHER_SET = THERE.replace(
         (
             HEAD + INCLUDE + END,
             {"switches.k": PARTS},
-            "with the name of the cards, 'switches.k'",
+            "with the name of the card file, 'switches.k'",
         ),
         (
             HEAD + "*INCLUDE\n../parts.k\n" + END,
             {"../parts.k": PARTS},
-            "outside the folder",
+            "from outside its folder",
         ),
         ((HEAD + PARTS).rstrip("\n"), {}, IS_CUT + "end its last line"),
-        (f"{HEAD}{PARTS}*NODE\n       1\n", {}, IS_CUT + "add that line"),
+        (f"{HEAD}{PARTS}*NODE\n       1\n", {}, IS_CUT + r"add \*END"),
     ],
 )
 def test_what_cannot_be_written_is_refused_before_anything_is(
@@ -134,7 +134,7 @@ def test_no_link_leads_out_of_the_folder(tmp_path: Path) -> None:
         ("all.k", "parts"),
     ):
         with pytest.raises(
-            DeckError, match=rf"{name}: leads out of {folder}, by a link"
+            DeckError, match=rf"{name}: lies outside {folder}, because of a link"
         ):
             write_deck(main, CARD, str(folder), overwrite=True)
         (folder / link).unlink()
@@ -184,7 +184,7 @@ def test_legs_are_named_after_the_files_of_the_run_by_which_the_engine_finds_its
         names = [Path(one).name for one in write_deck(main, card, str(tmp_path / name))]
         assert names == [f"heavy_box_{number:04d}.rad" for number in range(6)]
     card = cards(WINDOWS, Printing(node=(1808,), end=0.4, name="other"), "radioss")
-    refused(main, card, "the cards are for run 'other', the run is 'box'")
+    refused(main, card, "the cards are for run 'other', but this is run 'box'")
 
 
 def test_a_run_of_several_legs_alike_is_cut_anew_at_the_switches(
@@ -311,7 +311,7 @@ LEGS = Printing(node=(1808,), end=0.4, name="box")
     ("deck", "engine", "card", "message"),
     [
         (RUN.deck, ENGINE.replace("OFF", "ON"), cards(WINDOWS, LEGS, "radioss"), "switches main node 1808 already"),
-        (RUN.deck, ENGINE, cards(WINDOWS, LEGS._replace(name="other"), "radioss"), "run 'other', the run is 'box'"),
+        (RUN.deck, ENGINE, cards(WINDOWS, LEGS._replace(name="other"), "radioss"), "but this is run 'box'"),
         (RUN.deck.replace("      1808         0", "      1808         4"), ENGINE, sensed(),
          "sensor 4 switches this /RBODY already"),
         (RUN.deck.replace("/END", "/SENSOR/TIME/903\nown\n 1.0\n/END"), ENGINE, sensed(),

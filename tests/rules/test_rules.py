@@ -342,7 +342,7 @@ def test_a_deck_cut_within_a_line_or_its_mesh_is_never_passed_in_silence(
         within = not (text.endswith("\n") or text.splitlines()[-1].startswith("$"))
         assert len(told) == (within or end > mesh + len("*NODE"))
         assert all(
-            one.endswith("or end its last line" if within else "or add that line")
+            one.endswith("or end its last line" if within else "or add *END")
             for one in told
         )
     deck.write_text(f"{whole}*END")
