@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FORESEEN, INTERNAL_ERROR, one_line
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.deck.card import Field
 from d2rpick.deck.ls_dyna_parts import (
     Constraint,
     Parts,
@@ -29,7 +30,7 @@ from d2rpick.deck.switching import (
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from d2rpick.deck.card import Card, Field, Value
+    from d2rpick.deck.card import Card, Value
     from d2rpick.deck.radioss_files import Flaw
     from d2rpick.deck.radioss_run import Run, RunWindows
     from d2rpick.deck.reader import Deck, Unread
@@ -421,5 +422,5 @@ class RunCase(Case):
         return rigid_legs
 
 
-Objection = tuple["Field", str]
+Objection = tuple[Field, str]
 """A field of the deck, and what is wrong there."""
