@@ -39,7 +39,7 @@ ENGINE = f"""\
 WIDE = 20  # columns of a real number
 
 
-def starter() -> str:
+def write_starter() -> str:
     """A strip of four shells, one end of which is given a velocity; SI units."""
     nodes = [(2 * i + j + 1, 0.1 * i, 0.1 * j) for i in range(5) for j in range(2)]
     text = f"#RADIOSS STARTER\n/BEGIN\nstrip\n{wide(2022, 0)}" + 2 * wide(
@@ -62,7 +62,7 @@ def starter() -> str:
     return text + f"/TH/PART/1\nparts\nDEF       MASS\n{wide(1)}/END\n"
 
 
-def solve(folder: Path, name: str) -> None:
+def run_solver(folder: Path, name: str) -> None:
     """Run the starter and all engine files; the test is skipped where there is no solver."""
     home = os.environ.get("OPENRADIOSS_PATH")
     if not home:
@@ -117,18 +117,18 @@ def test_printed_legs_run_to_the_end_and_are_rigid_in_their_windows(
 ) -> None:
     reference, switched = tmp_path / "reference", tmp_path / "switched"
     reference.mkdir()
-    (reference / "strip_0000.rad").write_text(starter())
+    (reference / "strip_0000.rad").write_text(write_starter())
     (reference / "strip_0001.rad").write_text(ENGINE)
     card = cards(windows, Printing(node=(MAIN,), end=END, name="strip"), "radioss")
     main, *legs = write_deck(str(reference / "strip_0000.rad"), card, str(switched))
     checked = check_deck(main)
-    assert [one.rule for one in checked.findings] == (
+    assert [finding.rule for finding in checked.findings] == (
         [] if vibrates else ["D2R407"]
     )  # its main node is not moved
     assert [(window.part, window.tr, window.td) for window in checked.windows] == [
         (1, *times) for times in windows
     ]
-    solve(switched, "strip")
+    run_solver(switched, "strip")
     histories = sorted(map(str, switched.glob("stripT0?")))
     assert len(histories) == len(legs)
     history = open_run(histories).history(Selection(parts=("1",)))
@@ -151,7 +151,7 @@ def test_sensors_switch_in_one_run_as_legs_do(tmp_path: Path) -> None:
     """Before tr all states are those of the run without switching, bit by bit; in the windows nothing deforms."""
     windows, reference = [(0.003, 0.006), (0.009, 0.014)], tmp_path / "reference"
     reference.mkdir()
-    (reference / "strip_0000.rad").write_text(starter())
+    (reference / "strip_0000.rad").write_text(write_starter())
     (reference / "strip_0001.rad").write_text(ENGINE)
     energies = {}
     for solver in ("radioss", "radioss-sensors"):
@@ -167,15 +167,17 @@ def test_sensors_switch_in_one_run_as_legs_do(tmp_path: Path) -> None:
         assert [
             (window.tr, window.td) for window in check_deck(main).windows
         ] == windows
-        solve(tmp_path / solver, "strip")
+        run_solver(tmp_path / solver, "strip")
         histories = sorted(map(str, (tmp_path / solver).glob("stripT0?")))
         energies[solver] = open_run(histories).history(Selection(parts=("1",)))
-    solve(reference, "strip")
+    run_solver(reference, "strip")
     plain = open_run([str(reference / "stripT01")]).history(Selection(parts=("1",)))
     for history in energies.values():
-        before = int(np.searchsorted(history.time, windows[0][0] - 4e-5))
-        assert before > 50
-        np.testing.assert_array_equal(history.energy[:before], plain.energy[:before])
+        leg_energies = int(np.searchsorted(history.time, windows[0][0] - 4e-5))
+        assert leg_energies > 50
+        np.testing.assert_array_equal(
+            history.energy[:leg_energies], plain.energy[:leg_energies]
+        )
         for (
             tr,
             td,
@@ -189,7 +191,7 @@ def test_sensors_switch_in_one_run_as_legs_do(tmp_path: Path) -> None:
 
 def test_a_first_run_switches_itself_at_the_same_step_twice(tmp_path: Path) -> None:
     """The strip flies 20 mm to a wall, at 5 m/s: rigid after the wait, and released by the force of the wall."""
-    head, _, rest = starter().partition("/RBODY/1")
+    head, _, body_lines = write_starter().partition("/RBODY/1")
     reals = [
         wide(*row, width=WIDE)
         for row in ((0.0, 0.0, 0.0), (0.0, 0.0, -0.02), (0.0, 0.0, 1.0))
@@ -199,7 +201,7 @@ def test_a_first_run_switches_itself_at_the_same_step_twice(tmp_path: Path) -> N
     reference = tmp_path / "reference"
     reference.mkdir()
     (reference / "strip_0000.rad").write_text(
-        f"{head}{wall}{thrown}{rest[rest.index('/TH/PART') :]}"
+        f"{head}{wall}{thrown}{body_lines[body_lines.index('/TH/PART') :]}"
     )
     (reference / "strip_0001.rad").write_text(
         f"/RUN/strip/1\n{END}\n/VERS/2022\n/DT\n0.9 0.0\n/TFILE/4\n2e-05\n"
@@ -207,11 +209,11 @@ def test_a_first_run_switches_itself_at_the_same_step_twice(tmp_path: Path) -> N
     ends = []
     for name in ("one", "other"):
         d2.first(reference / "strip_0000.rad", tmp_path / name, parts=1, wait=0.003)
-        solve(tmp_path / name, "strip")
+        run_solver(tmp_path / name, "strip")
         times = [
             open_run([str(tmp_path / name / f"stripT0{leg}")]).history(Selection()).time
             for leg in (1, 2, 3)
         ]
         ends.append([time[-1] for time in times])
     assert ends[0] == ends[1]
-    assert ends[0] == [pytest.approx(one, abs=5e-5) for one in (0.003, 0.004, END)]
+    assert ends[0] == [pytest.approx(stop, abs=5e-5) for stop in (0.003, 0.004, END)]

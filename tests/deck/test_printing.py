@@ -39,12 +39,12 @@ def test_few_digits_read_back(digits: int, exponent: int) -> None:
 def test_the_nearest_text_is_taken(value: float) -> None:
     text = shortest(value)
     assert len(text) <= LONGEST
-    others = [f"{value:.{n}f}" for n in range(12)] + [
+    texts = [f"{value:.{n}f}" for n in range(12)] + [
         f"{value:.{n}g}" for n in range(1, 12)
     ]
-    others += [other.removeprefix("0") for other in others if "." in other]
+    texts += [text.removeprefix("0") for text in texts if "." in text]
     assert abs(float(text) - value) <= min(
-        abs(float(other) - value) for other in others if len(other) <= LONGEST
+        abs(float(text) - value) for text in texts if len(text) <= LONGEST
     )
 
 
@@ -164,7 +164,7 @@ $#     pid     ptype
 """
 
 
-def rows(text: str) -> list[str]:
+def list_rows(text: str) -> list[str]:
     """Data lines of a card."""
     return [line for line in text.splitlines() if line[0] not in "$*"]
 
@@ -198,7 +198,7 @@ def test_the_check_finds_in_a_card_what_was_asked_for(
     assert all(len(line) <= 100 for line in card.text.split("\n"))
     assert all(
         a == " " or b == " "
-        for row in rows(card.text)
+        for row in list_rows(card.text)
         for a, b in zip(row[9::10], row[10::10], strict=False)
     )
 
@@ -259,8 +259,8 @@ def test_three_engine_files() -> None:
 
 def test_every_window_has_a_leg_and_one_from_the_start_none_before_it() -> None:
     card = radioss_cards([(0.0, 0.02), (0.05, 0.09)], BOX)
-    found = re.findall(r"/RUN/run/(\d)\n +(\S+)\n/RBODY/(\w+)", card.text)
-    assert found == [
+    printed_windows = re.findall(r"/RUN/run/(\d)\n +(\S+)\n/RBODY/(\w+)", card.text)
+    assert printed_windows == [
         ("1", "0.02", "ON"),
         ("2", "0.05", "OFF"),
         ("3", "0.09", "ON"),
