@@ -114,7 +114,7 @@ def _while_pushed(
 
 
 def waits_for_force(starter: Starter, number: int) -> bool:
-    """Whether a sensor, or one that it asks for, waits for a force."""
+    """Return True if a sensor, or one of its inputs, waits for a force."""
     asked = reached([number], lambda one: _asked(starter, one))
     return any(
         one in starter.sensors and starter.sensors[one].words[1] in _OF_FORCES
@@ -134,7 +134,7 @@ def _asked(starter: Starter, number: int) -> Sequence[int]:
 
 
 def only_force(starter: Starter) -> bool:
-    """Whether a deck has one contact or rigid wall that pushes: then what pushes by the momenta is that."""
+    """Return True if a deck has only one contact or rigid wall, so that the momenta show the force of that one."""
     contacts = [
         card
         for card in starter.named("INTER")
@@ -144,7 +144,7 @@ def only_force(starter: Starter) -> bool:
 
 
 def either(several: Sequence[Spans]) -> Spans:
-    """Spans in which one of several is active."""
+    """Return the spans in which at least one of several sensors is active."""
     joined: list[tuple[float, float]] = []
     for start, stop in sorted(one for spans in several for one in spans):
         if joined and start <= joined[-1][1]:
@@ -154,7 +154,7 @@ def either(several: Sequence[Spans]) -> Spans:
 
 
 def inactive(spans: Spans) -> Spans:
-    """Spans between those in which a sensor is active."""
+    """Return the spans in which a sensor is not active."""
     ends = [0.0, *(end for span in spans for end in span), math.inf]
     pairs = zip(ends[::2], ends[1::2], strict=True)
     return tuple((start, stop) for start, stop in pairs if start < stop)
