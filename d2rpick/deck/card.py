@@ -378,10 +378,10 @@ class Scope:
         """Return the text of a field with each reference ``&name`` to a character parameter replaced by its text."""
 
         def value(reference: re.Match[str]) -> str:
-            found = self.definition(reference[1].lower())
-            return (
-                found.value if found and isinstance(found.value, str) else reference[0]
-            )
+            definition = self.definition(reference[1].lower())
+            if definition and isinstance(definition.value, str):
+                return definition.value
+            return reference[0]
 
         return re.sub(REFERENCE, value, text) if "&" in text else text
 

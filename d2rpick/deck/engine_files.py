@@ -43,12 +43,12 @@ def legs(
     """
     caps = [step_cap or choose_step_cap(tr, td) for tr, td in windows]
     switches = zip(windows, caps, strict=True)
-    stops = [
-        (time, cap)
-        for (tr, td), leg_cap in switches
-        for time, cap in ((tr, None), (td, leg_cap))
-        if time > 0
-    ]
+    stops: list[tuple[float, float | None]] = []
+    for (tr, td), rigid_cap in switches:
+        if tr > 0:
+            stops.append((tr, None))
+        if td > 0:
+            stops.append((td, rigid_cap))
     if len(stops) >= _MOST_LEGS:
         raise DeckError(
             f"{len(windows)} windows need {len(stops) + 1} engine runs, at most {_MOST_LEGS} were expected"

@@ -28,7 +28,7 @@ _ISOLID: Final = {
     5: "HEPH5",
     14: "HA8",
     24: "HEPH",
-    **{one: f"SOLID{one}" for one in (1, 2, 12, 17, 18)},
+    **{number: f"SOLID{number}" for number in (1, 2, 12, 17, 18)},
 }
 _ISOLID_MEASURED: Final = {1, 17, 24}
 

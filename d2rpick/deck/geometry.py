@@ -120,7 +120,9 @@ def _depth(kind: str, data: PartData) -> float | None:
     """Return the factor that turns a size into a volume [length, area or 1]; None if it is unknown."""
     if kind in _SURFACES:
         return data.section.thickness
-    return data.section.area if kind in _LINES else 1.0 if kind in _VOLUMES else None
+    if kind in _LINES:
+        return data.section.area
+    return 1.0 if kind in _VOLUMES else None
 
 
 def _wave_speed(kind: str, material: Material | None) -> float | None:

@@ -300,13 +300,10 @@ def _followed(card: Card) -> bool:
 def _width(card: Card) -> int:
     """Return the number of columns of an id."""
     words = card.block.head.split()
-    return (
-        LONG
-        if card.width == LONG
-        else 10
-        if "%" in words[0] or words[1:2] == ["%"]
-        else 8
-    )
+    if card.width == LONG:
+        return LONG
+    has_percent_suffix = "%" in words[0] or words[1:2] == ["%"]
+    return 10 if has_percent_suffix else 8
 
 
 def _elements(

@@ -52,7 +52,10 @@ _OTHER_TIES: Final = (
         "CONSTRAINED_SHELL_TO_SOLID",
         "CONSTRAINED_NODE_SET",
     ),
-    *(f"CONSTRAINED_{one}_IN_SOLID" for one in ("BEAM", "SHELL", "SOLID", "LAGRANGE")),
+    *(
+        f"CONSTRAINED_{kind}_IN_SOLID"
+        for kind in ("BEAM", "SHELL", "SOLID", "LAGRANGE")
+    ),
 )
 # Global directions fixed by each code (0 to 7) of *NODE, *MAT_RIGID and *CONSTRAINED_GLOBAL.
 CODES: Final = ((), (0,), (1,), (2,), (0, 1), (1, 2), (2, 0), (0, 1, 2))

@@ -99,11 +99,11 @@ class Boundary(NamedTuple):
         cls, holds: Sequence[Hold | str], loads: Sequence[Gravity | str], *, whole: bool
     ) -> Boundary:
         """Separate supports and gravity from notes (text); if the deck is not ``whole``, gravity is unknown."""
-        gravity = tuple(one for one in loads if isinstance(one, Gravity))
+        gravity = tuple(load for load in loads if isinstance(load, Gravity))
         is_known = whole and len(gravity) == len(loads)
-        notes = tuple(one for one in (*holds, *loads) if isinstance(one, str))
+        notes = tuple(note for note in (*holds, *loads) if isinstance(note, str))
         return cls(
-            tuple(one for one in holds if isinstance(one, Hold)),
+            tuple(hold for hold in holds if isinstance(hold, Hold)),
             gravity if is_known else None,
             notes,
         )
@@ -397,8 +397,8 @@ class Inventory:
         """Return the rigid bodies that these parts form: parts connected by nodes, joints or springs form one body.
 
         A car with its engine on mounts is one body. Engine, battery and wheels alone are several, like loose wheels. If
-        all parts of a rigid body in ``switched`` are among these parts, they form one body. Springs do not connect
-        parts of two such bodies. A part of springs belongs to the body that contains all its nodes.
+        all parts of a rigid body of the deck (attribute `switched`) are among these parts, they form one body. Springs
+        do not connect parts of two such bodies. A part of springs belongs to the body that contains all its nodes.
         """
         rigid = {part for part in parts if not self._discrete(part)} or set(parts)
         ready = [body for body in self.ready if body and body <= rigid]

@@ -367,17 +367,15 @@ def _period(
     label: int, pieces: Mapping[int, _Piece], springs: list[_Spring]
 ) -> InnerPeriod:
     """Return the period in which a piece oscillates relative to the pieces on the other ends of its springs."""
-    piece, other_labels = (
-        pieces[label],
-        frozenset[int]().union(*(one.joins for one in springs)) - {label},
-    )
-    mass = 1 / (1 / piece.mass + 1 / sum(pieces[one].mass for one in other_labels))
-    stiffness = np.sum([one.stiffness for one in springs], axis=0)
+    piece = pieces[label]
+    joined = frozenset[int]().union(*(spring.joins for spring in springs))
+    mass_of_others = sum(pieces[other].mass for other in joined - {label})
+    reduced_mass = 1 / (1 / piece.mass + 1 / mass_of_others)
+    stiffness = np.sum([spring.stiffness for spring in springs], axis=0)
     largest = float(np.linalg.eigvalsh(stiffness)[-1])
-    time, shortest_period = (
-        2 * math.pi * math.sqrt(mass / one)
-        for one in (largest, float(np.trace(stiffness)))
-    )
+    total = float(np.trace(stiffness))
+    time = 2 * math.pi * math.sqrt(reduced_mass / largest)
+    shortest_period = 2 * math.pi * math.sqrt(reduced_mass / total)
     return InnerPeriod(
         time,
         shortest_period,

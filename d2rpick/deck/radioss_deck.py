@@ -150,21 +150,20 @@ def read_legs(source: SourceFile) -> list[Leg]:
 
 def kept_off(legs: Sequence[Leg]) -> tuple[int, ...]:
     """Return the main nodes that the first leg deactivates and no leg activates, in the order of the file."""
-    states = {
-        node.value: rigid
-        for leg in legs[:1]
-        for _, rigid, nodes in leg.switched
-        for node in nodes
-        if node.value
-    }
-    on = {
-        node.value
-        for leg in legs
-        for _, rigid, nodes in leg.switched
-        for node in nodes
-        if rigid
-    }
-    return tuple(node for node, rigid in states.items() if not rigid and node not in on)
+    is_rigid_in_first_leg: dict[int, bool] = {}
+    activated: set[int] = set()
+    for index, leg in enumerate(legs):
+        for _, rigid, nodes in leg.switched:
+            numbers_of_card = [node.value for node in nodes]
+            if rigid:
+                activated.update(numbers_of_card)
+            if index == 0:
+                is_rigid_in_first_leg.update(dict.fromkeys(numbers_of_card, rigid))
+    return tuple(
+        node
+        for node, rigid in is_rigid_in_first_leg.items()
+        if node and not rigid and node not in activated
+    )
 
 
 def _leg(card: Card) -> Leg:

@@ -226,7 +226,11 @@ def _materials(starter: Starter) -> Iterator[tuple[int, Material]]:
         modulus, poisson = (
             _at(rows, 1, at) if is_elastic else None for at in (0, _REAL)
         )
-        kind = "void" if law in _VOID else "airbag" if law in _AIRBAG else "deformable"
+        kind = "deformable"
+        if law in _VOID:
+            kind = "void"
+        elif law in _AIRBAG:
+            kind = "airbag"
         yield (
             number_of(card, 2),
             Material(f"MAT/{law}", kind, _at(rows, 0, 0), modulus, poisson),

@@ -64,12 +64,11 @@ class Run:
     @cached_property
     def named(self) -> frozenset[int]:
         """Return the main nodes that the legs switch."""
-        return frozenset(
-            node.value
-            for leg in self.legs
-            for _, _, nodes in leg.switched
-            for node in nodes
-        )
+        main_nodes: set[int] = set()
+        for leg in self.legs:
+            for _, _, nodes in leg.switched:
+                main_nodes.update(node.value for node in nodes)
+        return frozenset(main_nodes)
 
     @cached_property
     def resets(self) -> Mapping[int, float]:

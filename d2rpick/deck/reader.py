@@ -331,7 +331,11 @@ class _Reader:
                 width = LONG if match[1].upper() == "Y" else STANDARD
                 if not context.chain:
                     self.deck.long = width == LONG
-            card_width = LONG if "+" in suffix else STANDARD if "-" in suffix else width
+            card_width = width
+            if "+" in suffix:
+                card_width = LONG
+            elif "-" in suffix:
+                card_width = STANDARD
             self.take(
                 Card(
                     name,

@@ -200,13 +200,11 @@ class SourceFile:
         piece: int = _PIECE,
     ) -> None:
         self.name, self._piece = name, piece
-        self._file = (
-            stored(name)
-            if content is None
-            else Held(content)
-            if isinstance(content, bytes)
-            else content
-        )
+        if content is None:
+            content = stored(name)
+        elif isinstance(content, bytes):
+            content = Held(content)
+        self._file = content
         # Offsets and the line numbers at them, ascending.
         self._counted = [(0, 1)]
         self._longest = bound("LINE")

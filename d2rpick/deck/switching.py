@@ -384,7 +384,9 @@ class Unit(NamedTuple):
     @property
     def kind(self) -> str:
         """Return the kind of the id: part, part set or main node."""
-        return "part set" if self.is_set else "main node" if self.is_body else "part"
+        if self.is_set:
+            return "part set"
+        return "main node" if self.is_body else "part"
 
     @property
     def part(self) -> int | None:

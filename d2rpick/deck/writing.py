@@ -346,12 +346,10 @@ def _refuse_other_run(leg: Leg, root: str, printed: Sequence[Leg]) -> None:
         raise DeckError(
             f"the cards are for run {printed[0].name!r}, but this is run {leg.name!r}; print them with this name"
         )
-    nodes = {
-        node.value
-        for printed_leg in printed
-        for _, _, ids in printed_leg.switched
-        for node in ids
-    }
+    nodes: set[int] = set()
+    for printed_leg in printed:
+        for _, _, ids in printed_leg.switched:
+            nodes.update(node.value for node in ids)
     for card, rigid, ids in leg.switched:
         if rigid and (common_nodes := nodes & {node.value for node in ids}):
             problem = (

@@ -138,7 +138,7 @@ def read_configuration(
 ) -> Configuration:
     """Return the configuration in a table of settings.
 
-    ``others`` are keys that belong to other commands; so do nested tables, one for each command.
+    ``other_keys`` are keys that belong to other commands; so do nested tables, one for each command.
 
     Raises
     ------
@@ -219,9 +219,9 @@ class Checked(NamedTuple):
 def configuration_for(
     deck: str, override: Configuration, other_keys: Collection[str] = ()
 ) -> Configuration:
-    """Return the configuration nearest to a deck, with the keys of ``asked`` in place of its own.
+    """Return the configuration nearest to a deck, with the keys of ``override`` in place of its own.
 
-    ``others`` are keys that belong to other commands.
+    ``other_keys`` are keys that belong to other commands.
 
     Raises
     ------

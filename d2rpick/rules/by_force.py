@@ -164,7 +164,7 @@ def _find_pair(
     by_card: dict[SwitchSet, list[Event]],
     waiting: dict[SwitchSet, ForceSwitch],
 ) -> SwitchSet | None:
-    """Return the set that makes the same parts deformable again as the set ``there`` makes rigid, or None."""
+    """Return the set that makes the same parts deformable as ``rigid_card`` makes rigid, or None."""
     units = {event.unit for event in by_card[rigid_card]}
     for card, switch in waiting.items():
         if not switch.to_rigid and units & {event.unit for event in by_card[card]}:

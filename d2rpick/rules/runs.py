@@ -92,7 +92,9 @@ _SPRING: Final = "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-e
 def _wheel(
     further_nodes: str = "", members: tuple[int, ...] = (5, 6, 7, 8), part: int = 2
 ) -> Example:
-    """Return a run with a wheel as a second rigid body; ``named`` is added to /RBODY/OFF of the first engine file."""
+    """Return a run with a wheel as a second rigid body; ``further_nodes`` are added to /RBODY/OFF of the first
+    engine file.
+    """
     mesh = f"/PART/{part}\nwheel\n{_row(1, 1)}/SHELL/{part}\n{_row(2, 5, 6, 7, 8)}"
     wheel = f"{mesh}/GRNOD/NODE/6\nwheel\n{_row(*members)}"
     body = "/RBODY/2\nwheel\n" + _row(1809, 0, 0, 0, "", 0, 6)

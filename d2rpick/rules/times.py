@@ -250,7 +250,7 @@ def _equal(case: Case) -> Iterator[Objection]:
 def _mixed(times: list[float], end: float, run_end: str) -> str | None:
     """Return a message if the times fit a run up to ``end`` only after multiplication by 1000 or 1/1000, else None.
 
-    ``what`` names the end in the message. Times at or before the start of the run fit in any unit.
+    ``run_end`` names the end in the message. Times at or before the start of the run fit in any unit.
     """
     later = [time for time in times if time > 0]
     if not later:
@@ -328,16 +328,15 @@ def _faults(case: Case, rule_id: str) -> Iterator[Objection]:
         for window in windows
         if window.part is not None
     )
-    part_ids = grouped(
-        ((event.by, window.unit.kind, fault.message), window.unit.id)
-        for window in windows
-        for fault in case.judge.faults(
-            window, parts_by_times.get((window.tr, window.td), ())
-        )
-        if (event := window.closed if fault.at_td else window.opened)
-        and fault.rule == rule_id
-    )
-    for (card, kind, message), ids in part_ids.items():
+    objections: list[tuple[tuple[SwitchSet, str, str], int]] = []
+    for judged_window in windows:
+        together = parts_by_times.get((judged_window.tr, judged_window.td), ())
+        for fault in case.judge.faults(judged_window, together):
+            event = judged_window.closed if fault.at_td else judged_window.opened
+            if event and fault.rule == rule_id:
+                key = event.by, judged_window.unit.kind, fault.message
+                objections.append((key, judged_window.unit.id))
+    for (card, kind, message), ids in grouped(objections).items():
         yield card.time_field, f"{name_units(ids, kind)}: {message}"
 
 

@@ -1,4 +1,4 @@
-"""Decks that are cut, rewritten or replaced while they are read: one of their states or an error, never a mix."""
+"""Decks that are cut, rewritten or replaced while they are read give one of their states or an error, never a mix."""
 
 import builtins
 import itertools
@@ -37,13 +37,13 @@ TWICE = ONCE.replace(
 )
 
 
-# Bytes beside what a deck holds: a file of more than 256 KiB stays on its disk, one of more than 4 MiB is searched by
+# Sizes of comments added to a deck: a file above 256 KiB stays on disk, a file above 4 MiB is searched by
 # threads and read in pieces.
 SIZES = {"small": 0, "big": 300_000, "big, by threads": 5_000_000}
 
 
 def grow_text(text: str, size: str) -> str:
-    """A deck with so many comments in its middle, where a cut leaves half of it."""
+    """Return a deck with comments of this size in its middle, so that a cut leaves half of the deck."""
     middle = text.index("\n", len(text) // 2) + 1
     sign = "#" if text[0] in "#/" else "$"
     return (
@@ -53,7 +53,7 @@ def grow_text(text: str, size: str) -> str:
 
 @contextmanager
 def change_after(turns: int, change: Callable[[], None]) -> Iterator[list[int]]:
-    """Change something before a file is opened or read once so many turns are over; the number of turns."""
+    """Change something before the file access number ``turns``; provide the number of accesses so far."""
     taken: list[int] = []
 
     def at_the_turn(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -85,7 +85,7 @@ def rewrite_file(file: Path, text: str) -> None:
 
 
 def rewrite_in_place(file: Path, text: str) -> None:
-    """As long as before."""
+    """Rewrite the file with a text of the same length."""
     size = file.stat().st_size
     with file.open("r+") as target:
         target.write(text[:size].ljust(size, "\n"))
@@ -122,7 +122,7 @@ def read_parts_of(path: str) -> Hashable:
 
 
 def find_answer(ask: Callable[[str], Hashable], path: str) -> Hashable:
-    """What is found, or the error."""
+    """Return the result, or the text of the error."""
     try:
         return ask(path)
     except DeckError as error:
@@ -130,7 +130,7 @@ def find_answer(ask: Callable[[str], Hashable], path: str) -> Hashable:
 
 
 def make_older(folder: Path) -> None:
-    """Let files look old, so that a change shows in their times however soon it comes."""
+    """Make the files look old, so that any later change alters their times."""
     for file in folder.iterdir():
         os.utime(file, (1e9, 1e9))
 
@@ -148,7 +148,7 @@ CASES = {
 THREADED = (
     "deck",
     "elements",
-)  # what is asked of one file does not depend on how many there are
+)  # the reads of one file do not depend on the number of files
 
 
 @pytest.mark.slow
@@ -183,7 +183,7 @@ def test_a_change_at_any_moment_gives_one_of_the_states_or_an_error(
         with change_after(turn, lambda: change(file, text)) as taken:
             outcomes.add(find_answer(ask, path))
         if len(taken) <= turn:
-            break  # it was read before the change
+            break  # the file was read before the change
     errors = {error for error in outcomes if isinstance(error, str)} - {
         first_state,
         second_state,
@@ -221,7 +221,7 @@ def test_rows_that_are_read_late_are_those_of_the_keywords(
 
 @pytest.mark.parametrize("size", ["small", "big"])
 def test_what_is_written_is_what_was_checked(size: str, tmp_path: Path) -> None:
-    """Whenever both files are written anew with cards in them, which would have been refused."""
+    """Both files may be rewritten at any time with cards that `write_deck` refuses."""
     mesh = grow_text("*NODE\n$ of a mesh\n", size)
     text, files = f"*KEYWORD\n{PARTS}{mesh}*INCLUDE\nmore.k\n*END\n", {"more.k": mesh}
     read_calls = (
@@ -289,7 +289,7 @@ def test_a_deck_that_changes_all_the_time_is_an_error(
         match=r"main\.k: the file keeps changing while it is read; read it again",
     ):
         read_deck(path)
-    assert main_decks(str(tmp_path)) == [path]  # it is not passed over
+    assert main_decks(str(tmp_path)) == [path]  # the file is not skipped
 
 
 def test_a_pipe_gives_its_bytes_once_and_hangs_no_folder(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Times of switches by force that give planned windows, read back by the check that follows such switches."""
+"""Times of force switches for planned windows, which the check of such switches reads back."""
 
 import itertools
 import math
@@ -27,7 +27,7 @@ def test_the_wait_lets_no_window_begin_before_it_is_planned() -> None:
     pair = time_pair(planned, PUSHES)
     assert [tr for tr, _ in pair.windows] == pytest.approx([0.02, 0.08])
     assert pair.earliest == 0.02
-    assert 0.12 < pair.latest < 0.13  # in the contact behind the last window
+    assert 0.12 < pair.latest < 0.13  # in the contact after the last window
     sensor = time_sensor(planned, PUSHES)
     assert sensor.wait == pytest.approx(0.01)
     assert flatten_windows(sensor.windows) == pytest.approx([0.02, 0.05, 0.08, 0.119])
@@ -45,7 +45,7 @@ def test_chatter_between_two_windows_is_waited_for() -> None:
     assert flatten_windows(timing.windows) == pytest.approx([0.013, 0.05, 0.073, 0.12])
     with pytest.raises(
         DeckError, match="no wait lets a sensor switch"
-    ):  # the gap from 0.06 to 0.062 is left open
+    ):  # the short gap from 0.06 to 0.062 stays without a window
         time_sensor([(0.011, 0.05), (0.0705, 0.12)], PUSHES)
 
 
@@ -72,7 +72,7 @@ def test_without_a_contact_behind_it_a_pair_switches_nothing_back() -> None:
 def test_windows_after_every_contact_are_met_by_a_common_wait(
     gaps: list[float], share: float
 ) -> None:
-    """Contacts of length 1 with gaps; planned is each gap from the same time after its contact on."""
+    """Contacts of length 1 with gaps: each window begins at the same time after a contact and fills the gap."""
     starts = [sum(gaps[:at]) + at for at in range(len(gaps) + 1)]
     contacts = tuple((start, start + 1.0) for start in starts)
     wait = share * min(gaps)

@@ -165,4 +165,6 @@ def test_texts_that_are_too_long_for_a_number_are_not_kept() -> None:
     assert (
         next(problem for _, problem in card.problems) == f"{'x' * 40!r} is not a number"
     )
-    assert plain.cache_info().currsize <= size_before + 1  # the 1 behind it
+    assert (
+        plain.cache_info().currsize <= size_before + 1
+    )  # the digit 1 after the blanks

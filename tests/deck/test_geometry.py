@@ -1,4 +1,4 @@
-"""Masses and stable steps of parts, against sizes worked out by hand; where parts lie, and what nodes a run watches."""
+"""Masses, stable time steps and positions of parts, compared with values by hand; watched nodes of a run."""
 
 import math
 from dataclasses import replace
@@ -111,7 +111,7 @@ ALONG, ACROSS = 12, 5
 
 
 def make_plate(far: float = 0.0) -> Inventory:
-    """A plate of 3.6 x 1.5 of one part in shells, turned into the plane x = far, and a part of two springs."""
+    """Return a deck with a plate of shells, 3.6 x 1.5, in the plane x = far, and a part of two springs."""
     y, z = np.meshgrid(
         np.linspace(0, 3.6, ALONG + 1), np.linspace(0, 1.5, ACROSS + 1), indexing="ij"
     )
@@ -216,7 +216,7 @@ PLATE_MESH = f"{dyna.HEAD}*NODE\n{dyna.write_nodes()}{PLATE}"
         (
             f"{dyna.HEAD}*INCLUDE_TRANSFORM\nmesh.k\n\n\n\n     &turn\n*END\n",
             False,
-        ),  # not known, so not at rest
+        ),  # unknown, so not at rest
     ],
 )
 def test_where_a_deck_moves_its_nodes_no_part_is_placed(

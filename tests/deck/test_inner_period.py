@@ -1,4 +1,4 @@
-"""The longest inner period by masses and springs: what a closed form gives, and what is not known."""
+"""The longest period of masses on springs: values of a closed form, and cases in which it is unknown."""
 
 import math
 from pathlib import Path
@@ -29,7 +29,7 @@ def test_two_masses_on_parallel_springs(
     masses: list[float],
     stiffness: list[float],
 ) -> None:
-    """All act along x: both ends of the bracket are the closed form of two masses."""
+    """All springs act along x, so the period and its lower limit equal the closed form of two masses."""
     first_mass, second_mass = masses
     expected = (
         2
@@ -52,7 +52,7 @@ def test_the_longest_of_several_counts_and_light_pieces_do_not(tmp_path: Path) -
     assert periods
     assert (
         periods[0] < 1
-    )  # [s]; the light one on its soft spring swings in 0.6 s and against half of all
+    )  # [s]; the light mass on its soft spring has a period of 0.6 s
     softer = find_period(
         tmp_path, cubes((5.0, 5.0, 0.01), [(10, 20, 1e6), (20, 30, 0.1)])
     )

@@ -1,4 +1,4 @@
-"""What joins parts that share no nodes: in every form that is followed, and what is named because it is not."""
+"""Joints of parts that share no nodes, in every form that d2rpick reads, and notes on those that it cannot read."""
 
 from pathlib import Path
 
@@ -78,7 +78,7 @@ def test_several_welds_on_the_lines_of_a_keyword_join_a_chain(tmp_path: Path) ->
     assert inventory.groups([7, 11]) == (
         (7,),
         (11,),
-    )  # what stays deformable joins nothing
+    )  # a part that stays deformable joins nothing
 
 
 @pytest.mark.parametrize(
@@ -97,7 +97,7 @@ def test_several_welds_on_the_lines_of_a_keyword_join_a_chain(tmp_path: Path) ->
         (
             "*CONSTRAINED_NODAL_RIGID_BODY\n" + wide(1, 0, 77),
             "nodal rigid body",
-        ),  # of a set that is not there
+        ),  # the set does not exist
         ("*CONSTRAINED_SPR2\n" + wide(7, 9), "*CONSTRAINED_SPR2"),
         (
             "*CONSTRAINED_INTERPOLATION\n" + wide(1, 2, 123456),
@@ -117,7 +117,7 @@ def test_a_tie_that_is_not_followed_is_named_and_leaves_the_bodies_open(
     assert "main.k:" in tie
     assert bodies_of(inventory, [7, 9]) == ()
     assert bodies_of(inventory, [7]) == (RigidBody((7,)),)
-    assert inventory.complete  # of its cost all is known
+    assert inventory.complete  # its cost is known
 
 
 RADIOSS = "".join(

@@ -43,7 +43,7 @@ def read_ls_dyna(folder: Path, further_cards: str) -> Inventory:
 
 
 def find_held_parts(inventory: Inventory) -> tuple[set[int], bool]:
-    """Parts that are held, and whether the model is."""
+    """Return the parts that are held, and True if the model is held."""
     by_part, whole = supports_of(inventory)
     return set(by_part), bool(whole)
 
@@ -55,7 +55,7 @@ def find_held_parts(inventory: Inventory) -> tuple[set[int], bool]:
         (write_group(1, 1) + write_support("000 000", 1), (set(), False)),
         (write_group(1, 1) + write_support("000 111", 1), (BODY, True)),  # shells have rotations
         (write_group(1, 22) + write_support("111 111", 1), (WHEEL, True)),
-        (write_group(1, *range(31, 37)) + write_support("111 111", 1), (OTHER, False)),  # fixed all over: an obstacle
+        (write_group(1, *range(31, 37)) + write_support("111 111", 1), (OTHER, False)),  # completely fixed: an obstacle
         (write_group(1, *range(31, 37)) + write_support("110 111", 1), (set(), False)),  # no motion there, free along z
         ("/GRNOD/PART/1\nparts\n" + wide(9) + write_support("111 000", 1), (OTHER, True)),
         (write_group(1, 1) + "/IMPVEL/1\nmoved\n" + wide(1, "Y", 0, 0, 1), (BODY, True)),
@@ -81,7 +81,7 @@ def test_a_support_holds_what_hangs_together_with_its_nodes(
             (1, 2, 3, 4),
             "011 000",
             BODY,
-        ),  # they lie at different heights, where gravity pulls
+        ),  # they lie at different heights along gravity
         ((1, 2, 3, 4), "010 000", set()),
     ],
 )
@@ -101,7 +101,7 @@ def test_a_symmetry_plane_holds_nothing(
             )
         )[0]
         == BODY
-    )  # its plane is not known
+    )  # its plane is unknown
 
 
 def test_imposed_motion_holds_from_its_start_to_its_stop_and_always_where_a_sensor_is_asked(
@@ -178,7 +178,7 @@ def write_gravity(
 
 
 def find_surroundings(inventory: Inventory) -> Surroundings:
-    """What a deck tells of a run of nothing."""
+    """Return the surroundings that a deck defines, for a run without other information."""
     return in_deck(Run((), ()), inventory).surroundings
 
 

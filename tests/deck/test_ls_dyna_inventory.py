@@ -19,7 +19,7 @@ HEAD = "*KEYWORD\n*PART\na\n         7         1         1\n*PART\nb\n         9
 
 
 def write_nodes(width: int = 8, real: int = 16, count: int = 24) -> str:
-    """Node cards of a row of unit cubes."""
+    """Return the node lines of a row of unit cubes."""
     coordinates = [(i // 4, i % 2, i // 2 % 2) for i in range(count)]
     return "".join(
         f"{n:{width}d}" + "".join(f"{float(x):{real}.4f}" for x in position) + "\n"
@@ -43,7 +43,7 @@ LINES = SHELLS.splitlines(keepends=True)
 
 
 def insert_after_each(line: str) -> str:
-    """Shells, each with a line of an option below."""
+    """Return shells, each followed by a line of an option."""
     return "".join(f"{shell}{line}\n" for shell in LINES)
 
 
@@ -123,11 +123,11 @@ def test_two_line_solids_go_on_over_the_pieces_that_are_read_together(
     tmp_path: Path,
 ) -> None:
     text = "".join(row(n, 7) + row(*range(1, 9)) for n in range(1, 60_001))
-    assert len(text) > 4 << 20  # a piece ends in it
+    assert len(text) > 4 << 20  # a piece ends within the element
     for shift in (
         "",
         "$" * 63 + "\n",
-    ):  # then the other line of an element is the last of a piece
+    ):  # now a piece ends after the other line of an element
         solid_inventory = read_text(
             tmp_path, f"{HEAD}*NODE\n{write_nodes()}*ELEMENT_SOLID\n{shift}{text}*END\n"
         )
@@ -199,7 +199,7 @@ def test_a_deck_cut_at_any_byte_of_its_mesh_says_that_it_is_cut(tmp_path: Path) 
     assert (count_elements(cut_inventory), cut_inventory.complete) == (whole, True)
     (tmp_path / "mesh.k").write_text(
         text.removeprefix(HEAD), "utf-8"
-    )  # an include may do without *END
+    )  # an include needs no *END
     cut_inventory = read_text(tmp_path, f"{HEAD}*INCLUDE\nmesh.k\n")
     assert (count_elements(cut_inventory), cut_inventory.complete) == (whole, True)
 

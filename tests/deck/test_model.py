@@ -1,4 +1,4 @@
-"""Which rigid bodies parts become: what springs hold, what a rigid body of the deck has, and what nothing joins."""
+"""Rigid bodies that parts form: connected by springs, by a rigid body of the deck, or by nothing."""
 
 from pathlib import Path
 
@@ -46,7 +46,7 @@ FIRST, SECOND, THIRD = range(1, 41), range(41, 45), range(45, 49)
 
 
 def test_a_small_part_beside_a_big_one_is_a_body_of_its_own(tmp_path: Path) -> None:
-    """Loose wheels were merged with the car that had three quarters of the nodes."""
+    """Earlier, loose wheels were merged with a car that had three quarters of the nodes."""
     assert read_radioss(tmp_path).bodies([1, 2, 3]) == ((1,), (2,), (3,))
 
 
@@ -81,7 +81,7 @@ def test_a_rigid_body_that_is_there_to_be_switched_says_which_parts_become_one(
     assert inventory.bodies([2, 3]) == (
         (2,),
         (3,),
-    )  # it has another part too: it cannot serve these
+    )  # it contains another part too, so it cannot switch these
     assert inventory.groups([1, 2, 3]) == ((1,), (2,), (3,))
     assert inventory.joined == {}
 

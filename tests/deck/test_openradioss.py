@@ -1,6 +1,6 @@
-"""Printed engine files in the hands of the real solver: they run to the end, and the parts are rigid in the window.
+"""Printed engine files run with the real solver to the end, and the parts are rigid in the windows.
 
-Runs only where OPENRADIOSS_PATH names an installation of OpenRadioss; takes some seconds.
+These tests run only if OPENRADIOSS_PATH names an installation of OpenRadioss, and take some seconds.
 """
 
 import os
@@ -40,7 +40,7 @@ WIDE = 20  # columns of a real number
 
 
 def write_starter() -> str:
-    """A strip of four shells, one end of which is given a velocity; SI units."""
+    """Return a strip of four shells with a velocity at one end; SI units."""
     nodes = [(2 * i + j + 1, 0.1 * i, 0.1 * j) for i in range(5) for j in range(2)]
     text = f"#RADIOSS STARTER\n/BEGIN\nstrip\n{wide(2022, 0)}" + 2 * wide(
         "kg", "m", "s", width=WIDE
@@ -124,7 +124,7 @@ def test_printed_legs_run_to_the_end_and_are_rigid_in_their_windows(
     checked = check_deck(main)
     assert [finding.rule for finding in checked.findings] == (
         [] if vibrates else ["D2R407"]
-    )  # its main node is not moved
+    )  # the velocity does not move its main node
     assert [(window.part, window.tr, window.td) for window in checked.windows] == [
         (1, *times) for times in windows
     ]
@@ -139,7 +139,7 @@ def test_printed_legs_run_to_the_end_and_are_rigid_in_their_windows(
         assert held.sum() > 50
         assert (
             np.ptp(history.energy[held]) <= 1e-9 * history.energy.max()
-        )  # what is locked in stays as it is
+        )  # the locked-in energy stays constant
         inside |= held
     assert (
         bool(np.ptp(history.energy[~inside]) > 0.5 * history.energy.max()) == vibrates
@@ -148,14 +148,14 @@ def test_printed_legs_run_to_the_end_and_are_rigid_in_their_windows(
 
 
 def test_sensors_switch_in_one_run_as_legs_do(tmp_path: Path) -> None:
-    """Before tr all states are those of the run without switching, bit by bit; in the windows nothing deforms."""
+    """Before tr all states equal those of the reference run bit by bit; in the windows nothing deforms."""
     windows, reference = [(0.003, 0.006), (0.009, 0.014)], tmp_path / "reference"
     reference.mkdir()
     (reference / "strip_0000.rad").write_text(write_starter())
     (reference / "strip_0001.rad").write_text(ENGINE)
     energies = {}
     for solver in ("radioss", "radioss-sensors"):
-        # the cap of one run holds while it is deformable, too, where the step is 1.7e-5
+        # the limit of the only run also applies while it is deformable, with a time step of 1.7e-5
         card = cards(
             windows,
             Printing(node=(MAIN,), end=END, name="strip", step_cap=2.5e-5),
@@ -181,7 +181,9 @@ def test_sensors_switch_in_one_run_as_legs_do(tmp_path: Path) -> None:
         for (
             tr,
             td,
-        ) in windows:  # at which step it becomes rigid differs, and with it the energy that is locked in
+        ) in (
+            windows
+        ):  # the time step of the switch differs, and so does the locked-in energy
             held = history.energy[
                 (history.time > tr + 6e-5) & (history.time < td - 6e-5)
             ]

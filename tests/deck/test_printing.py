@@ -18,7 +18,7 @@ from tests.command import refused, run
 from tests.decks import found, read, spans, write
 
 TIMES = st.floats(1e-9, 1e9)
-# Something pushes from the end of each window in the test to the next one.
+# A contact force acts from the end of each window in the test to the next window.
 ALL = Printing(
     part=(11,),
     node=(1001,),
@@ -116,7 +116,7 @@ def test_a_file_of_windows() -> None:
 
 
 def test_windows_are_read_from_the_journal_of_a_driven_run() -> None:
-    """A leg takes the place of those of its number: of a probe that went too far, or of a flight that was left out."""
+    """A leg replaces one with the same number: of a probe that went too far, or of a skipped flight."""
     legs = [("load", 1, 0.0, 0.06), ("probe", 2, 0.06, 0.1), ("probe", 3, 0.1, 0.2), ("rigid", 3, 0.1, 0.145),
             ("load", 4, 0.145, 0.16), ("probe", 5, 0.16, 0.17), ("load", 5, 0.16, 0.2), ("probe", 6, 0.2, 0.3),
             ("probe", 7, 0.3, 0.32), ("load", 7, 0.3, 0.4), ("load", 8, 0.4, 0.5)]  # fmt: skip
@@ -127,7 +127,7 @@ def test_windows_are_read_from_the_journal_of_a_driven_run() -> None:
     assert read_windows(text, "drive.ndjson") == ((0.06, 0.145), (0.2, 0.3))
     back = "\n".join(
         [*lines, '{"event": "back", "legs": 5}']
-    )  # to before the second flight
+    )  # up to the second flight
     assert read_windows(back, "drive.ndjson") == ((0.06, 0.145),)
     with pytest.raises(DeckError, match="no window was found"):
         read_windows('{"event": "prepared"}\n', "drive.ndjson")
@@ -165,7 +165,7 @@ $#     pid     ptype
 
 
 def list_rows(text: str) -> list[str]:
-    """Data lines of a card."""
+    """Return the data lines of a card."""
     return [line for line in text.splitlines() if line[0] not in "$*"]
 
 
@@ -219,7 +219,7 @@ def test_warnings_are_those_that_apply() -> None:
     assert "merged" not in text(MERGED)
     assert "merged" not in text(Printing(part=(11,)))
     assert "already" in text(PARTS._replace(merge=5))
-    assert "    7.0e-5 " in text(PARTS)  # a thousandth of the window
+    assert "    7.0e-5 " in text(PARTS)  # 1/1000 of the window
     assert "    1.0e-5 " in text(PARTS._replace(step_cap=1e-5))
 
 

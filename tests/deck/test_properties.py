@@ -1,4 +1,4 @@
-"""Decks made at random: what is written is read, and no bytes whatever bring the check down."""
+"""Random decks: the reader returns what was written, and no bytes make the check fail."""
 
 import contextlib
 import string
@@ -18,7 +18,7 @@ TIMES = st.integers(1, 10**6).map(lambda n: n / 1000)
 
 @dataclass(frozen=True)
 class Written:
-    """Windows, and how the deck that holds them is to be written."""
+    """Windows, and how their deck is written."""
 
     windows: list[tuple[int, float, float | None]] = field(default_factory=list)
     style: str = "fixed"
@@ -48,7 +48,7 @@ def draw_deck(draw: st.DrawFn) -> Written:
 
 
 def write_text(written: Written) -> str:
-    """The deck: one card per switch."""
+    """Return the deck with one card per switch."""
     width = 20 if written.style == "long" else 10
     lines = ["*KEYWORD" + (" LONG=Y" if written.style == "long" else "")]
 

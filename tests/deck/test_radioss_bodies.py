@@ -1,4 +1,4 @@
-"""Rigid bodies that a deck lacks: their parts, their main node, and what moves it."""
+"""Rigid bodies that a deck lacks: their parts, their main node, and the velocities and gravity on it."""
 
 from pathlib import Path
 
@@ -22,7 +22,7 @@ BODY = f"/RBODY/7\nbody\n{wide(99, 0, 0, 0, '', 0, 70)}"
 
 
 def write_quad(part: int, left_edge: float) -> tuple[str, str]:
-    """Nodes and shell of a square part of side 1 from x = left on, and its /PART."""
+    """Return nodes and shell of a square part of side 1 that begins at x = left_edge, and its /PART."""
     ids = [10 * part + i for i in range(4)]
     corners = (
         (left_edge, 0.0),
@@ -111,7 +111,7 @@ def write_bodies(
 
 
 def test_each_group_of_joined_parts_gets_a_body(tmp_path: Path) -> None:
-    """Springs go with the parts that they join; the copy is the deck with cards before its end."""
+    """Springs belong to the body of their parts; the copy is the deck with the cards before its end."""
     nodes, run, name = write_bodies(tmp_path)
     assert run.starter
     bodies = {body.node.value: body for body in run.starter.bodies}
@@ -147,7 +147,7 @@ def test_the_main_node_lies_at_the_centre_of_mass(tmp_path: Path) -> None:
 
 
 def test_what_moves_and_pulls_the_parts_acts_on_the_main_nodes(tmp_path: Path) -> None:
-    """Else the starter puts the bodies at rest (D2R407), and gravity leaves them alone."""
+    """Otherwise the starter sets the bodies to rest (D2R407), and gravity does not act on them."""
     everything = write_group(
         1, *(10 * part + i for part in (1, 2, 3) for i in range(4))
     )

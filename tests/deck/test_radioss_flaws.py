@@ -1,4 +1,4 @@
-"""What becomes of the nodes of rigid bodies, held against numbers that OpenRadioss (bd4557ba7) gave for these decks.
+"""Flaws of rigid bodies, compared with numbers that OpenRadioss (bd4557ba7) gave for these decks.
 
 The decks are the strip of four shells of `tests.deck.test_openradioss`: nodes 1 to 10, 0.1 apart, and main node 99.
 """
@@ -23,7 +23,7 @@ SENSOR = f"/SENSOR/TIME/5\nclock\n{wide(0.001, 0.002, width=WIDE)}"
 def find_run_flaws(
     folder: Path, further_cards: str = "", *legs: str, deck: str = ""
 ) -> tuple[Flaw, ...]:
-    """Flaws of the strip with more cards in its starter deck; ``legs`` are the lines of each below /RUN."""
+    """Return the flaws of the strip with further cards; ``legs`` are the lines of each leg below /RUN."""
     (folder / "strip_0000.rad").write_text(
         (deck or write_starter()).replace("/TH/PART/1", f"{further_cards}/TH/PART/1")
     )
@@ -94,7 +94,7 @@ def write_wall(
                 "PLANE/1", 0.25, (0.05, 0, 0), (1, 0, 0), fields=wide(0, 0, 0, 0, 1)
             ),
             4,
-        ),  # Iform is none before 2026
+        ),  # before 2026 there is no Iform
     ],
     ids=lambda text: text.split("\n", 1)[0] if isinstance(text, str) else "",
 )
@@ -226,7 +226,7 @@ def test_a_body_that_an_engine_file_lets_rest_is_found(
 def test_a_velocity_of_the_first_leg_stands_for_that_of_the_starter(
     tmp_path: Path,
 ) -> None:
-    """Of a body that is off its nodes are moved, whatever velocity the starter gave them."""
+    """/INIV moves the nodes of a body that is off, whatever velocity the starter gave them."""
     assert find_run_flaws(tmp_path, write_velocity(1), OFF + write_start(1, 10)) == ()
 
 

@@ -97,7 +97,7 @@ def test_elements_between_the_parts_of_a_body_are_rigid_with_it(tmp_path: Path) 
     assert set(read_inventory.elements_within([1, 2])) == {
         1,
         2,
-    }  # two bodies: what is between them bends
+    }  # two bodies: the elements between them deform
     assert set(read_inventory.elements_within([1, 3])) == {1, 3}
     assert set(read_inventory.elements_within([1, 2, 3])) == {1, 2, 3}
 

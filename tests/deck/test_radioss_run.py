@@ -1,4 +1,4 @@
-"""Radioss runs: which files belong together, and when which part is rigid."""
+"""Radioss runs: which files belong together, and when each part is rigid."""
 
 from pathlib import Path
 
@@ -258,7 +258,7 @@ BRICK = "/BRICK/1\n" + "".join(f"{n:10d}" for n in (9, 1, 2, 3, 4, 5, 6, 7, 8)) 
         (
             f"{SOLID}{BRICK}/DEF_SOLID\n{'':70}         2\n/DEF_SOLID\n         1\n",
             False,
-        ),  # the first one counts
+        ),  # the first card is used
         (SOLID + BRICK.replace("BRICK", "PENTA6"), False),
         (f"/PROP/TYPE20/1\nthick shell\n\n{BRICK}", False),  # HA8 is its default
         ("/TETRA4/1\n         9         1         2         3         4\n", True),
@@ -277,7 +277,7 @@ def test_stresses_of_solids_without_a_frame_do_not_turn(
         (("0.09", f"{ON}/DTIX\n1e-6 1e-6\n"), ("0.2", OFF)),
     )
     (tmp_path / "box_0003.rad").unlink()
-    assert check_deck(start).findings == ()  # without stress there is nothing to turn
+    assert check_deck(start).findings == ()  # without stress nothing can rotate wrongly
 
 
 def test_files_of_a_run_are_found_by_name_or_by_what_they_hold(tmp_path: Path) -> None:
@@ -314,7 +314,7 @@ def test_an_include_that_is_asked_for_twice_is_read_once(tmp_path: Path) -> None
         write_run(tmp_path, f"{head}#include inner.inc\n#include inner.inc\n/END\n")
     ).deck.sources[:3]
     assert [Path(source.name).name for source in inner] == ["inner.inc", "inner.inc"]
-    assert inner[0] is inner[1]  # both are of one state
+    assert inner[0] is inner[1]  # both have the same state of the file
 
 
 def test_an_include_of_the_starter_deck_is_read(tmp_path: Path) -> None:

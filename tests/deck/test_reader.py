@@ -1,4 +1,4 @@
-"""The reader: where keywords and fields stand, formats, comments, parameters, includes, and what tells of a cut."""
+"""The reader: places of keywords and fields, formats, comments, parameters, includes and truncated files."""
 
 import gzip
 from pathlib import Path
@@ -292,5 +292,5 @@ def test_a_parameter_without_a_value_is_named_with_its_place(
 
 @pytest.mark.parametrize("keyword", [*KINDS, *sorted(NOT_COUNTED), "NODE"])
 def test_all_elements_of_radioss_are_mesh(keyword: str) -> None:
-    """Their names stand twice: a check does without the inventory, which takes time to load."""
+    """The names are defined twice, because a check does not load the inventory."""
     assert holds_mesh(Block(SourceFile("run_0000.rad", b""), 0, None, f"/{keyword}/1"))

@@ -17,13 +17,13 @@ from tests.deck.test_openradioss import run_solver
 from tests.decks import wide
 
 WIDE = 20  # columns of a real number
-STEP = 1e-5  # of a cycle
+STEP = 1e-5  # duration of a cycle
 OFF, ON, RESET = "/RBODY/OFF\n", "/RBODY/ON\n", "/SENS/RESET\n"
 Spans = Mapping[int, Sequence[tuple[float, float | None]]]
 
 
 class Listed(NamedTuple):
-    """A run: what its starter deck has beside three plates, what its legs say, and when which part is rigid."""
+    """A run: its starter cards besides three plates, the cards of its legs, and when each part is rigid."""
 
     starter: str
     legs: tuple[str, ...]
@@ -31,7 +31,7 @@ class Listed(NamedTuple):
     version: int = 2023
     parts: Mapping[
         int, str
-    ] = {}  # lines of /PART below the title, of plates that have others
+    ] = {}  # lines of /PART below the title, for plates with other than the default lines
 
 
 def write_head(version: int) -> str:
@@ -271,7 +271,7 @@ def test_check_gives_the_spans_and_parts_of_the_listings(
 
 
 def read_events(folder: Path) -> Iterator[tuple[int, bool, float]]:
-    """Parts that become rigid or deformable, and when, by the listings of the engine: element i is that of part i."""
+    """Yield part, True if it becomes rigid, and time from the listings of the engine; element i belongs to part i."""
     length = 0.0
     for listing in sorted(folder.glob("X_000[1-9].out")):
         now = length
@@ -283,13 +283,13 @@ def read_events(folder: Path) -> Iterator[tuple[int, bool, float]]:
 
 
 def find_spans_by_listing(folder: Path) -> dict[int, list[tuple[float, float]]]:
-    """Spans by part, those of a few cycles left out: a part whose first event is an activation was rigid before."""
+    """Return the rigid spans by part without those of a few cycles; an activation first means rigid before."""
     rigid_spans: dict[int, list[tuple[float, float]]] = {}
     for part, rigid, now in read_events(folder):
         spans = rigid_spans.setdefault(part, [])
         if rigid:
             if spans and now - spans[-1][1] < 4 * STEP:
-                spans[-1] = spans[-1][0], inf  # the sensor changed its mind
+                spans[-1] = spans[-1][0], inf  # the sensor changed its state again
             elif not spans or spans[-1][1] < inf:
                 spans.append((now, inf))
         elif not spans:

@@ -1,4 +1,4 @@
-"""Where keywords stand: found alike in memory and on a disk, in pieces of any size, by any number of threads."""
+"""Places of keywords are the same in memory and on disk, for any size of pieces and any number of threads."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ FILES = st.lists(st.sampled_from(FRAGMENTS), max_size=40).map(b"".join)
 
 
 def find_marks_by_line(data: bytes) -> Iterator[int]:
-    """Offsets as a look at every line finds them."""
+    """Yield the offsets of keywords by checking every line."""
     start = len(MARK) if data.startswith(MARK) else 0
     for line in (
         data[start:].splitlines(keepends=True)
@@ -71,7 +71,7 @@ def find_marks_by_line(data: bytes) -> Iterator[int]:
 
 
 def open_on_disk(file: Path, window: int = 64) -> OnDisk:
-    """A file that stays on its disk, and is read in small pieces."""
+    """Return a file that stays on disk and is read in small pieces."""
     with file.open("rb", buffering=0) as opened:
         return OnDisk(str(file), FileState.of(opened), window)
 
@@ -117,7 +117,7 @@ def test_pieces_are_whole_lines(
 
 
 class Sparing(io.FileIO):
-    """A file that gives three bytes at a time."""
+    """A file that returns three bytes per read."""
 
     def readinto(self, room: memoryview, /) -> int:  # type: ignore[override]
         return super().readinto(room[:3])
@@ -138,7 +138,7 @@ def test_a_call_of_the_system_that_gives_less_is_repeated(
 
 
 class Failing(Held):
-    """Bytes that a disk gives up to a place."""
+    """Bytes that can be read only up to an offset."""
 
     @contextmanager
     def opened(self) -> Iterator[Filling]:
@@ -167,7 +167,7 @@ def test_where_no_more_threads_are_allowed_one_searches_all(
 
 
 class Short(Held):
-    """Bytes for which threads beside the first one find no memory."""
+    """Bytes for which only the main thread gets memory."""
 
     @contextmanager
     def opened(self) -> Iterator[Filling]:
@@ -187,7 +187,7 @@ def test_what_a_thread_has_no_memory_for_the_first_one_searches(
 
 
 class Counting(Held):
-    """Bytes that count how many of them are asked for."""
+    """Bytes that count how many of them are read."""
 
     asked = 0
 
@@ -212,7 +212,7 @@ def test_lines_are_counted_once_in_whatever_order_they_are_asked_for() -> None:
 
 
 class Interrupted(Held):
-    """Bytes of which the main thread reads none: it is interrupted before."""
+    """Bytes whose read interrupts the main thread."""
 
     def __init__(self, data: bytes) -> None:
         super().__init__(data)

@@ -1,4 +1,4 @@
-"""Parts, part sets and the windows they are rigid in."""
+"""Parts, part sets and their rigid windows."""
 
 from pathlib import Path
 

@@ -31,7 +31,7 @@ CARD = """\
 def write_bricks(
     folder: Path, elform: int, law: str = "*MAT_ELASTIC", further_cards: str = ""
 ) -> str:
-    """Write the deck of the sample run with a brick for each part, the first of which is made of ``law``."""
+    """Write the deck of the sample run with a brick for each part; the first part has the material ``law``."""
     text = "*KEYWORD\n*CONTROL_TERMINATION\n      0.42\n*DATABASE_MATSUM\n     0.001\n*DATABASE_GLSTAT\n     0.001\n"
     text += f"{law}\n         7    1000.0   1.0e+06       0.3\n*MAT_ELASTIC\n         8    7850.0   2.1e+11       0.3\n"
     text += f"*SECTION_SOLID\n         1{elform:10d}\n*SECTION_SOLID\n         2         0\n"

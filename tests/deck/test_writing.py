@@ -1,4 +1,4 @@
-"""Decks written with cards in them: nothing else changes, and what is there is never lost."""
+"""Decks written with cards: nothing else changes, and no existing file is lost."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -96,7 +96,7 @@ def test_what_cannot_be_written_is_refused_before_anything_is(
 
 
 def check_refused(main: str, card: PrintedCard, message: str) -> None:
-    """The deck is not written, and nothing else either."""
+    """Check that the deck is refused with this message, and that no file is written."""
     folder = Path(main).parent / "next"
     with pytest.raises(DeckError, match=message):
         write_deck(main, card, str(folder))
@@ -182,7 +182,7 @@ def test_legs_are_named_after_the_files_of_the_run_by_which_the_engine_finds_its
     for file in (tmp_path / "ref").iterdir():
         file.rename(file.with_name(file.name.replace("box_", "heavy_box_")))
     main = main.replace("box_0000", "heavy_box_0000")
-    for name in ("box", "heavy_box"):  # that in /RUN, or that of the files
+    for name in ("box", "heavy_box"):  # the name in /RUN, or that of the files
         card = cards(WINDOWS, Printing(node=(1808,), end=0.4, name=name), "radioss")
         names = [
             Path(written_file).name
@@ -196,7 +196,7 @@ def test_legs_are_named_after_the_files_of_the_run_by_which_the_engine_finds_its
 def test_a_run_of_several_legs_alike_is_cut_anew_at_the_switches(
     tmp_path: Path,
 ) -> None:
-    """A later leg may leave out keywords of the first, as velocities at the start, but has none of its own."""
+    """A later leg may lack keywords of the first one, such as initial velocities, but has none of its own."""
     card = cards(WINDOWS, Printing(node=(1808,), end=0.8, name="box"), "radioss")
     ref = write_radioss_run(tmp_path / "ref")
     (tmp_path / "ref" / "box_0002.rad").write_text(
@@ -219,7 +219,7 @@ def test_a_run_of_several_legs_alike_is_cut_anew_at_the_switches(
 
 
 def test_bodies_that_the_run_keeps_off_stay_off_in_every_leg(tmp_path: Path) -> None:
-    """Else they would be rigid from time 0: the loose wheels of a car whose body alone is switched."""
+    """Otherwise they would be rigid from time 0, like the wheels of a car of which only the body is switched."""
     engine = ENGINE.replace("1808\n", "1808 1809\n1810\n") + "/END\nleft over\n"
     for starter_deck, name in (
         ((), "a"),
@@ -242,7 +242,7 @@ def test_bodies_that_the_run_keeps_off_stay_off_in_every_leg(tmp_path: Path) -> 
         blocks = [Path(leg).read_text().count("/RBODY/OFF") for leg in legs]
         assert blocks == [1] * len(
             leg_states
-        )  # the starter overlooks a second one that follows the first
+        )  # the starter ignores a second block that follows the first
 
 
 def list_states(leg: Leg) -> Iterator[tuple[int, bool]]:
@@ -251,7 +251,7 @@ def list_states(leg: Leg) -> Iterator[tuple[int, bool]]:
 
 
 def test_a_card_names_all_that_is_off_in_one_block() -> None:
-    """The starter of OpenRadioss overlooks the second of two blocks that follow each other."""
+    """The starter of OpenRadioss ignores the second of two consecutive blocks."""
     card = cards(
         WINDOWS, Printing(node=(1808,), off=(1809,), end=0.4, name="box"), "radioss"
     )
@@ -279,7 +279,7 @@ def test_all_windows_fit_one_engine_run_by_sensors(
     text = Path(engine).read_text()
     assert (
         "/RBODY/OFF\n1809\n" in text
-    )  # what the run keeps off; the one with a sensor has no leg
+    )  # bodies that the run keeps off; one with a sensor has no leg
     assert (
         text.count("/DTIX\n5e-05 5e-05\n") == text.count("/DTIX") == 1
     )  # of the shortest window

@@ -1,4 +1,4 @@
-"""Switches by force in a history with momenta: when, how often, and whether their windows are good."""
+"""Force switches in a history with momenta: their times, their number, and the verdict on their windows."""
 
 import re
 from pathlib import Path
@@ -16,7 +16,7 @@ LANDING = ("--drop", "0.4", "--mesh", "6", "--dt", "5e-4")
 
 @pytest.fixture(scope="module")
 def bounces(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """A box that falls and bounces twice: momenta of box (part 1) and step."""
+    """Write the history of a box that falls and bounces twice: momenta of the box (part 1) and the sill."""
     path = str(tmp_path_factory.mktemp("drop") / "drop.matsum")
     assert run("rollover", *LANDING, "-o", path).exit_code == 0
     return path

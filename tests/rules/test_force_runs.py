@@ -20,8 +20,8 @@ from tests.decks import wide
 
 WIDE = 20  # columns of a real number
 MAIN, SENSOR, ENTITY, END, INTERVAL = 9999, 5, 3, 0.25, 5e-4
-GAP = 0.002  # of the contact
-_CELLS = 3  # of the plate along each side
+GAP = 0.002  # gap of the contact
+_CELLS = 3  # cells of the plate along each side
 
 
 class Bounce(NamedTuple):
@@ -125,7 +125,7 @@ def write_contact() -> str:
 
 
 def read_listed_windows(folder: Path) -> list[tuple[float, float]]:
-    """Give when the sensor is not active, by the listing: from 0 on, from one time to another, and to the end."""
+    """Return the spans in which the sensor is inactive according to the listing."""
     ends, now = [0.0], 0.0
     for line in (folder / "X_0001.out").read_text("latin-1").splitlines():
         if cycle := re.match(r"\s+\d+\s+([\d.E+-]+)\s+[\d.E+-]+ [A-Z]+ ", line):
@@ -140,7 +140,7 @@ def read_listed_windows(folder: Path) -> list[tuple[float, float]]:
 
 
 def is_met(window: tuple[float, float], windows: list[tuple[float, float]]) -> bool:
-    """Whether both ends of a window are those of another one, within an interval and the step of the listing."""
+    """Return True if another window has the same ends, within an output interval and the step of the listing."""
     return any(
         window == pytest.approx(other_window, abs=1.5 * INTERVAL)
         for other_window in windows
@@ -151,7 +151,7 @@ def is_met(window: tuple[float, float], windows: list[tuple[float, float]]) -> b
 def test_the_sensor_switches_as_often_as_momenta_say(
     tmp_path: Path, run: Bounce
 ) -> None:
-    """In the run without switching the sensor switches nothing: its listing is the truth of what it would do."""
+    """In the reference run the sensor switches nothing, so its listing shows when it would have switched."""
     reference, switched = tmp_path / "reference", tmp_path / "switched"
     engine = f"/RUN/X/1\n{END}\n/VERS/2023\n/DT\n0.9 0.0\n{{}}/DTIX\n2e-05 2e-05\n/TFILE/4\n{INTERVAL}\n/PRINT/-10\n"
     for folder, off_cards in ((reference, f"/RBODY/OFF\n{MAIN}\n"), (switched, "")):
@@ -168,7 +168,7 @@ def test_the_sensor_switches_as_often_as_momenta_say(
     ]
     listed = read_listed_windows(reference)
     for windows_a, windows_b in ((predicted, listed), (listed, predicted)):
-        # what is shorter than that may fall between two states of the history
+        # a shorter window may lie between two states of the history
         lasting = [(tr, td) for tr, td in windows_a if td - tr > 3 * INTERVAL]
         assert lasting
         assert all(is_met(window, windows_b) for window in lasting)

@@ -1,4 +1,4 @@
-"""Small restarts of LS-DYNA, which switch when they begin, as legs of the run that they go on with."""
+"""Small restarts of LS-DYNA, which switch when they begin, as continuation of a run."""
 
 from pathlib import Path
 
@@ -38,7 +38,7 @@ def write_restart(end: str, *cards: str) -> str:
 
 @pytest.fixture
 def legs(tmp_path: Path) -> list[str]:
-    """A run to 0.02 and two restarts: parts 11 and 12 are rigid from 0.02 to 0.09."""
+    """Write a run to 0.02 and two restarts: parts 11 and 12 are rigid from 0.02 to 0.09."""
     files = {
         "main.k": MAIN.format(0.02),
         "r1.k": write_restart("0.09", TO_RIGID),

@@ -1,4 +1,4 @@
-"""Every rule: its examples, how it is selected and silenced, and that decks are judged apart."""
+"""Every rule: its examples, its selection and silencing, and the independence of several decks."""
 
 import json
 import re
@@ -37,7 +37,7 @@ def write_history(command: str, arguments: str) -> bytes:
 
 
 def find_findings(folder: Path, rule: Rule, example: Example) -> list[dict[str, Any]]:
-    """What the rule finds in an example, checked as `d2rpick rule` says."""
+    """Return the findings of the rule in an example, checked as `d2rpick rule` says."""
     options = shlex.split(example.options)
     if example.history:
         (folder / "energy.csv").write_bytes(
@@ -206,13 +206,13 @@ def test_a_comment_that_names_no_rule_is_told(
 
 
 def comment_second_card(comment: str) -> str:
-    """A deck with one fault, and a comment before the card that has it."""
+    """Return a deck with one fault and a comment before the faulty card."""
     second = SWAPPED.rindex("*DEFORMABLE_TO_RIGID_AUTOMATIC")
     return f"{SWAPPED[:second]}{comment}\n{SWAPPED[second:]}"
 
 
 def find_message(folder: Path, rule: str, deck: str) -> str:
-    """The only finding of a rule."""
+    """Return the message of the only finding of a rule."""
     (finding,) = (
         finding
         for finding in check_deck(write(folder, deck)).findings
@@ -328,7 +328,7 @@ def test_a_file_with_nothing_but_its_end_says_what_is_missing(tmp_path: Path) ->
 def test_a_deck_cut_within_a_line_or_its_mesh_is_never_passed_in_silence(
     tmp_path: Path,
 ) -> None:
-    """Wherever it is cut, unless in a comment or at the end of a line of a card that holds no mesh."""
+    """The exceptions are a cut in a comment and a cut at the end of a line that is not in a mesh."""
     whole = (
         GOOD.removesuffix(END)
         + "*NODE\n       1             0.0\n*ELEMENT_SHELL\n       1       1       1\n"
