@@ -8,6 +8,7 @@ the one that has PAIRED 1. No set acts within TIME3 after the last switch. Not t
 from __future__ import annotations
 
 import math
+from itertools import cycle
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
@@ -32,7 +33,11 @@ class ForceSwitch(NamedTuple):
 
 
 def follow_pair(
-    first: ForceSwitch, second: ForceSwitch | None, contacts: Spans, end: float
+    first: ForceSwitch,
+    second: ForceSwitch | None,
+    contacts: Spans,
+    end: float,
+    second_contacts: Spans | None = None,
 ) -> list[tuple[float, float | None]]:
     """Return the windows in which a set and its pair make their parts rigid.
 
@@ -44,6 +49,9 @@ def follow_pair(
         Spans in which a contact force acts, ascending [time].
     end : float
         End of the run [time].
+    second_contacts : sequence of (float, float), optional
+        Contacts as the second set sees them: it may wait for the force of another contact, or act before the contact
+        because of its OFFSET.  Default: ``contacts``.
 
     Returns
     -------
@@ -57,7 +65,8 @@ def follow_pair(
     [(0.03, 0.05), (0.07, None)]
     """
     windows: list[tuple[float, float | None]] = []
-    for time, to_rigid in _switches(first, second, contacts, end):
+    seen_by_second = contacts if second_contacts is None else second_contacts
+    for time, to_rigid in _switches((first, contacts), (second, seen_by_second), end):
         if to_rigid and not (windows and windows[-1][1] is None):
             windows.append((time, None))
         elif not to_rigid and windows and windows[-1][1] is None:
@@ -66,19 +75,21 @@ def follow_pair(
 
 
 def _switches(
-    first: ForceSwitch, second: ForceSwitch | None, contacts: Spans, end: float
+    first: tuple[ForceSwitch, Spans],
+    second: tuple[ForceSwitch | None, Spans],
+    end: float,
 ) -> Iterator[tuple[float, bool]]:
-    """Yield the times at which the sets act in turn, and whether they make their parts rigid."""
-    ready, acting, waiting = 0.0, first, second
-    while True:
+    """Yield the times at which the sets act in turn, and True if they make parts rigid; each sees its own contacts."""
+    ready = 0.0
+    turns = cycle((first, second)) if first[0].paired else iter((first, second))
+    for acting, contacts in turns:
+        if acting is None:
+            return
         time = _next(acting.with_force, max(acting.earliest, ready), contacts)
         if time >= end or time > acting.latest:
             return
         yield time, acting.to_rigid
-        if waiting is None or (waiting is first and not waiting.paired):
-            return
         ready = max(time + acting.delay, math.nextafter(time, math.inf))
-        acting, waiting = waiting, acting
 
 
 def _next(with_force: bool, since: float, contacts: Spans) -> float:

@@ -218,6 +218,23 @@ def first_parts(cards: Sequence[Card], parts: Collection[int]) -> dict[int, int]
     return part_by_node
 
 
+def find_parts_of_nodes(
+    cards: Sequence[Card], nodes: Collection[int]
+) -> dict[int, set[int]]:
+    """Return the parts whose elements contain each of some nodes, by node id."""
+    parts_by_node: dict[int, set[int]] = {}
+    wanted = {*nodes}
+    for card in cards:
+        for _, owners, members in _elements(card, _TEN):
+            rows = np.isin(members, [*wanted]).any(axis=1)
+            for part, element_nodes in zip(
+                owners[rows].tolist(), members[rows].tolist(), strict=True
+            ):
+                for node in wanted.intersection(element_nodes):
+                    parts_by_node.setdefault(node, set()).add(part)
+    return parts_by_node
+
+
 def _nodes_of(
     cards: Sequence[Card], parts: Collection[int]
 ) -> Iterator[tuple[int, int]]:

@@ -404,27 +404,22 @@ def parts_with_elements(starter: Starter) -> set[int]:
 
 
 def parts_within(
-    starter: Starter, groups: Mapping[int, Collection[int]]
+    starter: Starter, groups: Mapping[int, tuple[Collection[int], Collection[int]]]
 ) -> dict[int, set[int]]:
-    """Return for each group of nodes the parts whose nodes all belong to it."""
-    group_ids = {key: np.array([0, *group]) for key, group in groups.items()}
-    inside: dict[tuple[int, int], bool] = {}
-    for part, nodes in _elements(starter):
-        has_nodes = bool((nodes > 0).any(axis=1).all())
-        for key, ids in group_ids.items():
-            inside[key, part] = (
-                inside.get((key, part), True)
-                and has_nodes
-                and bool(np.isin(nodes, ids).all())
-            )
-    return {
-        key: {
-            part
-            for (group_key, part), whole in inside.items()
-            if whole and group_key == key
-        }
-        for key in groups
-    }
+    """Return for each group of nodes and parts the parts all of whose nodes belong to it."""
+    elements = [*_elements(starter)]
+    inside: dict[int, set[int]] = {}
+    for key, (nodes, parts) in groups.items():
+        of_parts = [members.ravel() for part, members in elements if part in parts]
+        group_nodes = np.unique(np.concatenate([np.array([0, *nodes]), *of_parts]))
+        inside[key] = {part for part, _ in elements}
+        for part, members in elements:
+            if part not in inside[key]:
+                continue
+            has_nodes = bool((members > 0).any(axis=1).all())
+            if not has_nodes or not np.isin(members, group_nodes).all():
+                inside[key].discard(part)
+    return inside
 
 
 def _elements(starter: Starter) -> Iterator[tuple[int, Integers]]:

@@ -112,14 +112,7 @@ def _window(
         [*to_deformable(ids, part_sets)],
     )
     cap = printing.step_cap or choose_step_cap(*map(float, texts))
-    deleted = [
-        flag * _DELETE
-        for flag in (printing.delete_nodal_bodies, printing.delete_node_sets)
-    ]
-    activated = [
-        flag * _ACTIVATE
-        for flag in (printing.delete_nodal_bodies, printing.delete_node_sets)
-    ]
+    deleted, activated = _constraint_flags(printing)
     yield from (
         *header(
             sets[0],
@@ -140,6 +133,14 @@ def _window(
         ),
         *deformable_lines,
     )
+
+
+def _constraint_flags(printing: Printing) -> tuple[list[int], list[int]]:
+    """Return NRBF and NCSF of the set that makes parts rigid, and of the set that makes them deformable."""
+    is_deleted = (printing.delete_nodal_bodies, printing.delete_node_sets)
+    return [flag * _DELETE for flag in is_deleted], [
+        flag * _ACTIVATE for flag in is_deleted
+    ]
 
 
 def _ls_dyna_contact(
@@ -186,18 +187,19 @@ def _ls_dyna_contact(
     lines = [f"$ {line}" for line in comment_lines]
     for members, name in part_sets.items():
         lines += write_part_set(members, name)
+    deleted, activated = _constraint_flags(printing)
+    earliest, counts = shortest(timing.earliest), (len(rigid_lines) - 1, 0)
     lines += (
-        *header(
-            first,
-            shortest(timing.earliest),
-            shortest(cap),
-            (len(rigid_lines) - 1, 0),
-            waits,
-        ),
+        *header(first, earliest, shortest(cap), counts, waits, deleted),
         *rigid_lines,
-    )
-    lines += (
-        *header(second, "0.0", "0.0", (0, len(deformable_lines) - 1), returns),
+        *header(
+            second,
+            "0.0",
+            "0.0",
+            (0, len(deformable_lines) - 1),
+            returns,
+            activated,
+        ),
         *deformable_lines,
     )
     text = "\n".join(lines) + "\n"
@@ -368,7 +370,8 @@ def _force_of(printing: Printing) -> tuple[str, int, Pushes]:
         )
     if not printing.pushed:
         raise DeckError(
-            "a card for switches by force needs a history with momenta that show the contacts"
+            "a card for switches by force needs a history with the force of that contact or wall, or with momenta of"
+            " the parts"
         )
     kind, number = (
         ("INTER", printing.contact)

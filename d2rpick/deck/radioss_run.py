@@ -42,10 +42,11 @@ from d2rpick.deck.switching import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
-    Contacts = Callable[[Collection[int]], tuple[tuple[float, float], ...] | None]
-
     from d2rpick.deck.card import Card
     from d2rpick.deck.radioss_rigid import Body
+    from d2rpick.deck.radioss_sensors import Forces, Spans
+
+    Contacts = Callable[[Collection[int]], Spans | None]
 
 
 @dataclass(eq=False, repr=False)
@@ -204,11 +205,14 @@ def in_order(legs: list[Leg]) -> bool:
     )
 
 
-def find_run_windows(run: Run, contacts: Contacts | None = None) -> RunWindows:
+def find_run_windows(
+    run: Run, contacts: Contacts | None = None, forces: Forces | None = None
+) -> RunWindows:
     """Return the windows of every body that a leg or a sensor switches.
 
-    A body with unknown parts is one unit, named by its main node. If the legs are not in order there are no windows.
-    ``contacts`` returns the spans of contact forces on some parts, for force sensors; None if no history shows them.
+    A body with unknown parts is one unit, named by its main node.  If the legs are not in order there are no windows.
+    For force sensors ``contacts`` returns the spans in which a contact force acts on some parts, and ``forces`` those
+    in which an interface or wall has a force; None if no history shows them.
     """
     sets = tuple(_switches(run.legs)) if in_order(run.legs) else ()
     starter = None if run.starter and run.starter.moved else run.starter
@@ -228,7 +232,10 @@ def find_run_windows(run: Run, contacts: Contacts | None = None) -> RunWindows:
                 windows += _follow(unit, node, sets, run.legs[0])
     for node in sorted(sensors):
         windows += _by_sensor(
-            run, bodies[node], parts, find_course(run, parts.get(node, ()), contacts)
+            run,
+            bodies[node],
+            parts,
+            find_course(run, parts.get(node, ()), contacts, forces),
         )
     for body in bodies.values():
         if body.part and not body.sensor and body.node.value not in switched:
@@ -290,7 +297,12 @@ def _follow(
     ]
 
 
-def find_course(run: Run, parts: Collection[int], contacts: Contacts | None) -> Course:
+def find_course(
+    run: Run,
+    parts: Collection[int],
+    contacts: Contacts | None,
+    forces: Forces | None = None,
+) -> Course:
     """Return the course of a run for the sensors that switch some parts."""
     has_contacts = (
         contacts is not None
@@ -298,7 +310,8 @@ def find_course(run: Run, parts: Collection[int], contacts: Contacts | None) -> 
         and run.starter is not None
         and only_force(run.starter)
     )
-    return Course(run.resets, contacts(parts) if has_contacts and contacts else None)
+    spans = contacts(parts) if has_contacts and contacts else None
+    return Course(run.resets, spans, forces)
 
 
 def _by_sensor(
@@ -343,7 +356,7 @@ def _always(body: Body) -> Window:
 
 
 def rigid_parts(starter: Starter, bodies: Mapping[int, int]) -> dict[int, set[int]]:
-    """Return the parts that lie completely in the node group of each body.
+    """Return the parts that lie completely in the group of each body: named by it, or with all nodes in it.
 
     Parameters
     ----------
@@ -358,19 +371,20 @@ def rigid_parts(starter: Starter, bodies: Mapping[int, int]) -> dict[int, set[in
         Parts by main node; empty if the members of the group are unknown.
     """
     members = {node: starter.group_members(group) for node, group in bodies.items()}
+    known_members = {node: found for node, found in members.items() if found}
     whole_parts = {
-        node: set(nodes_and_parts[1]) if nodes_and_parts else set()
-        for node, nodes_and_parts in members.items()
+        node: {*known_members[node][1]} if node in known_members else set()
+        for node in bodies
     }
-    of_nodes = {
-        node: nodes_and_parts[0]
-        for node, nodes_and_parts in members.items()
-        if nodes_and_parts and nodes_and_parts[0]
+    all_parts = starter.parts.keys()
+    # Another part may lie on the nodes of the named parts, as a skin does.
+    incomplete = {
+        node: found for node, found in known_members.items() if all_parts - found[1]
     }
-    if of_nodes:
+    if incomplete:
         from d2rpick.deck.mesh import parts_within  # loads numpy
 
-        for node, parts in parts_within(starter, of_nodes).items():
+        for node, parts in parts_within(starter, incomplete).items():
             whole_parts[node] |= parts
     return whole_parts
 

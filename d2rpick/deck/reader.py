@@ -151,7 +151,8 @@ _KEPT: Final = (
         "BOUNDARY_SPC",
         "BOUNDARY_PRESCRIBED_MOTION",
     ),
-    *("LOAD_", "AIRBAG_", "INITIAL_VELOCITY", "DEFINE_CURVE", "SENSOR_CONTROL"),
+    *("LOAD_", "AIRBAG_", "INITIAL_VELOCITY", "DEFINE_CURVE"),
+    *("SENSOR_CONTROL", "SENSOR_SWITCH", "SENSOR_DEFINE"),
 )
 _READ_INCLUDES: Final = ("INCLUDE", "INCLUDE_TRANSFORM")
 # Both are relative to the folder of the main deck.

@@ -433,8 +433,14 @@ class Windows(NamedTuple):
     other_deformable: frozenset[Unit]
 
 
-def find_windows(sets: Iterable[SwitchSet], parts: Parts) -> Windows:
+def find_windows(
+    sets: Iterable[SwitchSet],
+    parts: Parts,
+    by_sensor: Iterable[tuple[float, Event]] = (),
+) -> Windows:
     """Return the windows of every part, from the cards in the order of their times.
+
+    ``by_sensor`` are switches by sensors with their times, which the cards do not contain.
 
     Part sets are replaced by their parts. A part that is made rigid while it is rigid (a new lead) stays in its window.
     If a part is switched back first and made rigid later, and nothing else matches, the two form one inverted window.
@@ -444,6 +450,8 @@ def find_windows(sets: Iterable[SwitchSet], parts: Parts) -> Windows:
     for event in events:
         if event.by.time is not None:
             timed[event.unit].append((event.by.time, event))
+    for time, event in by_sensor:
+        timed[event.unit].append((time, event))
     windows: list[Window] = []
     orphans: list[Event] = []
     for unit in sorted(timed):

@@ -45,6 +45,8 @@ _FOLLOW: Final = {
     "D2R207": {"D2R205", "D2R206"},
     "D2R206": {"D2R205"},
 }
+# A time after the end of the run lies outside its history, too; by what follows, on the same line.
+_FOLLOW_THERE: Final = {"D2R205": {"D2R101"}}
 RULES: Final[Mapping[str, Rule]] = {
     rule.id: rule for rule in sorted(_ALL, key=lambda rule: rule.id)
 }
@@ -304,10 +306,21 @@ def check_deck(
 
 
 def _without_what_follows(findings: list[Finding]) -> list[Finding]:
-    """Return the findings without those that only follow from a mistake of units that another finding reports."""
+    """Return the findings without those that follow from a mistake of units, or of one time, reported by another."""
     causes = {finding.rule for finding in findings} & _FOLLOW.keys()
     follow = set[str]().union(*(_FOLLOW[rule] for rule in causes))
-    return [finding for finding in findings if finding.rule not in follow]
+    reported_fields = {
+        (finding.rule, finding.file, finding.line) for finding in findings
+    }
+    return [
+        finding
+        for finding in findings
+        if finding.rule not in follow
+        and not any(
+            (cause, finding.file, finding.line) in reported_fields
+            for cause in _FOLLOW_THERE.get(finding.rule, ())
+        )
+    ]
 
 
 def _told(windows: Iterable[Window]) -> Iterator[CheckedWindow]:

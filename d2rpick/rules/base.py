@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, TypeVar
@@ -18,6 +19,7 @@ from d2rpick.deck.ls_dyna_parts import (
     read_sections,
 )
 from d2rpick.deck.switching import (
+    BY_SENSOR,
     Event,
     Header,
     SwitchSet,
@@ -32,10 +34,13 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.card import Card, Value
     from d2rpick.deck.radioss_files import Flaw
+    from d2rpick.deck.radioss_rigid import Body
     from d2rpick.deck.radioss_run import Run, RunWindows
+    from d2rpick.deck.radioss_sensors import Course
     from d2rpick.deck.reader import Deck, Unread
     from d2rpick.deck.unswitchable import Unswitchable
     from d2rpick.rules.by_force import Forced
+    from d2rpick.rules.by_sensor import Sensed
     from d2rpick.rules.judgement import HistoryJudge
 
 
@@ -144,6 +149,11 @@ class Case:
     def windows(self) -> Windows:
         """Return the rigid windows of all parts, including switches by a force if the history shows them."""
         timed = find_windows(self.sets, self.parts)
+        if self.sensed:
+            by_sensor: list[tuple[float, Event]] = []
+            for sensed_set in self.sensed:
+                by_sensor += sensed_set.events(timed.events)
+            timed = find_windows(self.sets, self.parts, by_sensor)
         windows = [*timed.windows]
         for switch in self.forced:
             windows += switch.windows
@@ -165,6 +175,38 @@ class Case:
                 self.deck, find_windows(self.sets, self.parts).events, self.judge, end
             )
         )
+
+    @cached_property
+    def by_condition(self) -> tuple[Forced, ...]:
+        """Return the switches by a force and by a sensor, with their windows."""
+        if not self.sensed:
+            return self.forced
+        from d2rpick.rules.by_force import Forced  # not above: start-up
+
+        switches = [*self.forced]
+        for sensed_set in self.sensed:
+            card = sensed_set.by.card
+            windows = tuple(
+                window
+                for window in self.windows.windows
+                if window.opened.by is sensed_set.by
+            )
+            if windows:
+                switches.append(Forced(card, (card,), windows, (), "TIMWIN"))
+        return tuple(switches)
+
+    @cached_property
+    def sensed(self) -> tuple[Sensed, ...]:
+        """Return the sets with CODE 5 with their controls; forces need a history, times do not."""
+        if not any(header.code.value == BY_SENSOR for _, header in self.headers):
+            return ()
+        from d2rpick.rules.by_sensor import (
+            follow_sensed_switches,  # not above: start-up
+        )
+
+        ends = (self.end, self.judge.end if self.judge else None)
+        end = min((time for time in ends if time is not None), default=math.inf)
+        return tuple(follow_sensed_switches(self.deck, self.headers, self.judge, end))
 
     @cached_property
     def constraints(self) -> Sequence[Constraint]:
@@ -273,7 +315,22 @@ class RunCase(Case):
         """Return the windows, and the parts of the rigid bodies."""
         from d2rpick.deck.radioss_run import find_run_windows  # not above: start-up
 
-        return find_run_windows(self.run, self.judge.contacts if self.judge else None)
+        if self.judge is None:
+            return find_run_windows(self.run)
+        return find_run_windows(
+            self.run, self.judge.contacts, self.judge.find_force_spans
+        )
+
+    def _find_course(self, body: Body) -> Course:
+        """Return the course of the run for the sensor of a body."""
+        from d2rpick.deck.radioss_run import find_course  # not above: start-up
+
+        parts = self.found.parts.get(body.node.value, ())
+        if self.judge is None:
+            return find_course(self.run, parts, None)
+        return find_course(
+            self.run, parts, self.judge.contacts, self.judge.find_force_spans
+        )
 
     @cached_property
     def parts(self) -> Parts:
@@ -296,35 +353,26 @@ class RunCase(Case):
     @cached_property
     def forced(self) -> tuple[Forced, ...]:
         """Return the bodies that a force sensor switches, with the course in the history."""
-        from d2rpick.deck.radioss_run import find_course  # not above: start-up
-        from d2rpick.deck.radioss_sensors import waits_for_force
+        from d2rpick.deck.radioss_sensors import (
+            find_contacts_of_sensor,
+        )  # not above: start-up
         from d2rpick.rules.by_force import Forced
 
         starter, forced = self.run.starter, []
         for body in starter.bodies if starter and self.judge else ():
-            parts = self.found.parts.get(body.node.value, set())
-            contacts = find_course(
-                self.run, parts, self.judge.contacts if self.judge else None
-            ).contacts
             body_windows = tuple(
                 window
                 for window in self.windows.windows
                 if window.opened.by.card is body.card
             )
-            if (
-                starter
-                and contacts is not None
-                and body_windows
-                and waits_for_force(starter, body.sensor)
-            ):
+            if starter is None or not body.sensor or not body_windows:
+                continue
+            course = self._find_course(body)
+            contacts = find_contacts_of_sensor(starter, body.sensor, course)
+            if contacts is not None:
+                wait = "Tdelay of the sensor"
                 forced.append(
-                    Forced(
-                        body.card,
-                        (body.card,),
-                        body_windows,
-                        contacts,
-                        "Tdelay of the sensor",
-                    )
+                    Forced(body.card, (body.card,), body_windows, contacts, wait)
                 )
         return tuple(forced)
 
@@ -344,27 +392,14 @@ class RunCase(Case):
     @property
     def untimed(self) -> tuple[tuple[Field, str], ...]:
         """Return the bodies that a sensor switches at unknown times, and the legs that a sensor ends."""
-        from d2rpick.deck.radioss_run import find_course  # not above: start-up
-        from d2rpick.deck.radioss_sensors import active_spans
+        from d2rpick.deck.radioss_sensors import active_spans  # not above: start-up
 
-        starter, legs = (
-            self.run.starter,
-            [leg for leg in self.run.legs[:-1] if leg.sensor],
-        )
+        starter = self.run.starter
+        legs = [leg for leg in self.run.legs[:-1] if leg.sensor]
         sensed = [body for body in starter.bodies if body.sensor] if starter else []
-        contacts = self.judge.contacts if self.judge else None
-        courses = [
-            (
-                body,
-                find_course(
-                    self.run, self.found.parts.get(body.node.value, ()), contacts
-                ),
-            )
-            for body in sensed
-        ]
         spans = [
-            (body, active_spans(starter, body.sensor, course))
-            for body, course in courses
+            (body, active_spans(starter, body.sensor, self._find_course(body)))
+            for body in sensed
             if starter
         ]
         untimed_bodies = [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.base.errors import listing
 from d2rpick.base.files import STDIN
 from d2rpick.deck.card import Field, Problem
 from d2rpick.deck.ls_dyna_parts import element_cards
@@ -30,7 +31,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from d2rpick.deck.card import Card
+    from d2rpick.rules.by_sensor import Sensed
 
+_MOST_LISTED: Final = 8
 _CURES: Final = {
     "no such file": "add the file or its *INCLUDE_PATH",
     UNKNOWN_KIND: "check that file separately",
@@ -317,12 +320,15 @@ def _disabled(case: Case) -> Iterator[Objection]:
 def _untimed(case: Case) -> Iterator[Objection]:
     """CODE 1 to 4 switch by the force of a contact or rigid wall, and CODE 5 by a sensor. Restart cards switch when the
     restart begins, and plain cards at the start of the run. A Radioss body may be switched by a sensor other than
-    /SENSOR/TIME. No time on such a card can be compared with an energy history. If the history has the part momenta and
-    the deck has only one contact or wall, d2rpick finds the times of a force switch from them and judges these.
-    Restarts that are checked together with their main deck have times: each begins at the ENDTIM of the run before it.
+    /SENSOR/TIME. No time on such a card can be compared with an energy history. If the history has the force of the
+    contact or wall (or the part momenta, if the deck has only one contact or wall), d2rpick finds the switching times
+    from it and judges them. A *SENSOR_CONTROL is evaluated through *SENSOR_SWITCH of the time, or of the magnitude of
+    such a force. That its set is made rigid while the sensor is on, and deformable while it is off, was not tried with
+    the solver. Restarts that are checked together with their main deck have times: each begins at the ENDTIM of the run
+    before it.
 
-    Fix: To have the switches judged, give a history with part momenta (--history), check restarts together with their
-    main deck, or switch by time (CODE 0).
+    Fix: To have the switches judged, give a history with contact forces or part momenta (--history), check restarts
+    together with their main deck, or switch by time (CODE 0).
     """
     for field, how in case.untimed:
         yield field, f"{how}; not judged by time"
@@ -331,9 +337,13 @@ def _untimed(case: Case) -> Iterator[Objection]:
         forced = next(
             (switch for switch in case.forced if card.card in switch.cards), None
         )
+        sensed = next((sensed for sensed in case.sensed if sensed.by is card), None)
         if reason and forced:
-            times = f"{forced.switches} times by the momenta of the history, first at {forced.times[0][0]:.6g}"
-            yield card.card.here, f"*{card.card.name} {reason}: {times}"
+            first = f", first at {forced.times[0][0]:.6g}" if forced.times else ""
+            times = f"{forced.switches} times by the {forced.source} of the history"
+            yield card.card.here, f"*{card.card.name} {reason}: {times}{first}"
+        elif reason and sensed:
+            yield card.card.here, f"*{card.card.name} {reason}{_course_of(sensed)}"
         elif reason:
             yield card.card.here, f"*{card.card.name} {reason}; not judged by time"
 
@@ -417,6 +427,18 @@ def _without_parts(case: Case) -> Iterator[Objection]:
             "the input has no *PART, so the part ids of the cards were not checked"
         )
         yield case.sets[0].card.here, problem
+
+
+def _course_of(sensed: Sensed) -> str:
+    """Return the text that says when a control is on, or why that is unknown."""
+    if sensed.unknown:
+        return f", by {sensed.unknown}; not judged by time"
+    changes = sensed.changes
+    listed = listing(
+        [f"{'on' if change.on else 'off'} at {change.time:.6g}" for change in changes],
+        most=_MOST_LISTED,
+    )
+    return f": {listed}; its parts are assumed to be rigid while it is on, and deformable while it is off"
 
 
 def _reason(card: SwitchSet) -> str:

@@ -339,8 +339,8 @@ def _sensed(control: str) -> Example:
 @rule("D2R012", ERROR, "CODE 5 without a *SENSOR_CONTROL that switches the set")
 def _uncontrolled(case: Case) -> Iterator[Objection]:
     """A set with CODE 5 is switched by a *SENSOR_CONTROL with TYPE DEF2RIG whose TYPEID is its SWSET. Without one it
-    never switches. d2rpick applies this rule only if it could read the whole deck and the deck has parts. It does not
-    evaluate when the sensor switches (D2R302). Source: vendor keyword data.
+    never switches. d2rpick applies this rule only if it could read the whole deck and the deck has parts. D2R302
+    reports when the sensor switches. Source: vendor keyword data.
 
     Fix: Add a *SENSOR_CONTROL with TYPE DEF2RIG and TYPEID equal to SWSET, or choose another CODE.
     """
@@ -437,18 +437,20 @@ def _landed(wait: str) -> Example:
 @fails(_landed("0.0"))
 @rule("D2R208", WARNING, "a switch by a force that chatters in the history", BOTH)
 def _chatters(case: Case) -> Iterator[Objection]:
-    """A contact force begins and ends many times in one impact. If the history has the part momenta, and the deck has
-    only one contact or wall, d2rpick evaluates the switches over the history. Rigid windows below 10 % of the longest
-    one are not flights but chatter. They disappear if TIME3 of the set that makes the parts deformable (Radioss: Tdelay
-    of the sensor) is longer than the contact. d2rpick does not see a force that begins and ends within one output
-    interval.
+    """A contact force begins and ends many times in one impact. If the history has the force of the contact or wall, or
+    if it has the part momenta and the deck has only one contact or wall, d2rpick evaluates the switches over the
+    history. Rigid windows below 10 % of the longest one are not flights but chatter. They disappear if TIME3 of the set
+    that makes the parts deformable (Radioss: Tdelay of the sensor) is longer than the contact. d2rpick does not see a
+    force that begins and ends within one output interval.
 
     Fix: Raise TIME3 (Radioss: Tdelay) to the value in the finding.
     """
-    for switch in case.forced:
+    for switch in case.by_condition:
         short_count = len(switch.times) - len(switch.lasting)
         if short_count:
-            wait = find_delay_without_chatter(switch.lasting, switch.contacts)
+            wait = switch.contacts and find_delay_without_chatter(
+                switch.lasting, switch.contacts
+            )
             cure = (
                 f"; set {switch.wait} to {wait:.3g} or more, which leaves {len(switch.lasting)}"
                 if wait

@@ -1,10 +1,10 @@
-"""Rules D2R103-104, D2R106-108, D2R112-113 and D2R116-119: the switched parts, and what is attached to them."""
+"""Rules D2R103-104, D2R106-108, D2R112-113 and D2R116-120: the switched parts, and what is attached to them."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.base.errors import name_units
+from d2rpick.base.errors import are, name_units
 from d2rpick.base.graph import reached
 from d2rpick.deck.ls_dyna_parts import Parts, element_cards
 from d2rpick.rules.base import BOTH, ERROR, INFO, WARNING, Case, Objection, grouped
@@ -21,10 +21,10 @@ from d2rpick.rules.rule import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator
+    from collections.abc import Collection, Iterable, Iterator, Mapping
 
     from d2rpick.deck.card import Field
-    from d2rpick.deck.switching import Event, Header, Switched, SwitchSet, Unit
+    from d2rpick.deck.switching import Event, Switched, SwitchSet, Unit
 
 _NEAREST = 3  # ids of the deck that a message lists next to an unknown id
 
@@ -164,15 +164,16 @@ def _never_back(case: Case) -> Iterator[Objection]:
     """
     if _unknown_members(case, to_rigid=False):
         return
-    opened = [
-        window.opened
+    opened = {
+        window.opened: window.tr
         for window in case.windows.windows
         if window.closed is None and window.unit not in case.windows.other_deformable
-    ]
-    for card, field, unit_names in _by_card(opened):
+    }
+    for card, field, unit_names in _by_card([*opened]):
+        times = [tr for event, tr in opened.items() if event.by is card]
         yield (
             field,
-            f"{unit_names} made rigid at {card.time:g} and never switched back in this deck",
+            f"{unit_names} made rigid at {min(times):g} and never switched back in this deck",
         )
 
 
@@ -294,16 +295,7 @@ def _torn(case: Case) -> Iterator[Objection]:
     first = {event.unit.id: event for event in reversed(case.made_rigid)}
     if len(first) < 2:
         return
-    leads = {
-        part: event.line.lead.value for part, event in first.items() if event.line.lead
-    }
-    # The lead part of each part, at the end of the LRB chain; a part that is not merged leads itself.
-    bodies = {
-        part: reached(
-            [part], lambda low_name: [lead] if (lead := leads.get(low_name)) else []
-        )[-1]
-        for part in first
-    }
+    bodies = _find_bodies(first)
     cards = element_cards(case.deck, searched=True)
     if len(set(bodies.values())) < 2 or not cards:
         return
@@ -321,10 +313,24 @@ def _torn(case: Case) -> Iterator[Objection]:
             yield field, f"{problem}; merge them: LRB {low} on the line of {high_name}"
 
 
-def _together(case: Case, first: Unit, second: Unit) -> bool:
-    """Return True if two units may be rigid at the same time, or if this is unknown because a force switches one of
-    them.
+def _find_bodies(first: Mapping[int, Event]) -> dict[int, int]:
+    """Return the lead part of the rigid body of each part, by the event that makes it rigid: the end of its LRB chain.
+
+    A part that is not merged leads itself.
     """
+    leads = {
+        part: event.line.lead.value for part, event in first.items() if event.line.lead
+    }
+
+    def find_lead(part: int) -> list[int]:
+        lead = leads.get(part)
+        return [lead] if lead else []
+
+    return {part: reached([part], find_lead)[-1] for part in first}
+
+
+def _together(case: Case, first: Unit, second: Unit) -> bool:
+    """Return True if two units may be rigid at the same time, or if this is unknown because of a switch by force."""
     if {first, second} & case.windows.other_rigid:
         return True
     far = float("inf")
@@ -362,8 +368,8 @@ def _held(case: Case, *, nodal: bool) -> Iterator[Objection]:
         name = (
             f"{constraint.kind} {constraint.id}" if constraint.id else constraint.kind
         )
-        flag = f"{'NRBF' if nodal else 'NRBF and NCSF'} {switched[part].nrbf.value}"
-        problem = f"{name} on part {part}, which is made rigid at {switched[part].nrbf.field.at} with {flag}"
+        flag = f"{'NRBF' if nodal else 'NRBF and NCSF'} {switched[part].nrbf}"
+        problem = f"{name} on part {part}, which is made rigid at {switched[part].place.at} with {flag}"
         cure = "set the flag to 1 there and to 2 on the card that switches back"
         yield constraint.place, f"{problem}, so it stays active; {cure}"
 
@@ -378,18 +384,42 @@ def _owners(case: Case, parts: Collection[int]) -> dict[int, int]:
     return first_parts(cards, parts)
 
 
-def _left_active(case: Case, *, nodal: bool) -> dict[int, Header]:
-    """Return the header of the first card that makes each part rigid without deleting constraints, by part id."""
-    headers: dict[int, Header] = {}
+class _Flags(NamedTuple):
+    """NRBF and NCSF with which a card makes parts rigid, and the field of the first of them."""
+
+    nrbf: int
+    ncsf: int
+    place: Field
+
+
+def _find_flags(case: Case, card: SwitchSet) -> _Flags | None:
+    """Return the flags of a card; those of a restart are on its *RIGID_DEFORMABLE_CONTROL.  A plain card has none."""
+    if card.header:
+        nrbf, ncsf = card.header.nrbf, card.header.ncsf
+        return _Flags(nrbf.value, ncsf.value, nrbf.field)
+    if card.kind != "restart":
+        return None
+    controls = (
+        control
+        for control in case.sets
+        if control.card.file == card.card.file
+        and control.card.name.endswith("_CONTROL")
+    )
+    values = next((control.values for control in controls if control.values), None)
+    if values is None:
+        return _Flags(0, 0, card.card.here)
+    nrbf_value, ncsf_value = values[0].value, values[1].value
+    return _Flags(int(nrbf_value), int(ncsf_value), values[0].field)
+
+
+def _left_active(case: Case, *, nodal: bool) -> dict[int, _Flags]:
+    """Return the flags of the first card that makes each part rigid without deleting constraints, by part id."""
+    first_flags: dict[int, _Flags] = {}
     for event in case.made_rigid:
-        header = event.by.header
-        if (
-            header
-            and header.nrbf.value != _DELETED
-            and (nodal or header.ncsf.value != _DELETED)
-        ):
-            headers.setdefault(event.unit.id, header)
-    return headers
+        flags = _find_flags(case, event.by)
+        if flags and flags.nrbf != _DELETED and (nodal or flags.ncsf != _DELETED):
+            first_flags.setdefault(event.unit.id, flags)
+    return first_flags
 
 
 @passes(PASS, _solid("0"), _solid("2", "0.0"))
@@ -507,6 +537,67 @@ def _d2r112(case: Case) -> Iterator[Objection]:
     Fix: Set NRBF to 1 on the card that makes the part rigid and to 2 on the card that switches it back.
     """
     return _held(case, nodal=True)
+
+
+_TWO: Final = _MESH + "       2       2       5       6       7       8\n"
+_JOINING: Final = (
+    "*SET_NODE_LIST\n         5\n         3         6        99\n" + _NODAL
+)
+
+
+def _joined(*lines: str) -> Example:
+    """Return a deck in which a nodal rigid body joins two parts; ``lines`` are the D2R lines of the first card."""
+    rigid_card = automatic(1, "0.02", rigid=lines)
+    back_card = automatic(2, "0.09", deformable=["1", "2"][: len(lines)])
+    deleting = rigid_card.replace(_COUNTS[:40], f"{1:10d}{_COUNTS[10:40]}", 1)
+    activating = back_card.replace(_COUNTS[:40], f"{2:10d}{_COUNTS[10:40]}", 1)
+    return deck(_TWO + _JOINING + deleting + activating)
+
+
+@passes(PASS, _joined("1", "         2         1      PART"))
+@fails(_joined("1", "2"), _joined("1"))
+@rule("D2R120", ERROR, "a deleted nodal rigid body (NRBF 1) that joins separate bodies")
+def _come_apart(case: Case) -> Iterator[Objection]:
+    """While NRBF 1 deletes a nodal rigid body, only the rigid body of its parts connects them. The parts that it joins
+    separate if they become several rigid bodies, or if one of them is not switched. Source: vendor keyword data for
+    NRBF and LRB.
+
+    Fix: Merge the parts by LRB, and switch all of them.
+    """
+    deleting = [
+        event
+        for event in case.made_rigid
+        if (flags := _find_flags(case, event.by)) and flags.nrbf == _DELETED
+    ]
+    joining = [
+        constraint
+        for constraint in (case.constraints if deleting else ())
+        if constraint.kind == "nodal rigid body"
+    ]
+    cards = element_cards(case.deck, searched=True) if joining else ()
+    if not cards:
+        return
+    from d2rpick.deck.ls_dyna_inventory import find_parts_of_nodes  # loads numpy
+
+    bodies = _find_bodies({event.unit.id: event for event in reversed(deleting)})
+    joined_nodes = frozenset[int]().union(*(constraint.nodes for constraint in joining))
+    owners = find_parts_of_nodes(cards, joined_nodes)
+    for constraint in joining:
+        parts = set[int]().union(*(owners.get(node, ()) for node in constraint.nodes))
+        switched = parts & bodies.keys()
+        if not switched or len({bodies.get(part) for part in parts}) == 1:
+            continue
+        problem = f"nodal rigid body {constraint.id} joins {name_units(parts)} and is deleted (NRBF 1)"
+        if unswitched_parts := parts - switched:
+            yield (
+                constraint.place,
+                f"{problem}, but {name_units(unswitched_parts)} {are(unswitched_parts)} not made rigid; switch all",
+            )
+        else:
+            yield (
+                constraint.place,
+                f"{problem}, but they become separate rigid bodies; merge them by LRB",
+            )
 
 
 @passes(

@@ -328,10 +328,12 @@ def _faults(case: Case, rule_id: str) -> Iterator[Objection]:
         for window in windows
         if window.part is not None
     )
+    by_condition = {window for switch in case.by_condition for window in switch.windows}
     objections: list[tuple[tuple[SwitchSet, str, str], int]] = []
     for judged_window in windows:
         together = parts_by_times.get((judged_window.tr, judged_window.td), ())
-        for fault in case.judge.faults(judged_window, together):
+        by_force = judged_window in by_condition
+        for fault in case.judge.faults(judged_window, together, by_force=by_force):
             event = judged_window.closed if fault.at_td else judged_window.opened
             if event and fault.rule == rule_id:
                 key = event.by, judged_window.unit.kind, fault.message

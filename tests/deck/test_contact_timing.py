@@ -149,4 +149,4 @@ def test_without_momenta_nothing_shows_when_something_pushes() -> None:
     message = refused(
         "card", "--tr", "0.02", "--td", "0.09", "--part", "1", *BY_CONTACT
     )
-    assert "needs a history with momenta" in message
+    assert "needs a history with the force of that contact or wall" in message

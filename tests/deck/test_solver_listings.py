@@ -99,6 +99,14 @@ THREE = write_body(1, 101, 1) + write_body(2, 102, 2) + write_body(3, 103, 3)
 TWICE = write_clock(5, 0.0, 0.002) + write_clock(6, 0.004) + write_logic("OR", 7, 5, 6)
 MIDDLE = [(0.002, 0.004)]
 ALONE = write_body(1, 101, 1, 5)
+
+
+def write_fourth(*nodes: int) -> str:
+    """Write a further part of one element, on nodes of the plates."""
+    return f"/PART/4\nfurther\n{wide(1, 1)}/SHELL/4\n{wide(4, *nodes)}"
+
+
+BOTH = f"/GRNOD/PART/9\nboth\n{wide(1, 2)}"
 LISTED = {
     "a merged body goes with the main one": Listed(
         THREE + write_merge((1, 1, 2, 1)),
@@ -149,6 +157,32 @@ LISTED = {
         write_body(1, 0, 1) + write_body(2, 102, 2),
         (OFF + "102 0", ON + "0 102", OFF + "102 104"),
         {1: [(0.0, 0.004)], 2: MIDDLE},
+    ),
+    "a skin on the nodes of a part is rigid with it": Listed(
+        write_fourth(11, 12, 13, 14) + write_body(1, 101, 1),
+        (OFF + "101", ON + "101", OFF + "101"),
+        {1: MIDDLE, 4: MIDDLE},
+    ),
+    "a part between two of a body is rigid with them": Listed(
+        write_fourth(12, 21, 24, 13) + BOTH + write_body(1, 101, 9),
+        (OFF + "101", ON + "101", OFF + "101"),
+        dict.fromkeys((1, 2, 4), MIDDLE),
+    ),
+    "a part beside one of a body is not": Listed(
+        write_fourth(12, 21, 24, 13) + write_body(1, 101, 1),
+        (OFF + "101", ON + "101", OFF + "101"),
+        {1: MIDDLE},
+    ),
+    "a group of a range of nodes": Listed(
+        f"/GRNOD/GENE/9\nrange\n{wide(11, 24)}" + write_body(1, 101, 9),
+        (OFF + "101", ON + "101", OFF + "101"),
+        {1: MIDDLE, 2: MIDDLE},
+    ),
+    "groups of materials and properties": Listed(
+        f"/GRNOD/MAT/9\nall\n{wide(1)}/GRNOD/PROP/8\nnone\n{wide(7)}"
+        + write_body(1, 101, 9),
+        (OFF + "101", ON + "101", OFF + "101"),
+        dict.fromkeys((1, 2, 3), MIDDLE),
     ),
     "sensors of time join": Listed(
         write_body(1, 101, 1, 7) + TWICE, ("",), {1: MIDDLE}
@@ -377,6 +411,18 @@ def test_a_body_that_nothing_switches_makes_its_parts_rigid(tmp_path: Path) -> N
     material = read_inventory(main).parts[1].material
     assert material is not None
     assert material.kind == "deformable"
+
+
+def test_main_nodes_of_rigid_parts_follow_the_order_of_the_deck(tmp_path: Path) -> None:
+    """Nodes 101 to 103 are the last of the deck; the body of an /RBODY comes before those of parts."""
+    legs = (OFF + "104 105 106", ON + "105", OFF + "105")
+    parts = {1: write_rigid_part(), 3: write_rigid_part()}
+    main = Path(write_run(tmp_path, Listed(write_body(9, 0, 2), legs, {}, 2612, parts)))
+    before, first, *others = main.read_text().partition("/PART/1\n")
+    middle, third, rest = others[0].partition("/PART/3\n")
+    block, groups, after = rest.partition("/GRNOD/")
+    main.write_text(before + third + block + first + middle + groups + after)
+    assert find_spans_by_check(str(main)) == {3: MIDDLE}
 
 
 @pytest.mark.parametrize("name", ["rigid parts with a sensor", "sensors of time join"])
