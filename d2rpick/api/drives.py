@@ -159,7 +159,11 @@ class Driving:
         legs = driver.legs
         last = legs[-1].order.number if legs else 0
         names = [str(self.solver.history(number)) for number in range(1, last + 1)]
-        reasons = [leg.findings.why for leg in legs if leg.findings.why and not leg.findings.idle]
+        reasons = [
+            leg.findings.why
+            for leg in legs
+            if leg.findings.why and not leg.findings.idle
+        ]
         return Drive(
             run=open_run(names),
             deck=self.deck,
