@@ -1,11 +1,12 @@
-"""When a force acts on parts that gravity alone moves otherwise, interval by interval of the record, by their momenta.
+"""Find when a force other than gravity acts on the parts, for each output interval, from their momenta.
 
-Between two states the momentum of what flies changes by gravity alone.  The longest flight shows by how much; where it
-changes by more than that, and by more than the numbers leave open, something pushes.  A force that comes and goes
-within one interval is one force.  Where the force of a contact is written, this tells it without momenta.
+In flight the momentum changes between two states by gravity alone.  The longest flight shows this change.  If the
+momentum changes by more than that, and by more than numerical errors, a force acts.  A force that starts and ends
+within one interval counts as one force.
+If the force of a contact is written, it is used without momenta.
 
-A force begins and ends somewhere within an interval of the record.  The middle of that interval is the best estimate:
-it is off by half an interval at most.
+A force begins and ends somewhere within an interval of the record.  The middle of that interval is the best estimate,
+with an error of at most half an interval.
 """
 
 from __future__ import annotations
@@ -21,21 +22,21 @@ if TYPE_CHECKING:
     from d2rpick.histories.contact_forces import ContactForce
     from d2rpick.histories.history import Momenta, Samples
 
-# A force changes the momentum by so many times what digits and the solver's own errors do in the longest flight.
+# A force is seen if it changes the momentum by this many times the largest deviation in the longest flight.
 _SEEN: Final = 4.0
-# A force below this share of the weight is not seen: momenta of the first state are those of half a step before.
+# A force below this share of the weight is ignored: momenta of the first state are those of half a step before.
 _OF_WEIGHT: Final = 0.1
-# States at each end of the longest flight, in which the force before or after it may begin.
+# States at each end of the longest flight that are left out: the force before or after it may act in them.
 _EDGE: Final = 1
-_FEWEST: Final = 2  # intervals between these ends
-# A force that comes and goes within one interval is taken to act in the middle third of it.
+_FEWEST: Final = 2  # smallest number of intervals between these ends
+# A force that starts and ends within one interval is assumed to act in the middle third of it.
 _OF_ONE_INTERVAL: Final = 1 / 3
 
 
 class ContactTimes(NamedTuple):
-    """When something pushes: ``spans`` (from, to) [time], each end known within half an ``interval`` of the record.
+    """Periods in which a force acts: ``spans`` (from, to) [time], each end known within half an ``interval``.
 
-    ``speed``: how fast the parts move at the end of the longest flight [length/time]; None without masses.
+    ``speed`` is the speed of the parts at the end of the longest flight [length/time], None without masses.
     """
 
     spans: tuple[tuple[float, float], ...]
@@ -44,12 +45,12 @@ class ContactTimes(NamedTuple):
 
 
 def find_contact_times(momenta: Momenta) -> ContactTimes | None:
-    """Find when a force other than gravity acts on the chosen parts and what flies with them.
+    """Find when a force other than gravity acts on the chosen parts and on the parts that fly with them.
 
     Returns
     -------
     ContactTimes or None
-        None where no flight shows what gravity does, or states are too few to tell.
+        None if no flight shows the effect of gravity, or there are too few states.
     """
     flights = all_flights(momenta)
     if not flights:
@@ -140,7 +141,7 @@ def _place_in_intervals(time: Samples, first: int, stop: int) -> tuple[float, fl
 
 
 def _find_members(momenta: Momenta, parts: object) -> tuple[int, ...]:
-    """Give the places of the parts that fly; those of the chosen ones where the momentum is that of the model."""
+    """Return the columns of the flying parts, or of the chosen parts if the momentum is that of the whole model."""
     flying = {part.id for part in parts} if isinstance(parts, tuple) else set()
     places = tuple(
         place for place, part in enumerate(momenta.parts or ()) if part.id in flying
