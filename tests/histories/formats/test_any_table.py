@@ -222,7 +222,7 @@ def test_another_table_below_is_refused_with_both_lines() -> None:
     other = REPORT.replace(written(ENERGY[20]), "7")
     with pytest.raises(
         FormatError,
-        match=r"table:72: another table begins here, behind line 45 \('Minimum",
+        match=r"table:72: another table begins here, after line 45 \('Minimum",
     ):
         read(REPORT + EXTREMES + "\n" + other.lstrip("\n"))
 
@@ -236,11 +236,11 @@ def test_a_damaged_row_is_refused_though_it_begins_with_a_word() -> None:
 
 
 def test_what_stands_below_is_named() -> None:
-    assert "line 42 ('Total,1.0,2.0') and what follows are below the table" in notes(
+    assert "line 42 ('Total,1.0,2.0') and the lines after it are below the table" in notes(
         table("time,IE,KE") + "Total,1.0,2.0\n"
     )
     again = " ".join(read((REPORT + EXTREMES) * 2).notes)
-    assert "with the same table again from line 52 on; they were left out" in again
+    assert "the same table is repeated from line 52 on; they were left out" in again
 
 
 GLOBALS = (

@@ -273,7 +273,7 @@ def test_curves_side_by_side_have_times_of_their_own() -> None:
 @pytest.mark.parametrize(
     ("text", "asked", "reason"),
     [
-        (SIDE_BY_SIDE, ["IE", "KE"], "'KE' has other times than the first curve"),
+        (SIDE_BY_SIDE, ["IE", "KE"], "the times of 'KE' differ from those of the first requested curve"),
         (
             SIDE_BY_SIDE.replace("3,6,,,", "3,6,3,7,"),
             ["KE"],
@@ -420,7 +420,7 @@ def test_refused(text: str, reason: str) -> None:
         (
             "x,y\n0,1\n1,2\n",
             [],
-            "no column has the name of a time; 'x', the first, was taken as the time",
+            "no column has the name of a time; 'x', the first, was used as the time",
         ),
         ("time,IE\n0,5\n0,1\n1,2\n", [], "same printed time"),
         ("time,IE\n0,1\n1,2\n2,3", [], "the last line has no line end and may be cut"),

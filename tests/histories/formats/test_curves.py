@@ -76,7 +76,7 @@ def test_each_curve_has_its_own_times(form: str, end: str) -> None:
         True,
     )
     assert states_of(read(text, second.upper())) == states_of(read(text, "2")) == SECOND
-    with pytest.raises(FormatError, match="has other times than the first curve"):
+    with pytest.raises(FormatError, match="differ from those of the first requested curve"):
         read(text, "1", "2")
 
 
@@ -106,7 +106,7 @@ def test_what_the_labels_say() -> None:
         Precision(digits=11),
     )
     assert (
-        "'Displacement'; it was taken for the time"
+        "'Displacement'; it was used as the time"
         in read(CURVEPLOT.replace("Time (ms)", "Displacement"), "1").notes[0]
     )
     assert "not an internal energy by its name" in read(CURVEPLOT, "2").notes[0]
