@@ -93,7 +93,7 @@ def test_a_missing_branch_is_named_with_what_there_is() -> None:
     )
     with pytest.raises(
         FormatError,
-        match="no matsum in it, but glstat, nodout; name the binout of the run that holds it",
+        match="no matsum in it, but glstat, nodout; name the binout of the run that contains it",
     ):
         no_parts.history(Selection(parts=("3",)))
     with pytest.raises(FormatError, match="no glstat in it, but matsum, nodout"):

@@ -236,8 +236,9 @@ def test_a_damaged_row_is_refused_though_it_begins_with_a_word() -> None:
 
 
 def test_what_stands_below_is_named() -> None:
-    assert "line 42 ('Total,1.0,2.0') and the lines after it are below the table" in notes(
-        table("time,IE,KE") + "Total,1.0,2.0\n"
+    assert (
+        "line 42 ('Total,1.0,2.0') and the lines after it are below the table"
+        in notes(table("time,IE,KE") + "Total,1.0,2.0\n")
     )
     again = " ".join(read((REPORT + EXTREMES) * 2).notes)
     assert "the same table is repeated from line 52 on; they were left out" in again

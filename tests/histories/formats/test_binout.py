@@ -245,7 +245,7 @@ def test_times_of_another_type_are_refused(code: int) -> None:
 def test_no_states_is_a_legal_file() -> None:
     run = opened(made_binout([]))
     assert run.time.size == run.part_time.size == 0
-    assert any("holds no state yet" in note for note in run.notes)
+    assert any("has no state yet" in note for note in run.notes)
 
 
 @pytest.mark.parametrize(

@@ -273,7 +273,11 @@ def test_curves_side_by_side_have_times_of_their_own() -> None:
 @pytest.mark.parametrize(
     ("text", "asked", "reason"),
     [
-        (SIDE_BY_SIDE, ["IE", "KE"], "the times of 'KE' differ from those of the first requested curve"),
+        (
+            SIDE_BY_SIDE,
+            ["IE", "KE"],
+            "the times of 'KE' differ from those of the first requested curve",
+        ),
         (
             SIDE_BY_SIDE.replace("3,6,,,", "3,6,3,7,"),
             ["KE"],

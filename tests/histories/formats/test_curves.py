@@ -76,7 +76,9 @@ def test_each_curve_has_its_own_times(form: str, end: str) -> None:
         True,
     )
     assert states_of(read(text, second.upper())) == states_of(read(text, "2")) == SECOND
-    with pytest.raises(FormatError, match="differ from those of the first requested curve"):
+    with pytest.raises(
+        FormatError, match="differ from those of the first requested curve"
+    ):
         read(text, "1", "2")
 
 

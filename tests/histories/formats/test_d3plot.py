@@ -103,7 +103,7 @@ def test_files_are_ordered_by_number_and_left_out_numbers_are_told(
     run = opened(tmp_path, files)
     holds(run, STATES)
     assert not run.databases[0].complete
-    assert "of the files behind it 03 to 09, 12 to 99 are not there" in run.notes[0]
+    assert "of the files after it 03 to 09, 12 to 99 are not there" in run.notes[0]
 
 
 @pytest.mark.parametrize("width", [4, 8])
@@ -321,7 +321,7 @@ def test_times_that_are_none_are_refused(tmp_path: Path) -> None:
     ]  # without the mark, which would tell
     with pytest.raises(
         FormatError,
-        match=r"d3plot01: a state was expected at byte \d+, with a time above that of the one",
+        match=r"d3plot01: a state was expected at byte \d+, with a time above that of the state",
     ):
         opened(tmp_path, files)
 
