@@ -39,9 +39,9 @@ class ContactForce(NamedTuple):
     @classmethod
     def of_forces(cls, name: str, time: Samples, forces: Samples) -> ContactForce:
         """Take from forces at the states, of shape (n, 3) [force]."""
-        seen = _is_something(forces)
-        acts = seen.copy()
-        acts[1:] |= seen[:-1]
+        is_nonzero = _is_something(forces)
+        acts = is_nonzero.copy()
+        acts[1:] |= is_nonzero[:-1]
         acts[:1] = False
         means = (forces[1:] + forces[:-1]) / 2
         impulses = np.zeros_like(forces)
@@ -69,8 +69,11 @@ class ContactForce(NamedTuple):
     def times(self) -> tuple[tuple[float, float], ...]:
         """Times (start, end) in which it acts, ascending: from the last state without a force to the next one."""
         return tuple(
-            (float(self.time[max(one.start - 1, 0)]), float(self.time[one.stop - 1]))
-            for one in stretches(self.acts)
+            (
+                float(self.time[max(interval.start - 1, 0)]),
+                float(self.time[interval.stop - 1]),
+            )
+            for interval in stretches(self.acts)
         )
 
     @property
@@ -93,8 +96,8 @@ def joined(pieces: Sequence[ContactForce], keep: NDArray[np.bool_]) -> ContactFo
     begins = np.zeros(time.size, np.bool_)
     begins[np.cumsum([0, *(piece.time.size for piece in pieces[:-1])])] = True
     whole = ContactForce(pieces[0].name, time[keep], impulses[keep], acts[keep])
-    for place in np.flatnonzero(begins[keep])[1:].tolist():
-        whole.acts[place] = whole.acts[place - 1 : place + 2].any()
+    for state in np.flatnonzero(begins[keep])[1:].tolist():
+        whole.acts[state] = whole.acts[state - 1 : state + 2].any()
     return whole
 
 

@@ -318,7 +318,7 @@ def test_a_pattern_gives_what_the_folder_gives_and_names_what_it_leaves_out(
     assert by_pattern.sources == by_folder.sources == (str(tmp_path / "matsum"),)
     notes = " ".join(by_pattern.notes)
     assert (
-        "nodout was left out: this is the nodout of LS-DYNA, which holds no internal energy"
+        "nodout was left out: this is the nodout of LS-DYNA, which has no internal energy"
         in notes
     )
     assert "a_deck.k was left out: this is a deck" in notes

@@ -81,7 +81,7 @@ def test_the_files_of_one_folder_are_a_family_and_those_of_several_are_legs() ->
         for state in range(1, 8)
     ]
     assert run.notes == (
-        "1 state has the same printed time as the next one; the last of equal times counts",
+        "1 state has the same printed time as the next one; the last of equal times is used",
     )
 
 
@@ -113,7 +113,7 @@ def test_legs_are_ordered_by_their_start_and_the_newer_one_wins() -> None:
     history = history_of(glstat, *legs)
     assert states_of(history) == [(1, 1), (2, 2), (3, 30), (4, 40), (5, 50), (5.5, 55)]
     assert (
-        "time steps back once (restart); where legs overlap the newer one counts"
+        "time steps back once (restart); if legs overlap the newer one is used"
         in history.notes[0]
     )
 

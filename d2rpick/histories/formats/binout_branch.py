@@ -289,8 +289,8 @@ class Branch(Database):
                     raise self.refused(part, f"{counts}; they cannot be told apart")
                 columns[part.rows] = 0.0
                 if ids:
-                    places = [self._places(part, listed, id_) for id_ in ids]
-                    indices = np.stack(places, axis=1)
+                    indices_of_parts = [self._places(part, listed, id_) for id_ in ids]
+                    indices = np.stack(indices_of_parts, axis=1)
                     columns[part.rows] = part.values(variable, indices)
         return columns
 

@@ -216,14 +216,14 @@ class Lsda:
         if number >= 0 and (self.stop or command == VARIABLE):
             self.unfinished = "/".join(path[:-1])
 
-    def _goes_on(self, rest: bytes, heads: set[bytes]) -> bool:
-        """Return True if the file was cut within the record that begins with ``rest``; else the last record is damaged.
+    def _goes_on(self, last_bytes: bytes, heads: set[bytes]) -> bool:
+        """Return True if the file was cut in the record that begins ``last_bytes``; else the last record is damaged.
 
         Records of a state have the heads of the last state, but symbol tables differ from each other.
         """
-        if any(head.startswith(rest) for head in heads):
+        if any(head.startswith(last_bytes) for head in heads):
             return True
-        length, command = self._head.unpack(rest.ljust(self._head.size, b"\0"))
+        length, command = self._head.unpack(last_bytes.ljust(self._head.size, b"\0"))
         return command in _TABLES and length < _LONGEST
 
     def _leave(

@@ -194,7 +194,7 @@ def test_legs_may_be_text_and_binary() -> None:
     text, binary = t01(4, start=2, made=T01TextWriter()), t01(4)
     run = run_of(radioss_th, bytes(text.data), bytes(binary.data))
     assert run.history(Selection()).time.tolist() == [state / 8 for state in range(6)]
-    assert "where legs overlap the newer one counts" in run.notes[0]
+    assert "if legs overlap the newer one is used" in run.notes[0]
 
 
 @pytest.mark.parametrize(
