@@ -63,7 +63,7 @@ class Content:
         """Return ``width`` bytes at each of many addresses, shape (n, width)."""
         return _gathered(self.view(0, len(self)), addresses, width)
 
-    def fill_rows(self, room: Bytes, begin: int, stride: int, rest: int) -> bytes:
+    def fill_rows(self, room: Bytes, begin: int, stride: int, size_after: int) -> bytes:
         """Fill the rows of ``room`` (n, width) with bytes at ``begin`` and every ``stride`` after it.
 
         Return the ``rest`` bytes after the last stride, fewer if the file ends before.
@@ -73,7 +73,7 @@ class Content:
             room[:] = self.fields(
                 np.arange(begin, end, stride, dtype=np.int64), room.shape[1]
             )
-        return self[end : end + rest]
+        return self[end : end + size_after]
 
     def check(self) -> None:
         """Do nothing: bytes in memory do not change."""
@@ -318,14 +318,14 @@ class Scattered(OnDisk):
         with FileIO(self._name) as file:
             self._fill_from(file, room, begin)
 
-    def fill_rows(self, room: Bytes, begin: int, stride: int, rest: int) -> bytes:
+    def fill_rows(self, room: Bytes, begin: int, stride: int, size_after: int) -> bytes:
         """Fill the rows as `Content.fill_rows`; the file is opened once."""
         end = begin + len(room) * stride
         with FileIO(self._name) as file:
             for row, address in zip(room, range(begin, end, stride), strict=True):
                 self._fill_from(file, row.data, address)
             file.seek(end)
-            return file.read(max(0, min(rest, self._size - end)))
+            return file.read(max(0, min(size_after, self._size - end)))
 
 
 def scattered(names: Sequence[str]) -> list[Scattered]:

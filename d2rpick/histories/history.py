@@ -424,8 +424,8 @@ class History:
             pieces = np.array_split(times, times.size // _TOGETHER + 1)
             return np.concatenate([self.energies_at(piece) for piece in pieces])
         last_index = self.time.size - 1
-        before = np.searchsorted(self.time, times, side="right") - 1
-        start = np.clip(before, 0, max(last_index - 1, 0))
+        states_before = np.searchsorted(self.time, times, side="right") - 1
+        start = np.clip(states_before, 0, max(last_index - 1, 0))
         end = np.minimum(start + 1, last_index)
         t0, e0 = self.time[start], self.energy[start]
         t1, e1 = self.time[end], self.energy[end]

@@ -219,25 +219,26 @@ def find_crossings(
     (array([0.25]), array([ True]))
     """
     side = _sides(energy, level)
-    off = np.flatnonzero(side)
-    if not off.size:
+    off_level = np.flatnonzero(side)
+    if not off_level.size:
         return np.zeros(0), np.zeros(0, dtype=bool)
-    turn = np.flatnonzero(np.diff(side[off]))
-    before, after = off[turn], off[turn + 1]
+    turn = np.flatnonzero(np.diff(side[off_level]))
+    index_before, index_after = off_level[turn], off_level[turn + 1]
     # if there are samples on the level in between, the crossing is at the first of them: a share of 1
     share = np.where(
-        after == before + 1,
-        (level - energy[before]) / (energy[before + 1] - energy[before]),
+        index_after == index_before + 1,
+        (level - energy[index_before])
+        / (energy[index_before + 1] - energy[index_before]),
         1.0,
     )
-    at = time[before] + share * (time[before + 1] - time[before])
-    rising = side[after] > 0
-    if off[0] > 0:
-        at, rising = np.append(time[0], at), np.append(side[off[0]] > 0, rising)
-    if off[-1] < side.size - 1:
+    at = time[index_before] + share * (time[index_before + 1] - time[index_before])
+    rising = side[index_after] > 0
+    if off_level[0] > 0:
+        at, rising = np.append(time[0], at), np.append(side[off_level[0]] > 0, rising)
+    if off_level[-1] < side.size - 1:
         at, rising = (
-            np.append(at, time[off[-1] + 1]),
-            np.append(rising, side[off[-1]] < 0),
+            np.append(at, time[off_level[-1] + 1]),
+            np.append(rising, side[off_level[-1]] < 0),
         )
     return at, rising
 
@@ -258,9 +259,9 @@ def find_turns(energy: Samples) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     return moving[turn] + 1, slope[moving[turn]] > 0
 
 
-def _sides(values: Samples, others: Samples | float) -> NDArray[np.int8]:
+def _sides(values: Samples, limits: Samples | float) -> NDArray[np.int8]:
     """Return 1 where values (n,) are above the limits, -1 where they are below, else 0; one byte each saves memory."""
-    return np.asarray((values > others).view(np.int8) - (values < others).view(np.int8))
+    return np.asarray((values > limits).view(np.int8) - (values < limits).view(np.int8))
 
 
 # Number of adjacent windows that are combined into one; with eight the table of them stays small and quick to search.

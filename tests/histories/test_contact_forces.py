@@ -103,7 +103,7 @@ def test_a_folder_is_read_with_its_forces(tmp_path: Path) -> None:
 def test_forces_alone_are_no_history(tmp_path: Path) -> None:
     with pytest.raises(
         FormatError,
-        match=r"rcforc: an rcforc or rwforc of LS-DYNA, which holds forces .* name the gls",
+        match=r"rcforc: an rcforc or rwforc of LS-DYNA, which has forces .* name the gls",
     ):
         open_run(put(tmp_path, rcforc=rcforc()))
 
