@@ -386,8 +386,8 @@ _FEWEST = 0.5
 # The databases of a run end within this many of their longest output interval: a killed run has not written all states.
 _ENDS_APART = 2.0
 
-# Tolerance by which parts may have more internal energy than the model, as a share of the largest energy, plus round-off
-# relative to the kinetic energy.  In files of solvers their sum exceeds it by less than 0.1 % of the largest.
+# Tolerance by which parts may have more internal energy than the model, as a share of the largest energy, plus
+# round-off relative to the kinetic energy.  In files of solvers their sum exceeds it by less than 0.1 % of the largest.
 _MORE, _ROUND_OFF = 0.1, 1e-6
 
 
