@@ -221,7 +221,8 @@ def precisions(
     """
     digits = 0
     for field in (*energy, *time):
-        digits = max(digits, _significant(field))
+        if len(field) > digits:  # a field has no more digits than signs
+            digits = max(digits, _significant(field))
         if digits >= _FULL:
             return EXACT, EXACT
     general = Precision(digits=max(digits, 1))
@@ -285,9 +286,15 @@ def _significant(field: str) -> int:
 
 def _fixed_decimals(fields: Sequence[str]) -> int | None:
     """Return the number of decimals that all fields have in common without an exponent, None if there is none."""
-    parts = [_PARTS.fullmatch(field) for field in fields]
-    decimals = {len(part[2]) if part and part[3] is None else 0 for part in parts}
-    return decimals.pop() or None if len(decimals) == 1 else None
+    decimals = _decimals(fields[0]) if fields else 0
+    are_alike = decimals > 0 and all(_decimals(field) == decimals for field in fields)
+    return decimals if are_alike else None
+
+
+def _decimals(field: str) -> int:
+    """Return the number of decimals of a number without an exponent; 0 for any other field."""
+    parts = _PARTS.fullmatch(field)
+    return len(parts[2]) if parts and parts[3] is None else 0
 
 
 def _is_finer_than_its_grid(decimals: int, moments: Samples) -> bool:
