@@ -100,15 +100,12 @@ def long_line(data: bytes | Searched, most: float | None = None) -> int:
 
 _TRIES: Final = 5  # attempts to read a file that keeps changing
 _TICK: Final = 50_000_000  # [ns] above the resolution of most file times: later changes are visible
-_COARSE: Final = (
-    2_000_000_000  # [ns] the same for file systems that store whole seconds
-)
-_SLOWEST: Final = (
-    5  # [ns] to write a byte: the times of a file are set when its last write begins
-)
-_PAUSE: Final = (
-    0.05  # [s] for a write in progress, until which the file has half of its content
-)
+# [ns] the same for file systems that store whole seconds
+_COARSE: Final = 2_000_000_000
+# [ns] needed to write a byte: the times of a file are set when its last write begins
+_SLOWEST: Final = 5
+# [s] waited for a write in progress: until it ends, the file has only part of its content
+_PAUSE: Final = 0.05
 
 
 class FileState(NamedTuple):

@@ -99,12 +99,10 @@ class OnDisk(Content):
 
     # Numbers of bytes that are read together.
     block = 1 << 19  # of many bytes; a power of 2, which stays in the cache
-    gap = (
-        1 << 13
-    )  # between two fields read together: a system call costs more than these
-    window = (
-        1 << 16
-    )  # of few bytes: further requests are mostly for the bytes after them
+    # between two fields read together: a system call costs more than these
+    gap = 1 << 13
+    # of few bytes: further requests are mostly for the bytes after them
+    window = 1 << 16
 
     def __init__(self, name: str, file: int, state: FileState) -> None:
         from threading import Lock, local  # imported here: most files are small

@@ -379,7 +379,7 @@ def _holes(time: Samples) -> tuple[str, ...]:
     )
 
 
-# Two databases may be of one run if at least this share of the states of the coarser are at times of the other
+# Two databases may be of one run if at least this share of the states of the coarser are at times of the other one
 # Output intervals may differ, but a solver writes at its own cycles.
 _FEWEST = 0.5
 

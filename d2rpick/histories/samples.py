@@ -65,9 +65,8 @@ def bent(time: Samples, values: Samples) -> Samples:
     >>> bent(np.array([0.0, 1.0, 2.0]), np.array([[1.0, 0.0], [2.0, 3.0], [3.0, 0.0]])).round(12).tolist()
     [[0.0, -1.0], [0.0, 2.0], [0.0, -1.0]]
     """
-    t = (
-        time - time.sum() / time.size
-    )  # the same as mean(), which is slow for few values
+    # the same as mean(), which is slow for few values
+    t = time - time.sum() / time.size
     centred = values - values.sum(axis=0) / time.size
     columns = centred.T
     columns -= np.multiply.outer(t @ centred / (t @ t), t)

@@ -30,9 +30,8 @@ _MISSING: Final = _SPREADSHEET_ERRORS | frozenset(
     {"", "nan", "+nan", "-nan", "inf", "+inf", "-inf", "infinity", "-infinity", "na", "n/a", "null", "none", "nil",
      "n.a.", "k.a.", "nd", "?", ".", "-", "--", "---", "–", "—"}
 )  # fmt: skip
-_OVERFLOW: Final = re.compile(
-    r"\*+|#{2,}"
-)  # written for a number that is too wide for its field
+# What is written for a number that is too wide for its field.
+_OVERFLOW: Final = re.compile(r"\*+|#{2,}")
 
 # A number by its decimal sign.  The quantifiers are possessive (no backtracking), so that the time grows linearly with
 # the length of a cell.

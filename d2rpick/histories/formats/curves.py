@@ -40,9 +40,8 @@ _LONGEST_LABEL: Final = 1000  # characters; keeps the search in a longer line sh
 # Type and factor that the Oasys programs write after a label: "Time <TIME/0.001>;".
 _TYPE: Final = r"\s*<([^<>/]*)(?:/([^<>]*))?>\s*;?\s*$"
 _UNITS_OF_TIME: Final = {1.0: "s", 1e-3: "ms", 1e-6: "us"}
-_FEWEST_LABELS: Final = (
-    3  # x label, y label and name of the curve; the title may be blank
-)
+# x label, y label and name of the curve; the title may be blank
+_FEWEST_LABELS: Final = 3
 _MOST_DIGITS: Final = 12  # of a number of pairs; a longer one is damaged
 
 

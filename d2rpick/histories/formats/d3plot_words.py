@@ -20,9 +20,8 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.content import Content
 
-END: Final = (
-    -999999.0
-)  # end mark of the geometry, the titles, and the states of each file
+# end mark of the geometry, the titles, and the states of each file
+END: Final = -999999.0
 HEAD: Final = 512  # bytes of the control words if a word has 8 bytes
 CONTROL: Final = 64  # control words of any file; ``extra`` counts further ones
 

@@ -38,11 +38,12 @@ QUANTITIES: Final[Mapping[str, str]] = {
     "eroded_internal_energy": "eroded_ie",
 }
 
+# next to each other in the file
 _AXES: Final = (
     "x_momentum",
     "y_momentum",
     "z_momentum",
-)  # next to each other in the file
+)
 
 _START: Final = b" time ="
 _TIME: Final[tuple[int | None, str]] = (None, "time")

@@ -23,9 +23,8 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 INT: Final = struct.Struct(">i")
-WIDTH: Final = (
-    4  # bytes of a binary number, and of the length before and after a record
-)
+# bytes of a binary number, and of the length before and after a record
+WIDTH: Final = 4
 RUN: Final = 84  # bytes of the first record: a code and a title of 80 bytes
 
 _MARK: Final = b"ZZZZZEOR"

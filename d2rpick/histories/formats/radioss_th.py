@@ -38,11 +38,12 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.histories.source import Source
 
+# bytes of a title other than that of the run, by age of the format
 _TITLES: Final = (
     40,
     80,
     100,
-)  # bytes of a title other than that of the run, by age of the format
+)
 
 # Global variables in the order of the file: the first 12 up to 2024, 16 in 2025, 22 from 2026 on.
 _GLOBALS: Final = (

@@ -34,9 +34,8 @@ class Text:
 
     # How much is read together.
     top = HEAD  # lines in which the form of the text is searched
-    piece = (
-        1 << 17
-    )  # bytes of a piece, whose cells then fit into the cache of the processor
+    # bytes of a piece, whose cells then fit into the cache of the processor
+    piece = 1 << 17
     # A text of at most these bytes is used as a whole to find the printed precision.
     short = 1 << 16
     some = 100  # lines sampled at the start, at the end and between of a longer text
