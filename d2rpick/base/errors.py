@@ -16,6 +16,9 @@ UNSEEN: Final = frozenset({"Cc", "Cf", "Zl", "Zp"})
 _Read = TypeVar("_Read")
 _MOST_NAMED: Final = 20  # names in one message
 
+# Code of the caution on an input that was skipped because of an error of the program.
+INTERNAL_ERROR: Final = "internal-error"
+
 
 class D2RPickError(Exception):
     """Root of all errors of d2rpick; its text is one line, ready to be shown to a user."""
@@ -56,8 +59,6 @@ class Caution(NamedTuple):
     message: str
 
 
-# Code of the caution on an input that was skipped because of an error of the program.
-INTERNAL_ERROR: Final = "internal-error"
 # Errors that are not errors of the program itself.
 FORESEEN: Final = (D2RPickError, OSError, MemoryError)
 

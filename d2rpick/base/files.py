@@ -20,16 +20,6 @@ if TYPE_CHECKING:
     from io import FileIO
     from pathlib import Path
 
-
-class Searched(Protocol):
-    """Bytes that can be searched."""
-
-    def __len__(self) -> int: ...
-
-    def rfind(self, wanted: bytes, begin: int, end: int, /) -> int:
-        """Return the address of the last ``wanted`` between two addresses, -1 if there is none."""
-
-
 STDIN: Final = "-"  # name of standard input
 # Bounds on a file, each with its default and its unit.
 _BOUNDS: Final = {
@@ -40,6 +30,24 @@ _BOUNDS: Final = {
 }
 # Unpacked bytes above which the ratio is checked: constant columns pack a thousandfold, and less is quickly unpacked.
 _ALLOWED: Final = 1 << 24
+_TRIES: Final = 5  # attempts to read a file that keeps changing
+_TICK: Final = 50_000_000  # [ns] above the resolution of most file times: later changes are visible
+# [ns] the same for file systems that store whole seconds
+_COARSE: Final = 2_000_000_000
+# [ns] needed to write a byte: the times of a file are set when its last write begins
+_SLOWEST: Final = 5
+# [s] waited for a write in progress: until it ends, the file has only part of its content
+_PAUSE: Final = 0.05
+_CHECKSUM: Final = ', "checksum": "'
+
+
+class Searched(Protocol):
+    """Bytes that can be searched."""
+
+    def __len__(self) -> int: ...
+
+    def rfind(self, wanted: bytes, begin: int, end: int, /) -> int:
+        """Return the address of the last ``wanted`` between two addresses, -1 if there is none."""
 
 
 def bound(name: str) -> float:
@@ -96,16 +104,6 @@ def long_line(data: bytes | Searched, most: float | None = None) -> int:
             return begin
         begin = end
     return -1
-
-
-_TRIES: Final = 5  # attempts to read a file that keeps changing
-_TICK: Final = 50_000_000  # [ns] above the resolution of most file times: later changes are visible
-# [ns] the same for file systems that store whole seconds
-_COARSE: Final = 2_000_000_000
-# [ns] needed to write a byte: the times of a file are set when its last write begins
-_SLOWEST: Final = 5
-# [s] waited for a write in progress: until it ends, the file has only part of its content
-_PAUSE: Final = 0.05
 
 
 class FileState(NamedTuple):
@@ -295,9 +293,6 @@ def append_whole(path: Path, content: bytes, *, durable: bool = False) -> None:
             elif size == 0:
                 path.unlink()
         raise
-
-
-_CHECKSUM: Final = ', "checksum": "'
 
 
 def signed(text: str) -> str:

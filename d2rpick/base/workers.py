@@ -259,7 +259,8 @@ class Cluster(Farm):
         """
         from distributed import as_completed
 
-        queue, numbers = enumerate(items), dict[str, int]()
+        queue = enumerate(items)
+        numbers = dict[str, int]()
         done = as_completed(
             loop=self._client.loop, with_results=True, raise_errors=False
         )

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.model import Inventory
 
+# Bytes at the beginning of a file that identify a deck: titles and comments may come before the keyword.
+_HEAD = 64 * 1024
+
 
 def read_inventory(path: str) -> Inventory:
     """Read the parts and elements of a main deck and its includes.
@@ -39,21 +42,16 @@ def read_inventory(path: str) -> Inventory:
     from d2rpick.deck.reader import read_deck
 
     is_run = radioss_files.run_files(path)
-    inventory = (
-        radioss_inventory.read(read_run(path))
-        if is_run
-        else ls_dyna_inventory.read(read_deck(path))
-    )
+    if is_run:
+        inventory = radioss_inventory.read(read_run(path))
+    else:
+        inventory = ls_dyna_inventory.read(read_deck(path))
     if not inventory.parts:
         why = f" ({inventory.notes[0]})" if inventory.notes else ""
         raise DeckError(
             f"{path}: no parts were found{why}; give the main deck of the run"
         )
     return inventory
-
-
-# Bytes at the beginning of a file that identify a deck: titles and comments may come before the keyword.
-_HEAD = 64 * 1024
 
 
 def main_decks(folder: str) -> list[str]:
@@ -71,11 +69,10 @@ def main_decks(folder: str) -> list[str]:
     included = {os.path.realpath(path) for deck in decks for path in _includes(deck)}
     main_paths = [path for path in decks if os.path.realpath(path) not in included]
     if not main_paths:
-        reason = (
-            "each deck is included by another one"
-            if decks
-            else "no file with *KEYWORD or /BEGIN"
-        )
+        if decks:
+            reason = "each deck is included by another one"
+        else:
+            reason = "no file with *KEYWORD or /BEGIN"
         raise DeckError(
             f"{folder}: no main deck in this folder ({reason}); give the deck itself"
         )

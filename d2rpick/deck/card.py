@@ -39,6 +39,9 @@ _BETWEEN_COMMAS: Final = r"((?:[^,<]|<[^>]*>?)*),?"
 
 T = TypeVar("T", int, float, str)
 
+_LISTED = r"(?ai)\s*[RIC]\s*&?\s*\w+\s*"  # compiled on use
+_PAIRS = 4  # pairs of name and value in a line of *PARAMETER
+
 
 class Field(NamedTuple):
     """The text of one field without surrounding blanks, and its place: the column is counted from 1."""
@@ -84,11 +87,9 @@ class Value(Generic[T]):
     @property
     def field(self) -> Field:
         """Return the field itself."""
-        return (
-            self.place.field(self.position)
-            if isinstance(self.place, Row)
-            else self.place
-        )
+        if isinstance(self.place, Row):
+            return self.place.field(self.position)
+        return self.place
 
 
 @dataclass(eq=False, repr=False, slots=True)
@@ -111,7 +112,8 @@ class Row:
 
         It is empty beyond the end of the line.
         """
-        pieces, comma = self._pieces(), int("," in self.text)
+        pieces = self._pieces()
+        comma = int("," in self.text)
         text = "".join(pieces[position : position + 1])
         start = min(
             sum(len(piece) + comma for piece in pieces[:position]), len(self.text)
@@ -128,7 +130,8 @@ class Row:
 
     def _pieces(self) -> list[str]:
         """Split the line into the texts of its fields."""
-        line, width = self.text, self.width
+        line = self.text
+        width = self.width
         if "," in line:
             return re.findall(_BETWEEN_COMMAS, line)
         return [line[at : at + width] for at in range(0, len(line), width)]
@@ -155,7 +158,8 @@ class Transform(NamedTuple):
             offset + outer_offset
             for offset, outer_offset in zip(self[:5], outer[:5], strict=True)
         )
-        scaled, moved = self.scaled or outer.scaled, self.moved or outer.moved
+        scaled = self.scaled or outer.scaled
+        moved = self.moved or outer.moved
         return Transform(
             node, part, material, set_, other_id, self.time * outer.time, scaled, moved
         )
@@ -204,11 +208,9 @@ class Card:
     @cached_property
     def data(self) -> tuple[Row, ...]:
         """Return the data lines that are not blank, without the title line of a keyword with ``_TITLE``."""
-        return (
-            tuple(row for row in self.rows[1:] if not row.blank)
-            if "TITLE" in self.name
-            else self.lines
-        )
+        if "TITLE" in self.name:
+            return tuple(row for row in self.rows[1:] if not row.blank)
+        return self.lines
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -245,21 +247,17 @@ class Card:
             return Value(default, row, "", (), position)
         parameters: tuple[str, ...] = ()
         if len(text) > LONGEST or (value_and_problem := plain(kind, text)) is None:
-            value_and_problem, parameters = (
-                of_kind(kind, text, self.scope.value),
-                names_in(text),
-            )
+            value_and_problem = of_kind(kind, text, self.scope.value)
+            parameters = names_in(text)
         value, problem = value_and_problem
         return Value(default if problem else value, row, problem, parameters, position)
 
     def positive(self, row: Row, position: int) -> float | None:
         """Read a positive number; None for any other, and for all numbers of an include in other units."""
         number = self.real(row, position)
-        return (
-            None
-            if self.transform.scaled or number.problem or number.value <= 0
-            else number.value
-        )
+        if self.transform.scaled or number.problem or number.value <= 0:
+            return None
+        return number.value
 
     def word(self, row: Row, position: int, default: str = "") -> Value[str]:
         """Read a word in upper case."""
@@ -270,9 +268,6 @@ class Card:
 
 
 # Parameters.
-
-_LISTED = r"(?ai)\s*[RIC]\s*&?\s*\w+\s*"  # compiled on use
-_PAIRS = 4  # pairs of name and value in a line of *PARAMETER
 
 
 class Definition(NamedTuple):
@@ -349,11 +344,9 @@ class Scope:
         ]
         if not earlier:
             return None
-        return (
-            earlier[-1]
-            if self._whole._latest_wins or earlier[-1].replaceable
-            else earlier[0]
-        )
+        if self._whole._latest_wins or earlier[-1].replaceable:
+            return earlier[-1]
+        return earlier[0]
 
     def closure(self, names: tuple[str, ...]) -> list[str]:
         """Return ``names`` and all parameters that their definitions use, directly or indirectly."""
@@ -411,10 +404,8 @@ class Scope:
 
         ``name_field`` is the type letter with the name. Return None for another type letter.
         """
-        kind, name = (
-            name_field[:1].upper(),
-            name_field[1:].strip().lstrip("&").strip().lower(),
-        )
+        kind = name_field[:1].upper()
+        name = name_field[1:].strip().lstrip("&").strip().lower()
         if kind not in {"R", "I", "C"} or not name:
             return None
         value: Number | str
@@ -424,14 +415,14 @@ class Scope:
             value = text.strip().strip('"')
         else:
             try:
-                value = (
-                    evaluate(text, self._number)
-                    if uses or not is_number(text)
-                    else number(text)
-                )
+                if uses or not is_number(text):
+                    value = evaluate(text, self._number)
+                else:
+                    value = number(text)
                 value = int(value) if kind == "I" else float(value)
             except ExpressionError as error:
-                value, problem = 0, str(error)
+                value = 0
+                problem = str(error)
         return Definition(
             name, value, row.field(0), self._whole._count, replaceable, uses, problem
         )
@@ -474,9 +465,11 @@ def _expressions(rows: Sequence[Row]) -> Iterator[tuple[Row, str, str]]:
     for row in rows:
         name_part, comma, value_part = row.text.partition(",")
         if comma and re.fullmatch(_LISTED, name_part):
-            name, text = name_part.strip(), value_part
+            name = name_part.strip()
+            text = value_part
         else:
-            name, text = row.text[: row.width].strip(), row.text[row.width :]
+            name = row.text[: row.width].strip()
+            text = row.text[row.width :]
         if name or pending is None:
             if pending is not None:
                 yield pending

@@ -70,9 +70,10 @@ def time_pair(windows: Sequence[Times], pushes: Pushes) -> Timing:
     lead = min(leads, default=0.0) if pushes.speed else 0.0
     advanced = tuple((start - lead, end) for start, end in pushes.spans)
     landing = contacts_after[-1]
-    latest = (
-        windows[-1][1] if landing[0] == math.inf else (landing[0] + landing[1]) / 2
-    )  # in the contact behind them
+    if landing[0] == math.inf:
+        latest = windows[-1][1]
+    else:
+        latest = (landing[0] + landing[1]) / 2
     rigid = ForceSwitch(True, False, windows[0][0], latest)
 
     def follow(wait: float) -> Sequence[tuple[float, float | None]]:
@@ -96,7 +97,8 @@ def time_sensor(windows: Sequence[Times], pushes: Pushes) -> Timing:
         If no wait gives as many windows as are planned.
     """
     contacts_before = [_find_before(tr, pushes.spans) for tr, _ in windows]
-    first, last = windows[0][0], windows[-1][1]
+    first = windows[0][0]
+    last = windows[-1][1]
 
     def follow(wait: float) -> Sequence[tuple[float, float | None]]:
         pushed = tuple((start, end + wait) for start, end in pushes.spans)

@@ -30,6 +30,8 @@ LONGEST = 40  # characters: a longer text is not a number
 _LONGEST_EXPRESSION = 2000
 _INTEGER_LIMIT = 2**63
 
+_CONSTANTS: Final = {"pi": math.pi, "dtor": math.pi / 180, "rtod": 180 / math.pi}
+
 
 class ExpressionError(Exception):
     """Raised inside the deck reader for a text that is not a number; the message says why."""
@@ -48,7 +50,8 @@ def number(text: str) -> Number:
     match = _NUMBER.fullmatch(text) if len(text) <= LONGEST else None
     if match is None:
         raise ExpressionError(f"{text[:LONGEST]!r} is not a number")
-    mantissa, exponent = match[1], match[2] or match[3]
+    mantissa = match[1]
+    exponent = match[2] or match[3]
     if exponent is None and "." not in mantissa:
         return _checked(int(mantissa))
     return _checked(float(f"{mantissa}e{exponent or 0}"))
@@ -86,9 +89,9 @@ def of_kind(
         converted = kind(exact)
     except (ExpressionError, OverflowError) as error:
         return None, str(error)
-    return (
-        (converted, "") if converted == exact else (None, f"{text!r} is not an integer")
-    )
+    if converted == exact:
+        return (converted, "")
+    return (None, f"{text!r} is not an integer")
 
 
 def real(text: str) -> float:
@@ -107,11 +110,9 @@ def names_in(text: str) -> tuple[str, ...]:
     >>> names_in("-&tEnd/6.0+&dt")
     ('tend', 'dt')
     """
-    return (
-        tuple(name.lower() for name in re.findall(REFERENCE, text))
-        if "&" in text
-        else ()
-    )
+    if "&" in text:
+        return tuple(name.lower() for name in re.findall(REFERENCE, text))
+    return ()
 
 
 def evaluate(text: str, lookup: Callable[[str], Number]) -> Number:
@@ -175,7 +176,6 @@ _FUNCTIONS: Final[dict[str, tuple[int, Callable[..., Number]]]] = {
     "sign": (2, lambda x, y: abs(x) if y >= 0 else -abs(x)),
     "mod": (2, lambda x, y: int(math.fmod(_nint(x), _nint(y)))),
 }
-_CONSTANTS: Final = {"pi": math.pi, "dtor": math.pi / 180, "rtod": 180 / math.pi}
 
 
 def _quotient(x: Number, y: Number) -> Number:
@@ -237,11 +237,10 @@ class _Parser:
         ] >= lowest_level:
             level, operate = operation
             # operators of equal precedence apply from the left, powers from the right
-            operand = (
-                self.nested(level)
-                if self.tokens.pop(0) == "**"
-                else self.value(level + 1)
-            )
+            if self.tokens.pop(0) == "**":
+                operand = self.nested(level)
+            else:
+                operand = self.value(level + 1)
             value = _checked(operate(value, operand))
         return value
 

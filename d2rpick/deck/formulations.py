@@ -81,13 +81,9 @@ def _layered(shell: Formulation) -> Formulation:
 def _plain(kind: str, *, measured: bool) -> Formulation | None:
     """Return the formulation of a kind of element that has no variants; None if it is unknown."""
     alike = {"beam": BEAM, "truss": BEAM, "spring": SPRING, "seatbelt": SPRING}
-    cost = (
-        SOLID
-        if kind in ("tetrahedron", "pentahedron", "thick shell")
-        else alike.get(kind)
-    )
-    return (
-        Formulation(kind, cost, measured and kind in ("beam", "spring"))
-        if cost
-        else None
-    )
+    cost = alike.get(kind)
+    if kind in ("tetrahedron", "pentahedron", "thick shell"):
+        cost = SOLID
+    if cost:
+        return Formulation(kind, cost, measured and kind in ("beam", "spring"))
+    return None

@@ -68,10 +68,8 @@ def masses_and_steps(
         parts, starts, counts = np.unique(
             elements.part[order], return_index=True, return_counts=True
         )
-        sums, lows = (
-            np.add.reduceat(sizes[order], starts),
-            np.minimum.reduceat(lengths[order], starts),
-        )
+        sums = np.add.reduceat(sizes[order], starts)
+        lows = np.minimum.reduceat(lengths[order], starts)
         for part, *values in zip(
             *(a.tolist() for a in (parts, counts, sums, lows)), strict=True
         ):
@@ -93,10 +91,8 @@ def _mass(data: PartData, measured: Sequence[_Measured]) -> float | None:
         if elements.kind == "spring" and data.section.mass is not None:
             mass += elements.number * data.section.mass
             continue
-        density, depth = (
-            data.material.density if data.material else None,
-            _depth(elements.kind, data),
-        )
+        density = data.material.density if data.material else None
+        depth = _depth(elements.kind, data)
         if density is None or depth is None:
             return None
         mass += density * depth * elements.size
@@ -111,9 +107,9 @@ def _step(data: PartData, measured: Sequence[_Measured]) -> float | None:
         if speed is None:
             return None
         steps.append(elements.length / speed)
-    return (
-        min(steps) if all(math.isfinite(step) and step > 0 for step in steps) else None
-    )
+    if all(math.isfinite(step) and step > 0 for step in steps):
+        return min(steps)
+    return None
 
 
 def _depth(kind: str, data: PartData) -> float | None:
@@ -129,7 +125,8 @@ def _wave_speed(kind: str, material: Material | None) -> float | None:
     """Return the wave speed in elements of a kind; None if it is unknown."""
     if material is None or material.density is None or material.modulus is None:
         return None
-    plain, nu = material.modulus / material.density, material.poisson or 0.0
+    plain = material.modulus / material.density
+    nu = material.poisson or 0.0
     if kind in _LINES:
         return math.sqrt(plain)
     if kind in _SURFACES:
@@ -162,11 +159,9 @@ def _sizes(kind: str, nodes: Places, coordinates: Reals) -> tuple[Reals, Reals]:
     if kind in _SURFACES:
         return _surfaces(nodes, coordinates)
     if kind in _VOLUMES:
-        return (
-            _tetrahedra(nodes, coordinates)
-            if kind == "tetrahedron"
-            else _bricks(nodes, coordinates)
-        )
+        if kind == "tetrahedron":
+            return _tetrahedra(nodes, coordinates)
+        return _bricks(nodes, coordinates)
     unknown = np.full(len(nodes), np.nan)
     return unknown, unknown
 
@@ -191,7 +186,8 @@ def _area(corners: Reals) -> Reals:
 
 def _cross(a: Reals, b: Reals) -> Reals:
     """Return the cross products of vectors (n, 3); several times faster than numpy.cross."""
-    next_axis, second_axis = [1, 2, 0], [2, 0, 1]
+    next_axis = [1, 2, 0]
+    second_axis = [2, 0, 1]
     return np.asarray(
         a[:, next_axis] * b[:, second_axis] - a[:, second_axis] * b[:, next_axis]
     )
@@ -307,9 +303,10 @@ def _shares(elements: Elements, coordinates: Reals) -> Iterable[tuple[int, _Shar
     """Return the contribution of the elements of one kind to each part."""
     if elements.nodes.shape[1] == 0:
         return []
-    sizes = np.ones(len(elements.nodes)) if elements.kind in DISCRETE else (
-        sizes_and_lengths(elements.kind, elements.nodes, coordinates)[0]
-    )  # fmt: skip
+    if elements.kind in DISCRETE:
+        sizes = np.ones(len(elements.nodes))
+    else:
+        sizes = sizes_and_lengths(elements.kind, elements.nodes, coordinates)[0]
     middles = _middles(elements.nodes, coordinates)
     parts, part_index = np.unique(elements.part, return_inverse=True)
     total = np.bincount(part_index, sizes)

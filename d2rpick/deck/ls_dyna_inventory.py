@@ -37,24 +37,6 @@ if TYPE_CHECKING:
     from d2rpick.deck.card import Card
     from d2rpick.deck.mesh import Integers, Layout, Lines, Reals
 
-
-class _Kind(NamedTuple):
-    """A kind of element: its name, and the largest and the least number of nodes of an element."""
-
-    name: str
-    most: int
-    fewest: int
-
-
-_KINDS: Final = {
-    "SHELL": _Kind("shell", 8, 3),
-    "SOLID": _Kind("solid", 8, 4),
-    "TSHELL": _Kind("thick shell", 8, 6),
-    "BEAM": _Kind("beam", 2, 2),
-    "DISCRETE": _Kind("spring", 2, 2),
-    "SEATBELT": _Kind("seatbelt", 2, 2),
-    "SPH": _Kind("particle", 0, 0),
-}
 # Options of element keywords that can be read: their lines have no integers in the columns of element and part id.
 _OPTIONS: Final = {
     *(
@@ -161,6 +143,25 @@ _ELASTIC: Final = {
         "064",
         "64",
     ),
+}
+
+
+class _Kind(NamedTuple):
+    """A kind of element: its name, and the largest and the least number of nodes of an element."""
+
+    name: str
+    most: int
+    fewest: int
+
+
+_KINDS: Final = {
+    "SHELL": _Kind("shell", 8, 3),
+    "SOLID": _Kind("solid", 8, 4),
+    "TSHELL": _Kind("thick shell", 8, 6),
+    "BEAM": _Kind("beam", 2, 2),
+    "DISCRETE": _Kind("spring", 2, 2),
+    "SEATBELT": _Kind("seatbelt", 2, 2),
+    "SPH": _Kind("particle", 0, 0),
 }
 
 
@@ -382,11 +383,9 @@ def _of_two_lines(values: Integers) -> tuple[Integers, Integers | None]:
 
 def _nodes(deck: Deck) -> tuple[Integers, Reals, Integers]:
     """Return ids (n,) and coordinates (n, 3) of all nodes, and the codes of their fixed translations (n,)."""
-    ids, coordinates, codes = (
-        [np.empty(0, np.int64)],
-        [np.empty((0, 3))],
-        [np.empty(0, np.int64)],
-    )
+    ids = [np.empty(0, np.int64)]
+    coordinates = [np.empty((0, 3))]
+    codes = [np.empty(0, np.int64)]
     for card in deck.named("NODE"):
         if card.name != "NODE":
             continue
@@ -420,11 +419,9 @@ def _codes(lines: Lines, fields: Layout) -> Integers:
 
 def _parts(deck: Deck, parts: Parts, mesh: Mesh) -> dict[int, PartData]:
     """Return the data of all parts."""
-    kinds, sections, materials = (
-        mesh.kinds,
-        read_sections(deck),
-        dict(_materials(deck, parts)),
-    )
+    kinds = mesh.kinds
+    sections = read_sections(deck)
+    materials = dict(_materials(deck, parts))
     unswitchable = find_unswitchable_in_ls_dyna(deck, parts)
     part_data: dict[int, PartData] = {}
     for part, name in parts.materials.items():
@@ -448,11 +445,10 @@ def _section(
         formulation = formulations.ls_dyna(kind, card.elform if card else 0)
         if formulation and (card or kind == "spring"):
             formulations_by_kind[kind] = formulation
-    damped = (
-        None
-        if material is None or material.kind != "spring"
-        else material.name.startswith(_DAMPERS)
-    )
+    if material is None or material.kind != "spring":
+        damped = None
+    else:
+        damped = material.name.startswith(_DAMPERS)
     if card is None:
         return Section(formulations_by_kind, damped=damped)
     area = card.first if card.kind == "BEAM" and card.elform in (2, 3, 12) else None
@@ -473,7 +469,8 @@ def _materials(deck: Deck, parts: Parts) -> Iterator[tuple[str, Material]]:
     for card in deck.named("MAT"):
         if not card.data or card.name.startswith("MAT_ADD"):
             continue
-        row, number = card.data[0], material_of(card, card.data[0], 0)
+        row = card.data[0]
+        number = material_of(card, card.data[0], 0)
         name = card.name.removesuffix("_TITLE")
         is_elastic = name.removeprefix("MAT_") in _ELASTIC
         density, modulus, poisson = (

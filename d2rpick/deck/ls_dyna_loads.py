@@ -114,11 +114,10 @@ def _supports(deck: Deck) -> Iterator[Hold | str]:
             continue
         step = 1 + ("ID" in options) + ("BIRTH" in options)
         for at in range("ID" in options, len(card.lines), step):
-            times = (
-                card.lines[at + 1]
-                if "BIRTH" in options and at + 1 < len(card.lines)
-                else None
-            )
+            if "BIRTH" in options and at + 1 < len(card.lines):
+                times = card.lines[at + 1]
+            else:
+                times = None
             yield _spc(deck, card, card.lines[at], times)
 
 
@@ -166,9 +165,10 @@ def _of_nodes(numbers: Places, codes: Places) -> Iterator[Hold]:
 def _of_plane(card: Card, numbers: Places, coordinates: Reals) -> Hold | str:
     """Return the support of the nodes on a plane that a *CONSTRAINED_GLOBAL fixes."""
     rows = card.lines
-    code, normal = (
-        (card.integer(rows[0], at).value for at in (0, 2)) if rows else (0, 0)
-    )
+    if rows:
+        code, normal = (card.integer(rows[0], at).value for at in (0, 2))
+    else:
+        code, normal = (0, 0)
     if not 0 < code < len(CODES) or normal not in (1, 2, 3) or not numbers.size:
         return _not_followed(card)
     height = coordinates[:, normal - 1] - card.real(rows[0], 2 + normal).value
@@ -181,8 +181,10 @@ def _of_materials(deck: Deck, parts: Parts) -> Iterator[Hold]:
     for card in rigid_materials(deck):
         if len(card.data) < 2:
             continue
-        name, row = material_of(card, card.data[0], 0), card.data[1]
-        kind, code = card.real(row, 0).value, card.integer(row, 1).value
+        name = material_of(card, card.data[0], 0)
+        row = card.data[1]
+        kind = card.real(row, 0).value
+        code = card.integer(row, 1).value
         axes = frozenset(CODES[code] if kind > 0 and 0 < code < len(CODES) else ())
         along_own_axes = kind < 0 and bool(card.integer(row, 2).value)
         rigid_parts = frozenset(
@@ -222,11 +224,10 @@ def _motions(deck: Deck) -> Iterator[Hold | str]:
 
 def _motion(deck: Deck, card: Card, row: Row, options: frozenset[str]) -> Hold | str:
     """Read a line of *BOUNDARY_PRESCRIBED_MOTION."""
-    part = (
-        frozenset({card.integer(row, 0).value + card.transform.part})
-        if "RIGID" in options
-        else frozenset[int]()
-    )
+    if "RIGID" in options:
+        part = frozenset({card.integer(row, 0).value + card.transform.part})
+    else:
+        part = frozenset[int]()
     nodes = ids(()) if part else _members(deck, card, row)
     if nodes is None:
         return _not_followed(card)
@@ -246,11 +247,10 @@ def _gravity(deck: Deck, parts: Parts) -> Iterator[Gravity | str]:
     for card in deck.named("LOAD_BODY", "LOAD_GRAVITY"):
         if card.name == "LOAD_BODY_PARTS":
             continue
-        loads = (
-            [_of_row(card, row, curves) for row in card.lines[:1]]
-            if card.name in _ALONG
-            else [None]
-        )
+        if card.name in _ALONG:
+            loads = [_of_row(card, row, curves) for row in card.lines[:1]]
+        else:
+            loads = [None]
         for load in loads:
             if load is None or None in limits:
                 yield f"{_name(card)} cannot be read, so gravity is found from the run alone"
@@ -264,11 +264,12 @@ def _gravity(deck: Deck, parts: Parts) -> Iterator[Gravity | str]:
 
 def _limited(card: Card, parts: Parts) -> frozenset[int] | None:
     """Return the parts of a *LOAD_BODY_PARTS; None if they are unknown."""
-    members = (
-        parts.members(card.integer(card.lines[0], 0).value + card.transform.set_)
-        if card.lines
-        else None
-    )
+    if card.lines:
+        members = parts.members(
+            card.integer(card.lines[0], 0).value + card.transform.set_
+        )
+    else:
+        members = None
     return None if members is None else frozenset(members)
 
 
@@ -302,11 +303,9 @@ def _curves(deck: Deck) -> Iterator[tuple[int, tuple[float, ...]]]:
     for card in deck.named("DEFINE_CURVE"):
         if card.data and card.options("DEFINE_CURVE") <= {"TITLE"}:
             row = card.data[0]
-            number, factor, offset = (
-                card.integer(row, 0),
-                card.real(row, 3),
-                card.real(row, 5),
-            )
+            number = card.integer(row, 0)
+            factor = card.real(row, 3)
+            offset = card.real(row, 5)
             points = np.concatenate(
                 [
                     lines.reals(_POINT, slice(1, 2))[:, 0]
@@ -324,10 +323,8 @@ def _curves(deck: Deck) -> Iterator[tuple[int, tuple[float, ...]]]:
 
 def joints_of(deck: Deck) -> Joints:
     """Return the joints of parts in an LS-DYNA deck; joints of two rigid bodies that may rotate are not included."""
-    joints, unknown = (
-        [],
-        [_name(card) for name in _OTHER_TIES for card in deck.named(name)],
-    )
+    joints = []
+    unknown = [_name(card) for name in _OTHER_TIES for card in deck.named(name)]
     for constraint in read_constraints(
         deck, "nodal rigid body", "extra nodes", "spotweld", "rivet", "generalized weld"
     ):
@@ -372,8 +369,6 @@ def _of_contact(deck: Deck, card: Card) -> Joint | None:
             frozenset({first_id + offsets.part, second_id + offsets.part}),
         )
     nodes = nodes_of_set(deck, card, first_id)
-    return (
-        Joint("tied contact", ids(nodes), frozenset({second_id + offsets.part}))
-        if nodes
-        else None
-    )
+    if nodes:
+        return Joint("tied contact", ids(nodes), frozenset({second_id + offsets.part}))
+    return None

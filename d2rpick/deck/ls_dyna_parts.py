@@ -77,6 +77,25 @@ _ELEMENT_OPTIONS: Final = {  # options whose lines have no integers in the colum
     "ELFORM",
 }
 
+_BODY: Final = "CONSTRAINED_NODAL_RIGID_BODY"
+_JOINT_NODES = 6
+# Second words of *CONTACT keywords that define no contact.
+_NO_CONTACTS: Final = {
+    "ADD",
+    "AUTO",
+    "COUPLING",
+    "EXCLUDE",
+    "GEBOD",
+    "GUIDED",
+}
+# Contacts whose force can trigger a switch have one of these in their names.
+_ABLE: Final = (
+    "SURFACE_TO_SURFACE",
+    "NODES_TO_SURFACE",
+    "NODE_TO_SURFACE",
+)
+_MOST_ROWS = 8  # of a contact or wall without id; more rows may define a second one
+
 
 class PartSet(NamedTuple):
     """Members of a part set: parts, ranges of part ids, and further part sets.
@@ -180,11 +199,9 @@ def rigid_materials(deck: Deck) -> Iterator[Card]:
 def material_of(card: Card, row: Row, position: int) -> str:
     """Return the id of a material with its offset as text, or its name if the deck uses names."""
     value = card.integer(row, position)
-    return (
-        value.field.text.upper()
-        if value.problem
-        else str(value.value + card.transform.material)
-    )
+    if value.problem:
+        return value.field.text.upper()
+    return str(value.value + card.transform.material)
 
 
 def _take_parts(card: Card, parts: Parts) -> None:
@@ -203,7 +220,8 @@ def _take_parts(card: Card, parts: Parts) -> None:
     if not options <= _FOLLOWED:
         parts.all_known = False
         return
-    rows, at = card.rows, 0
+    rows = card.rows
+    at = 0
     extra_lines = sum(_EXTRA_LINES.get(option, 0) for option in options)
     while at + 1 < len(rows):  # title, ids, and the lines of the options
         _add(card, rows[at : at + 2], material_of(card, rows[at + 1], 2), parts)
@@ -219,7 +237,8 @@ def _take_parts(card: Card, parts: Parts) -> None:
 def _add(card: Card, lines: Sequence[Row], material: str, parts: Parts) -> None:
     """Add a part by its lines of title and ids."""
     title, row = lines
-    part, section = card.integer(row, 0), card.integer(row, 1)
+    part = card.integer(row, 0)
+    section = card.integer(row, 1)
     if part.problem:
         parts.problems.append((part.field, part.problem))
     elif part.value > 0:
@@ -231,7 +250,8 @@ def _add(card: Card, lines: Sequence[Row], material: str, parts: Parts) -> None:
 
 def _take_set(card: Card, parts: Parts) -> None:
     """Add a part set."""
-    options, rows = card.options("SET_PART"), card.data
+    options = card.options("SET_PART")
+    rows = card.data
     if not rows:
         return
     first = card.integer(rows[0], 0)
@@ -246,9 +266,10 @@ def _take_set(card: Card, parts: Parts) -> None:
         return
     content = _content(card, options, values)
     earlier = parts.sets.get(set_id)
-    parts.sets[set_id] = (
-        earlier.joined(content) if earlier and "COLLECT" in options else content
-    )
+    if earlier and "COLLECT" in options:
+        parts.sets[set_id] = earlier.joined(content)
+    else:
+        parts.sets[set_id] = content
 
 
 def _content(
@@ -267,11 +288,9 @@ def _content(
         return PartSet(
             ranges=tuple(zip(ids[::2], ids[1::2], strict=False)), problems=problems
         )
-    return (
-        PartSet(sets=ids, problems=problems)
-        if "ADD" in options
-        else PartSet(parts=ids, problems=problems)
-    )
+    if "ADD" in options:
+        return PartSet(sets=ids, problems=problems)
+    return PartSet(parts=ids, problems=problems)
 
 
 def nodes_of_set(deck: Deck, card: Card, number: int) -> frozenset[int] | None:
@@ -340,16 +359,17 @@ def read_sections(deck: Deck) -> dict[int, SectionCard]:
 def _sections(card: Card) -> Iterator[tuple[int, SectionCard]]:
     """Yield id and section of each section of a card."""
     kind = card.name.split("_")[1]
-    options, rows = card.options(f"SECTION_{kind}"), card.lines
+    options = card.options(f"SECTION_{kind}")
+    rows = card.lines
     titled = "TITLE" in options
     per_section = _LINES.get(kind)
     if per_section is None or options - {"TITLE"}:
-        rows, per_section, titled = rows[int(titled) :][:2], 2, False
+        rows = rows[int(titled) :][:2]
+        per_section = 2
+        titled = False
     for at in range(titled, len(rows), per_section + titled):
-        number, elform = (
-            card.integer(rows[at], 0),
-            card.integer(rows[at], 1, 1 if kind == "SOLID" else 2),
-        )
+        number = card.integer(rows[at], 0)
+        elform = card.integer(rows[at], 1, 1 if kind == "SOLID" else 2)
         layers = card.integer(rows[at], 3, 2) if kind == "SHELL" else None
         through = (layers.value or 2) if layers and not layers.problem else None
         second = rows[at + 1] if per_section > 1 and at + 1 < len(rows) else None
@@ -374,8 +394,6 @@ def element_cards(deck: Deck, *, searched: bool) -> list[Card]:
 Kind = Literal[
     "nodal rigid body", "extra nodes", "joint", "spotweld", "rivet", "generalized weld"
 ]
-_BODY: Final = "CONSTRAINED_NODAL_RIGID_BODY"
-_JOINT_NODES = 6
 
 
 class Constraint(NamedTuple):
@@ -398,11 +416,13 @@ def read_constraints(deck: Deck, *kinds: Kind) -> Iterator[Constraint]:
 
 def _nodal_rigid_bodies(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
     """Yield the nodal rigid bodies of a card."""
-    options, rows = card.options(_BODY), card.lines
+    options = card.options(_BODY)
+    rows = card.lines
     if options - {"TITLE"}:  # further options add lines, so the keyword has one body
         rows = rows[:2] if "TITLE" in options else rows[:1]
     for row in rows[1::2] if "TITLE" in options else rows:
-        body, nodes = card.integer(row, 0), card.integer(row, 2)
+        body = card.integer(row, 0)
+        nodes = card.integer(row, 2)
         members = nodes_of_set(deck, card, nodes.value) if nodes.value else None
         yield Constraint(kind, body.field, body.value, members or frozenset())
 
@@ -410,14 +430,14 @@ def _nodal_rigid_bodies(deck: Deck, card: Card, kind: Kind) -> Iterator[Constrai
 def _extra_nodes(deck: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
     """Yield the extra nodes of a card."""
     for row in card.rows:
-        part, node_or_set = card.integer(row, 0), card.integer(row, 1)
+        part = card.integer(row, 0)
+        node_or_set = card.integer(row, 1)
         if row.blank or part.problem or node_or_set.problem:
             continue
-        single = (
-            None
-            if card.name.endswith("_SET")
-            else frozenset({node_or_set.value + card.transform.node})
-        )
+        if card.name.endswith("_SET"):
+            single = None
+        else:
+            single = frozenset({node_or_set.value + card.transform.node})
         nodes = single or nodes_of_set(deck, card, node_or_set.value) or frozenset()
         yield Constraint(kind, part.field, 0, nodes, part.value + card.transform.part)
 
@@ -433,9 +453,10 @@ def _joints(_: Deck, card: Card, kind: Kind) -> Iterator[Constraint]:
     ):
         return
     for row in _first(card):
-        number = (
-            card.integer(card.lines[0], 0).value if card.name.endswith("_ID") else 0
-        )
+        if card.name.endswith("_ID"):
+            number = card.integer(card.lines[0], 0).value
+        else:
+            number = 0
         yield _of_nodes(card, row, kind, _JOINT_NODES, number)
 
 
@@ -486,24 +507,6 @@ _CONSTRAINTS: Final[
 }
 
 
-# Second words of *CONTACT keywords that define no contact.
-_NO_CONTACTS: Final = {
-    "ADD",
-    "AUTO",
-    "COUPLING",
-    "EXCLUDE",
-    "GEBOD",
-    "GUIDED",
-}
-# Contacts whose force can trigger a switch have one of these in their names.
-_ABLE: Final = (
-    "SURFACE_TO_SURFACE",
-    "NODES_TO_SURFACE",
-    "NODE_TO_SURFACE",
-)
-_MOST_ROWS = 8  # of a contact or wall without id; more rows may define a second one
-
-
 class Entity(NamedTuple):
     """A contact or rigid wall: keyword, id and title as given (0 and empty for none), and its number in the deck."""
 
@@ -545,14 +548,14 @@ def read_entities(deck: Deck, keyword: Literal["CONTACT", "RIGIDWALL"]) -> Entit
     entities: list[Entity] = []
     all_known = not deck.unread and not deck.encrypted
     for card in deck.named(keyword):
-        words, number, title = card.name.split("_"), 0, ""
+        words = card.name.split("_")
+        number = 0
+        title = ""
         if words[1:2] and words[1] in _NO_CONTACTS:
             continue
         if {"ID", "TITLE"} & {*words} and card.rows:
-            number, title = (
-                card.integer(card.rows[0], 0).value,
-                card.rows[0].text[card.width :].strip(),
-            )
+            number = card.integer(card.rows[0], 0).value
+            title = card.rows[0].text[card.width :].strip()
         all_known = (
             all_known
             and not card.transform.rest

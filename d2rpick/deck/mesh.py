@@ -42,6 +42,10 @@ NOTHING: Final = -1  # value of a field that is not an id
 # Up to so many lines all fields are parsed together, as a deck may have a card for each element.
 _FEW: Final = 1000
 
+_COMMENTS: Final = b"$#"
+_WIDTH, _REAL = 10, 20
+NOT_COUNTED: Final = {"SPHCEL", "XELEM"}
+
 
 def layout(*widths: int) -> Layout:
     """Return first column and width of adjacent fields.
@@ -107,11 +111,9 @@ class Lines:
         """Return the characters of a field (lines, width), padded with blanks."""
         cells = self.cells[:, start : start + width]
         missing = width - cells.shape[1]
-        return (
-            np.pad(cells, ((0, 0), (0, missing)), constant_values=_BLANK)
-            if missing
-            else cells
-        )
+        if missing:
+            return np.pad(cells, ((0, 0), (0, missing)), constant_values=_BLANK)
+        return cells
 
     @cached_property
     def _texts(self) -> dict[int, str]:
@@ -178,7 +180,8 @@ def _table(raw: NDArray[np.uint8]) -> NDArray[np.uint8]:
 def _integers(field: NDArray[np.uint8]) -> Integers:
     """Parse a field of digits; 0 for a blank, `NOTHING` for other text."""
     value = np.zeros(len(field), np.int64)
-    is_valid, groups = np.ones(len(field), bool), np.zeros(len(field), np.uint8)
+    is_valid = np.ones(len(field), bool)
+    groups = np.zeros(len(field), np.uint8)
     was_digit = np.zeros(len(field), bool)
     for letters in np.ascontiguousarray(field.T):
         digits = letters - _ZERO
@@ -209,11 +212,10 @@ def _id(value: float) -> int:
 def distinct(values: Places) -> Places:
     """Return the distinct values, ascending; sorting is faster here than hashing."""
     ordered = np.sort(values, axis=None)
-    return (
-        ordered[np.append(True, ordered[1:] != ordered[:-1])]
-        if ordered.size
-        else ordered
-    )
+    if ordered.size:
+        is_first: NDArray[np.bool_] = np.append(True, ordered[1:] != ordered[:-1])
+        ordered = ordered[is_first]
+    return ordered
 
 
 def _used(wanted: Sequence[Places]) -> Places:
@@ -349,10 +351,6 @@ class Mesh(NamedTuple):
             yield f"{self.lost} nodes of elements are not in any {sign}NODE of the deck"
 
 
-_COMMENTS: Final = b"$#"
-_WIDTH, _REAL = 10, 20
-
-
 class _Kind(NamedTuple):
     """Kind of element: its name, the nodes that define its size, and the number of ids on each of its lines."""
 
@@ -368,7 +366,6 @@ KINDS: Final = {
     "SPRING": _Kind("spring", 2, (3,)), "TETRA10": _Kind("tetrahedron", 10, (1, 10)),
     "BRIC20": _Kind("solid", 20, (9, 8, 4)), "SHEL16": _Kind("thick shell", 16, (9, 8)),
 }  # fmt: skip
-NOT_COUNTED: Final = {"SPHCEL", "XELEM"}
 
 
 def elements_of(
@@ -437,7 +434,8 @@ def _elements(starter: Starter) -> Iterator[tuple[int, Integers]]:
 
 def nodes_of(cards: Iterable[Card]) -> tuple[Integers, Reals]:
     """Return ids (n,) and coordinates (n, 3) of nodes [length]."""
-    ids, coordinates = [np.empty(0, np.int64)], [np.empty((0, 3))]
+    ids = [np.empty(0, np.int64)]
+    coordinates = [np.empty((0, 3))]
     fields: Layout = layout(_WIDTH, _REAL, _REAL, _REAL)
     for card in cards:
         for lines in lines_of(card, _COMMENTS):

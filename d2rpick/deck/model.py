@@ -286,11 +286,10 @@ class Inventory:
         0 for other elements.
         """
         data = self.parts.get(part)
-        layers = (
-            _LAYERS
-            if data is None or data.section.layers is None
-            else data.section.layers
-        )
+        if data is None or data.section.layers is None:
+            layers = _LAYERS
+        else:
+            layers = data.section.layers
         return self.formulation(part, kind).in_plane * max(layers - 1, 0)
 
     @cached_property
@@ -487,7 +486,8 @@ def _together(
     parts: Collection[int], linked: Callable[[int], Iterable[int]]
 ) -> tuple[tuple[int, ...], ...]:
     """Return the groups of parts that are linked to each other, directly or indirectly."""
-    remaining, groups = set(parts), []
+    remaining = set(parts)
+    groups = []
     while remaining:
         body = reached(
             [min(remaining)], lambda part: remaining.intersection(linked(part))

@@ -32,6 +32,22 @@ _LABELS: WeakKeyDictionary[Inventory, dict[tuple[frozenset[int], bool], Places]]
     WeakKeyDictionary()
 )
 
+# Kinds of elements whose nodes have no rotations.
+_UNTURNED: Final = {
+    "solid",
+    "tetrahedron",
+    "pentahedron",
+    "quad",
+    "tria",
+    "truss",
+    "thick shell",
+    "particle",
+}
+# Nodes lie in one plane if they do so within this fraction of the size of their piece.
+_FLAT: Final = 1e-6
+# A piece below this fraction of the mass of all pieces on springs moves the others too little to matter.
+_HEAVY: Final = 0.05
+
 
 def pieces_of(
     inventory: Inventory, parts: Collection[int], among: Collection[int] | None = None
@@ -82,7 +98,8 @@ def _rows(
     inventory: Inventory, parts: frozenset[int], *, springs: bool
 ) -> Iterator[Places]:
     """Yield arrays with connected nodes in each row."""
-    wanted, part_nodes = np.array([*parts], np.int64), inventory.nodes_by_part
+    wanted = np.array([*parts], np.int64)
+    part_nodes = inventory.nodes_by_part
     for elements in inventory.elements:
         of_springs = np.full(len(elements.part), springs)
         yield elements.nodes[
@@ -92,21 +109,6 @@ def _rows(
         yield np.concatenate(
             [nodes, *(part_nodes[part] for part in joint_parts & part_nodes.keys())]
         )[np.newaxis]
-
-
-# Kinds of elements whose nodes have no rotations.
-_UNTURNED: Final = {
-    "solid",
-    "tetrahedron",
-    "pentahedron",
-    "quad",
-    "tria",
-    "truss",
-    "thick shell",
-    "particle",
-}
-# Nodes lie in one plane if they do so within this fraction of the size of their piece.
-_FLAT: Final = 1e-6
 
 
 def supports_of(
@@ -236,9 +238,6 @@ def _is_plane(heights: NDArray[np.float64], fixed: Mask, tolerance: float) -> bo
 # transmitted first in the stiffest direction, so the period uses the largest lambda.  With the trace of K, the sum
 # of all k, it is the lower limit of all periods.
 
-# A piece below this fraction of the mass of all pieces on springs moves the others too little to matter.
-_HEAVY: Final = 0.05
-
 
 class InnerPeriod(NamedTuple):
     """The longest period [time], its lower limit ``least`` [time], and a text that says what oscillates."""
@@ -303,7 +302,8 @@ def _masses_of_pieces(
     inventory: Inventory, parts: Collection[int], labels: Places
 ) -> Mapping[int, _Piece] | None:
     """Return the pieces by label; None if the mass of a part is unknown."""
-    masses, pieces_by_label = masses_and_steps(inventory), dict[int, _Piece]()
+    masses = masses_and_steps(inventory)
+    pieces_by_label = dict[int, _Piece]()
     sizes: dict[int, dict[int, float]] = {part: {} for part in parts}
     for elements in inventory.elements:
         element_sizes, _ = sizes_and_lengths(

@@ -55,6 +55,31 @@ _DELETED = (
 )
 _CAPPED = "DTMAX: with nothing deformable left the time step would grow without limit."
 
+_RUN_NAME = re.compile(r"[\w.-]+", re.ASCII)
+_OF_RADIOSS = (
+    "Ids are main nodes of /RBODY, not bodies; an unknown one is skipped silently.",
+    "Gravity and damping act on a rigid body only if its main node is in their",
+    "  node groups; no warning is given.",
+    "The energy reported for rigid solids can be wrong until the release.",
+    "The starter looks for /RBODY/OFF in the engine files; keep all of them.",
+    "A body that the first file does not put off is rigid from time 0.",
+    "The starter takes the nodes of an /RBODY from every /RWALL; Ikrem 1 keeps",
+    "  them there while the body is off.",
+    "An initial velocity must move the main node of a body too.",
+    "Repeat your output keywords (/TFILE, /ANIM, ...) in every file.",
+)
+_BY_FORCE = (
+    "The windows are those of the history: a switched run lands elsewhere, and at",
+    "  other times, after its first window that locks in energy.",
+    "They end in the first step of a contact, without a margin before it.",
+)
+_OF_SENSORS = tuple(
+    line
+    for line in _OF_RADIOSS[1:-1]
+    if not line.startswith(("The starter looks", "A body that"))
+)
+DEFAULT: Final = "ls-dyna"  # solver for histories that name none
+
 
 def _ls_dyna(
     windows: Sequence[Times], printing: Printing, remarks: Sequence[str] = ()
@@ -66,7 +91,8 @@ def _ls_dyna(
     DeckError
         If windows overlap or are not in order, as given or as printed, or an id does not fit.
     """
-    windows, ids = printed_card.check_windows(windows), check_ids(printing.part)
+    windows = printed_card.check_windows(windows)
+    ids = check_ids(printing.part)
     sets = list(_sets(printing.swset, len(windows)))
     if printing.merge is not None:
         # The lead id follows another id in the same line, separated by a blank.
@@ -107,10 +133,8 @@ def _window(
 ) -> Iterator[str]:
     # Both begin with a comment line.
     """Yield the lines of the two switch sets of one window."""
-    rigid_lines, deformable_lines = (
-        [*to_rigid(ids, printing, part_sets)],
-        [*to_deformable(ids, part_sets)],
-    )
+    rigid_lines = [*to_rigid(ids, printing, part_sets)]
+    deformable_lines = [*to_deformable(ids, part_sets)]
     cap = printing.step_cap or choose_step_cap(*map(float, texts))
     deleted, activated = _constraint_flags(printing)
     yield from (
@@ -159,16 +183,15 @@ def _ls_dyna_contact(
         time_pair,
     )  # not above: other cards do without
 
-    windows, ids = printed_card.check_windows(windows), check_ids(printing.part)
+    windows = printed_card.check_windows(windows)
+    ids = check_ids(printing.part)
     kind, number, pushes = _force_of(printing)
     free, forced = _CODES[kind]
     timing = time_pair(windows, pushes)
     first, second = printing.swset
     part_sets = number_sets((ids, *group_by_lead(ids, printing).values()), first)
-    rigid_lines, deformable_lines = (
-        [*to_rigid(ids, printing, part_sets)],
-        [*to_deformable(ids, part_sets)],
-    )
+    rigid_lines = [*to_rigid(ids, printing, part_sets)]
+    deformable_lines = [*to_deformable(ids, part_sets)]
     cap = printing.step_cap or min(choose_step_cap(*times) for times in timing.windows)
     waits = Waiting(free, number, 0.0, second, 1, latest=timing.latest)
     returns = Waiting(forced, number, timing.wait, first, -1, offset=timing.offset)
@@ -188,7 +211,8 @@ def _ls_dyna_contact(
     for members, name in part_sets.items():
         lines += write_part_set(members, name)
     deleted, activated = _constraint_flags(printing)
-    earliest, counts = shortest(timing.earliest), (len(rigid_lines) - 1, 0)
+    earliest = shortest(timing.earliest)
+    counts = (len(rigid_lines) - 1, 0)
     lines += (
         *header(first, earliest, shortest(cap), counts, waits, deleted),
         *rigid_lines,
@@ -251,31 +275,6 @@ def _warnings(ids: Sequence[int], printing: Printing) -> Iterator[str]:
         yield "Merge parts that share nodes (d2rpick card --merge), never loose ones."
     elif printing.merge is not None and printing.merge not in ids:
         yield f"Part {printing.merge} is the lead: it must be rigid already."
-
-
-_RUN_NAME = re.compile(r"[\w.-]+", re.ASCII)
-_OF_RADIOSS = (
-    "Ids are main nodes of /RBODY, not bodies; an unknown one is skipped silently.",
-    "Gravity and damping act on a rigid body only if its main node is in their",
-    "  node groups; no warning is given.",
-    "The energy reported for rigid solids can be wrong until the release.",
-    "The starter looks for /RBODY/OFF in the engine files; keep all of them.",
-    "A body that the first file does not put off is rigid from time 0.",
-    "The starter takes the nodes of an /RBODY from every /RWALL; Ikrem 1 keeps",
-    "  them there while the body is off.",
-    "An initial velocity must move the main node of a body too.",
-    "Repeat your output keywords (/TFILE, /ANIM, ...) in every file.",
-)
-_BY_FORCE = (
-    "The windows are those of the history: a switched run lands elsewhere, and at",
-    "  other times, after its first window that locks in energy.",
-    "They end in the first step of a contact, without a margin before it.",
-)
-_OF_SENSORS = tuple(
-    line
-    for line in _OF_RADIOSS[1:-1]
-    if not line.startswith(("The starter looks", "A body that"))
-)
 
 
 def _radioss(
@@ -373,12 +372,10 @@ def _force_of(printing: Printing) -> tuple[str, int, Pushes]:
             "a card for switches by force needs a history with the force of that contact or wall, or with momenta of"
             " the parts"
         )
-    kind, number = (
-        ("INTER", printing.contact)
-        if printing.contact is not None
-        else ("RWALL", printing.wall)
-    )
-    return kind, number or 0, Pushes(printing.pushed, printing.speed)
+    pushes = Pushes(printing.pushed, printing.speed)
+    if printing.contact is not None:
+        return "INTER", printing.contact, pushes
+    return "RWALL", printing.wall or 0, pushes
 
 
 def _of_sensors(
@@ -391,7 +388,8 @@ def _of_sensors(
     from d2rpick.deck.radioss_sensors import STOPS_SINCE
 
     texts, last = sensors
-    ids, end = check_ids(printing.node), printing.end or 0.0
+    ids = check_ids(printing.node)
+    end = printing.end or 0.0
     cap = min(
         leg.cap for leg in legs(windows, end, printing.step_cap) if leg.cap is not None
     )
@@ -461,17 +459,17 @@ def _of_run(
     DeckError
         If a window, a main node, the name or the end is missing or wrong.
     """
-    windows, ids = printed_card.check_windows(windows), check_ids(printing.node)
+    windows = printed_card.check_windows(windows)
+    ids = check_ids(printing.node)
     if not _RUN_NAME.fullmatch(printing.name):
         raise DeckError(
             f"the name of the run is {printing.name!r} (expected letters, digits, '.', '_' and '-')"
         )
     if printing.end is None or not windows[-1][1] < printing.end < math.inf:
-        problem = (
-            "the end of the run is not given"
-            if printing.end is None
-            else f"the run ends at {printing.end:g}"
-        )
+        if printing.end is None:
+            problem = "the end of the run is not given"
+        else:
+            problem = f"the run ends at {printing.end:g}"
         raise DeckError(f"{problem}, expected a time after td = {windows[-1][1]:g}")
     return windows, ids, printing.end
 
@@ -488,10 +486,8 @@ def _told(
     head = comments(
         [f"Rigid from {spans}; written by d2rpick {__version__}", *PHYSICS, *remarks]
     )
-    text, starter = (
-        "".join(f"# {line}\n" for line in head),
-        printing.starter + further_cards,
-    )
+    text = "".join(f"# {line}\n" for line in head)
+    starter = printing.starter + further_cards
     text += (
         f"# ---- into {printing.name}_0000.rad, before /END\n{starter}"
         if starter
@@ -530,7 +526,6 @@ SOLVERS: Final[Mapping[str, Solver]] = {
         _radioss_contact,
     ),
 }
-DEFAULT: Final = "ls-dyna"  # solver for histories that name none
 
 
 def solver_of(history_format: str) -> str:

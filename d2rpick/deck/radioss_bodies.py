@@ -89,7 +89,8 @@ def bodies_for(path: str, parts: Collection[int]) -> Bodies:
         raise DeckError(
             f"{path}: {name_units(unknown)} {are(unknown)} without elements that can be read; give other parts"
         )
-    nodes, lacking = list[int](), list[tuple[int, ...]]()
+    nodes = list[int]()
+    lacking = list[tuple[int, ...]]()
     unused = frozenset(kept_off(run.legs))
     for group in inventory.bodies(parts):
         main_nodes = _ready(starter, inventory, group, groups, unused)
@@ -131,7 +132,8 @@ def replaced(run: Run, cards: str) -> tuple[Body, ...]:
         for body in added.bodies
         if (group_members := added.group_members(body.group))
     ]
-    groups, unused = NodeGroups(run.starter), frozenset(kept_off(run.legs))
+    groups = NodeGroups(run.starter)
+    unused = frozenset(kept_off(run.legs))
     taken = _nodes({part for _, parts in members for part in parts}, groups)
     return tuple(
         body
@@ -148,9 +150,9 @@ def _is_unused(body: Body, unused: Collection[int]) -> bool:
 def _apart(inventory: Inventory, parts: Sequence[int]) -> str:
     """Return a remark if the body joins pieces that nothing else connects."""
     pieces = pieces_of(inventory, parts)
-    return (
-        f"; it joins {pieces} pieces that nothing else connects" if pieces > 1 else ""
-    )
+    if pieces > 1:
+        return f"; it joins {pieces} pieces that nothing else connects"
+    return ""
 
 
 def _stiff(inventory: Inventory, parts: Collection[int]) -> list[int]:
@@ -177,7 +179,8 @@ def _whole(run: Run) -> Starter:
     DeckError
         If ids, nodes or their positions may be unknown.
     """
-    starter, path = run.starter, run.deck.path
+    starter = run.starter
+    path = run.deck.path
     if starter is None:
         raise DeckError(
             f"{path}: the run has no starter deck (NAME_0000.rad); give a run that has one"
@@ -189,11 +192,10 @@ def _whole(run: Run) -> Starter:
     for block, sign in cuts(run.deck):
         raise DeckError(f"{block.source.name}: {sign} Complete the file first")
     if starter.moved or starter.transformed:
-        problem = (
-            "ids of a //SUBMODEL may be moved"
-            if starter.moved
-            else "/TRANSFORM moves nodes"
-        )
+        if starter.moved:
+            problem = "ids of a //SUBMODEL may be moved"
+        else:
+            problem = "/TRANSFORM moves nodes"
         raise DeckError(
             f"{path}: {problem}, which d2rpick does not evaluate; write the /RBODY yourself and give its main node"
         )
@@ -239,10 +241,8 @@ def _ready(
         ),
         touching[0],
     )
-    location, part_names = (
-        f"{body.card.at}: /RBODY {body.id}",
-        name_units(sorted(stiff)),
-    )
+    location = f"{body.card.at}: /RBODY {body.id}"
+    part_names = name_units(sorted(stiff))
     if body.sensor:
         raise DeckError(
             f"{location} of {part_names} is switched by sensor {body.sensor} already; remove the sensor first"
@@ -278,7 +278,9 @@ class _Made:
 
     def body(self, parts: Sequence[int]) -> tuple[int, str]:
         """Return main node and cards of a new body of some parts, with the velocities and gravity of its main node."""
-        node, group, alone = self.next("NODE"), self.next("GRNOD"), self.next("GRNOD")
+        node = self.next("NODE")
+        group = self.next("GRNOD")
+        alone = self.next("GRNOD")
         moving = "".join(self._moving(parts, alone))
         x, y, z = self._centre(parts)
         text = f"/NODE\n{node:10d}{x:20.12g}{y:20.12g}{z:20.12g}\n"
@@ -371,10 +373,8 @@ class _Made:
         head = "/".join(
             ["", *card.words[:at], str(self.next(card.words[0])), *card.words[at + 1 :]]
         )
-        text_before, text_after = (
-            first[: 10 * column].ljust(10 * column),
-            first[10 * (column + 1) :],
-        )
+        text_before = first[: 10 * column].ljust(10 * column)
+        text_after = first[10 * (column + 1) :]
         return (
             "\n".join(
                 [head, title, f"{text_before}{group:10d}{text_after}", *further_lines]

@@ -31,6 +31,35 @@ _INCLUDE = b"#include"
 _ENDS: Final = (["/END"], ["/END/ENGINE"])
 _DIGITS = 10  # most digits of an id
 
+# Elements whose stresses do not rotate with a rigid body.
+WITHOUT_FRAME: Final = {
+    "TETRA4",
+    "TETRA10",
+    "BRIC20",
+    "SHEL16",
+}
+_WIDTH: Final = 10
+# Fields (of 10 columns) of main node, sensor, group and Ikrem; the mass before the group takes two.
+_OF_BODY: Final = (
+    0,
+    1,
+    6,
+    7,
+)
+# /PART of a rigid part: Irigid in its first line, main node and sensor in its second.
+_IRIGID: Final = 5
+_OF_RIGID_PART: Final = (0, 5)
+_RIGID_PARTS_SINCE: Final = 2612  # input version from which /PART has Irigid
+_ICOROTATIONAL: Final = 2  # value of Iframe
+# Isolid of bricks without a co-rotational frame; 12 according to the help up to 2017.
+_NOT_TURNED: Final = {
+    1,
+    2,
+    12,
+}
+_DEFAULT_ISOLID: Final = 1
+SOLIDS: Final = {"SOLID", "TYPE14", "SOL_ORTH", "TYPE6"}
+
 
 def blocks(source: SourceFile) -> Iterator[Block]:
     """Yield keyword blocks and ``#include`` lines in the order of the file, up to ``/END``."""
@@ -79,11 +108,9 @@ def keyword(block: Block) -> tuple[str, ...]:
 
     The run name in ``/RUN/name/1`` is in upper case too; `Card.block` has it as written.
     """
-    return (
-        tuple(word.strip().upper() for word in block.head[1:].split("/"))
-        if block.head.startswith("/")
-        else ()
-    )
+    if block.head.startswith("/"):
+        return tuple(word.strip().upper() for word in block.head[1:].split("/"))
+    return ()
 
 
 def whole(text: str) -> int:
@@ -198,17 +225,17 @@ def _start(card: Card) -> Start:
     Source: Altair's public help for /INIV, and the published source of OpenRadioss.
     """
     type_ = number_of(card, 3)
-    velocity_count = (
-        5 if card.words[1:2] == ("AXIS",) else 1
-    )  # numbers that define the velocity
+    if card.words[1:2] == ("AXIS",):
+        velocity_count = 5
+    else:
+        velocity_count = 1
     ids = [_integer(value).value for value in numbers(card)][velocity_count:]
     if type_ == 2:
         return Start(card, (), ids[0] if ids else 0)
-    pairs = (
-        zip(ids[::2], ids[1::2], strict=False)
-        if type_ == 1
-        else zip(ids, ids, strict=True)
-    )
+    if type_ == 1:
+        pairs = zip(ids[::2], ids[1::2], strict=False)
+    else:
+        pairs = zip(ids, ids, strict=True)
     return Start(card, tuple(pairs), 0)
 
 
@@ -231,36 +258,6 @@ def _integer(value: Value[float]) -> Value[int]:
     if not value.problem and value.value != int(value.value):
         return Value(0, value.field, f"{value.field.text!r} is not an integer")
     return Value(int(value.value), value.field, value.problem)
-
-
-# Elements whose stresses do not rotate with a rigid body.
-WITHOUT_FRAME: Final = {
-    "TETRA4",
-    "TETRA10",
-    "BRIC20",
-    "SHEL16",
-}
-_WIDTH: Final = 10
-# Fields (of 10 columns) of main node, sensor, group and Ikrem; the mass before the group takes two.
-_OF_BODY: Final = (
-    0,
-    1,
-    6,
-    7,
-)
-# /PART of a rigid part: Irigid in its first line, main node and sensor in its second.
-_IRIGID: Final = 5
-_OF_RIGID_PART: Final = (0, 5)
-_RIGID_PARTS_SINCE: Final = 2612  # input version from which /PART has Irigid
-_ICOROTATIONAL: Final = 2  # value of Iframe
-# Isolid of bricks without a co-rotational frame; 12 according to the help up to 2017.
-_NOT_TURNED: Final = {
-    1,
-    2,
-    12,
-}
-_DEFAULT_ISOLID: Final = 1
-SOLIDS: Final = {"SOLID", "TYPE14", "SOL_ORTH", "TYPE6"}
 
 
 class PartLine(NamedTuple):
@@ -444,7 +441,8 @@ class Starter:
 
     def group_members(self, group: int) -> tuple[set[int], set[int]] | None:
         """Return the nodes and the complete parts of a node group; None if they are unknown."""
-        nodes, parts = set[int](), set[int]()
+        nodes = set[int]()
+        parts = set[int]()
         for kind, ids in map(self._group, reached([group], self._groups_in)):
             if kind in ("NODE", "NODENS"):
                 nodes.update(ids)

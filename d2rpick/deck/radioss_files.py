@@ -22,6 +22,14 @@ RUINS: Final = {
     LEFT_RIGID: "the deck keeps parts rigid that deform (D2R409)",
 }
 
+HEAD: Final = 256 * 1024  # bytes at the beginning of a file that identify it
+_KEYWORD: Final = re.compile(rb"^[*/]", re.MULTILINE)
+# Patterns for files of Radioss are compiled on use.
+STARTER: Final = rb"(?mi)^/BEGIN"
+ENGINE: Final = rb"(?mi)^/RUN/"
+_NUMBERED: Final = r"(?is)(.+)_(\d{4})\.rad"
+_NAME: Final = rb"(?mi)^/BEGIN[^\n]*\n(?:[#$][^\n]*\n)*([^\n]*)|^/RUN/([^/\n]+)"
+
 
 class Flaw(NamedTuple):
     """A flaw of a run with a stable ``code``, its place and its message.
@@ -32,15 +40,6 @@ class Flaw(NamedTuple):
     code: str
     place: Field
     message: str
-
-
-HEAD: Final = 256 * 1024  # bytes at the beginning of a file that identify it
-_KEYWORD: Final = re.compile(rb"^[*/]", re.MULTILINE)
-# Patterns for files of Radioss are compiled on use.
-STARTER: Final = rb"(?mi)^/BEGIN"
-ENGINE: Final = rb"(?mi)^/RUN/"
-_NUMBERED: Final = r"(?is)(.+)_(\d{4})\.rad"
-_NAME: Final = rb"(?mi)^/BEGIN[^\n]*\n(?:[#$][^\n]*\n)*([^\n]*)|^/RUN/([^/\n]+)"
 
 
 def recognises(head: bytes) -> bool:
@@ -81,11 +80,9 @@ def run_files(path: str) -> list[str]:
     )
     alike = (folder / match[0] for match in numbered if match and match[1] == name)
     files = [str(file_name) for file_name in alike if file_name.is_file()]
-    return (
-        files
-        if any(Path(path).samefile(file_name) for file_name in files)
-        else [path, *files]
-    )
+    if any(Path(path).samefile(file_name) for file_name in files):
+        return files
+    return [path, *files]
 
 
 def root_of(path: str) -> str:

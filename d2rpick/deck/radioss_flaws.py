@@ -92,11 +92,10 @@ def flaws_of(run: Run, switched: Collection[int]) -> tuple[Flaw, ...]:
     A flaw with code `NOT_FOLLOWED` says what is unknown, and why.
     """
     starter = run.starter
-    bodies = (
-        [body for body in starter.bodies if body.node.value in switched]
-        if starter
-        else []
-    )
+    if starter:
+        bodies = [body for body in starter.bodies if body.node.value in switched]
+    else:
+        bodies = []
     if starter is None or not bodies or not run.pushed:
         return ()
     if starter.moved:
@@ -159,7 +158,8 @@ def _of_wall(
     for group in (added, left_out):
         if groups.members(group) is None:
             yield _unknown(group, wall, card.here)
-    near, without = _near(card, node, starter, groups), groups.members(left_out)
+    near = _near(card, node, starter, groups)
+    without = groups.members(left_out)
     if near is None:
         yield Flaw(
             NOT_FOLLOWED,
@@ -199,12 +199,10 @@ def _near(
         points[0] = coordinates[ids == node][0]
     with np.errstate(invalid="ignore", over="ignore"):  # fields that are not a number
         distance = _distance(kind, coordinates, points, diameter / 2)
-    return (
-        None
-        if distance is None
-        else frozenset(
-            ids[(distance >= 0) & (distance <= reach) & (ids != node)].tolist()
-        )
+    if distance is None:
+        return None
+    return frozenset(
+        ids[(distance >= 0) & (distance <= reach) & (ids != node)].tolist()
     )
 
 
@@ -273,7 +271,8 @@ def _of_velocities(
 
 def _moved(card: Card) -> tuple[int, frozenset[int]]:
     """Return the node group of an /INIVEL, or the nodes that it lists; neither if it moves nothing at the start."""
-    kind, rows = "".join(card.name.split("/")[1:2]), card.rows[1:]
+    kind = "".join(card.name.split("/")[1:2])
+    rows = card.rows[1:]
     if kind == "NODE":
         return 0, frozenset(
             node for row in rows if (node := card.integer(row, 0).value) > 0
@@ -281,7 +280,8 @@ def _moved(card: Card) -> tuple[int, frozenset[int]]:
     axis = kind == "AXIS"
     if kind == "FVM" or len(rows) < 1 + axis:
         return 0, frozenset()
-    speeds, later = reals(rows[axis], 3 + axis), rows[1 + axis : 2 + axis]
+    speeds = reals(rows[axis], 3 + axis)
+    later = rows[1 + axis : 2 + axis]
     if not any(speeds) or any(
         reals(row, 1)[0] or card.integer(row, 2).value for row in later
     ):

@@ -86,6 +86,12 @@ _OTHER_SPRINGS: Final = {"SPR_GENE", "TYPE8", "SPR_BEAM", "TYPE13", "SPR_PUL", "
 _OF_SPRINGS: Final = _SPRING | _OTHER_SPRINGS
 _DEFAULT_SHELL, _DEFAULT_TRIANGLE, _DEFAULT_SOLID = 1, 2, 1
 
+# Further keywords that connect parts; the connected parts are unknown.
+_OTHER_TIES: Final = ("RBE2", "RBE3", "RLINK", "MPC")
+_MOTIONS: Final = ("IMPVEL", "IMPDISP", "IMPACC")
+_AXES: Final = "XYZ"
+_TRANSLATIONS, _ROTATIONS = slice(3, 6), slice(7, 10)  # columns of the codes of /BCS
+
 
 class _Property(NamedTuple):
     """A property as written: its type, its formulation flags for shells, triangles and solids, and its section."""
@@ -169,12 +175,11 @@ def _notes(run: Run, starter: Starter) -> Iterator[str]:
 
 def _parts(starter: Starter, mesh: Mesh, rigid: set[int]) -> Mapping[int, PartData]:
     """Return the data of all parts."""
-    materials, properties = dict(_materials(starter)), dict(_properties(starter))
-    kinds, unturned, unswitchable = (
-        mesh.kinds,
-        starter.unturned,
-        find_unswitchable_in_radioss(starter),
-    )
+    materials = dict(_materials(starter))
+    properties = dict(_properties(starter))
+    kinds = mesh.kinds
+    unturned = starter.unturned
+    unswitchable = find_unswitchable_in_radioss(starter)
     sensors = find_sensors_of_parts(starter)
     part_data: dict[int, PartData] = {}
     for part, line in starter.parts.items():
@@ -186,11 +191,10 @@ def _parts(starter: Starter, mesh: Mesh, rigid: set[int]) -> Mapping[int, PartDa
         material = _material(
             materials.get(line.material), properties.get(line.prop), part in rigid
         )
-        by_sensor = (
-            f"the deck switches it by sensor {sensors[part]} already"
-            if part in sensors
-            else ""
-        )
+        if part in sensors:
+            by_sensor = f"the deck switches it by sensor {sensors[part]} already"
+        else:
+            by_sensor = ""
         reason = unswitchable[part].reason if part in unswitchable else by_sensor
         part_data[part] = PartData(part, line.title, material, section, reason)
     return part_data
@@ -221,7 +225,8 @@ def _materials(starter: Starter) -> Iterator[tuple[int, Material]]:
     for card in starter.named("MAT"):
         if len(card.words) < 3:
             continue
-        rows, law = [row.text for row in below_title(card)], card.words[1]
+        rows = [row.text for row in below_title(card)]
+        law = card.words[1]
         is_elastic = law in _ELASTIC
         modulus, poisson = (
             _at(rows, 1, at) if is_elastic else None for at in (0, _REAL)
@@ -248,8 +253,10 @@ def _properties(starter: Starter) -> Iterator[tuple[int, _Property]]:
     for card in starter.named("PROP"):
         if len(card.words) < 3:
             continue
-        below, type_ = below_title(card), card.words[1]
-        flags, rows = _flags(card, below), [row.text for row in below]
+        below = below_title(card)
+        type_ = card.words[1]
+        flags = _flags(card, below)
+        rows = [row.text for row in below]
         shells = (
             flags[0] or shell or _DEFAULT_SHELL,
             flags[2] or triangle or _DEFAULT_TRIANGLE,
@@ -299,9 +306,10 @@ def _of_springs(rows: Sequence[str]) -> Section:
 def _of_plain_shells(rows: Sequence[str]) -> Section:
     """Read thickness and integration points of a shell; 0 points mean global integration, which counts as one."""
     points = rows[2][:_WIDTH].strip() if len(rows) > 2 else None
-    layers = (
-        None if points is None else max(int(points) if points.isdecimal() else 0, 1)
-    )
+    if points is None:
+        layers = None
+    else:
+        layers = max(int(points) if points.isdecimal() else 0, 1)
     return Section(thickness=_at(rows, 2, 20), layers=layers)
 
 
@@ -314,13 +322,6 @@ def _at(rows: Sequence[str], row: int, start: int) -> float | None:
     """Read a positive number in 20 columns, or None."""
     value = real(rows[row][start : start + _REAL]) if row < len(rows) else 0.0
     return value if value > 0 else None
-
-
-# Further keywords that connect parts; the connected parts are unknown.
-_OTHER_TIES: Final = ("RBE2", "RBE3", "RLINK", "MPC")
-_MOTIONS: Final = ("IMPVEL", "IMPDISP", "IMPACC")
-_AXES: Final = "XYZ"
-_TRANSLATIONS, _ROTATIONS = slice(3, 6), slice(7, 10)  # columns of the codes of /BCS
 
 
 def _boundary(run: Run, starter: Starter) -> model.Boundary:
@@ -355,7 +356,8 @@ def _holds(run: Run, starter: Starter) -> Iterator[model.Hold | str]:
         keyword(block)[:1] == ("BCSR",) for source in engine for block in blocks(source)
     )
     for card in starter.named("BCS", *_MOTIONS):
-        words, rows = card.words, below_title(card)
+        words = card.words
+        rows = below_title(card)
         if not rows:
             continue
         if words[0] == "BCS" and lifted:
@@ -408,11 +410,10 @@ def _of_bodies(
 ) -> Iterator[model.Hold]:
     """Yield supports of all nodes of a rigid body that is on, for each support of its main node."""
     for body in starter.bodies:
-        members = (
-            None
-            if body.sensor or body.node.value in run.named
-            else starter.group_members(body.group)
-        )
+        if body.sensor or body.node.value in run.named:
+            members = None
+        else:
+            members = starter.group_members(body.group)
         for hold in holds if members else ():
             if members and body.node.value in hold.nodes:
                 yield hold._replace(
@@ -436,11 +437,10 @@ def _gravity(starter: Starter) -> Iterator[model.Gravity | str]:
         and units[1].text.strip() != ""
     )
     for card in loads:
-        load = (
-            None
-            if converted or number_of(card, 2)
-            else _of_card(card, starter, functions)
-        )
+        if converted or number_of(card, 2):
+            load = None
+        else:
+            load = _of_card(card, starter, functions)
         yield (
             load
             or f"{_name(card)} cannot be read, so gravity is found from the run alone"
@@ -454,9 +454,10 @@ def _of_card(
     row = below_title(card)[0]
     function, skew, sensor, group = (card.integer(row, at).value for at in (0, 2, 3, 4))
     scale = reals(row, 5)[4] or 1.0
-    values = (
-        model.plateaus(functions.get(function, ()), scale) if function else (scale,)
-    )
+    if function:
+        values = model.plateaus(functions.get(function, ()), scale)
+    else:
+        values = (scale,)
     members = starter.group_members(group) if group else (set[int](), set[int]())
     direction = row.text[_WIDTH : 2 * _WIDTH].strip().upper() or "Z"
     if (
@@ -468,11 +469,9 @@ def _of_card(
         return None
     axis = None if skew else _AXES.index(direction)
     values = (0.0, *values) if sensor else values
-    return (
-        model.Gravity(axis, values, model.ids(members[0]), frozenset(members[1]))
-        if group
-        else model.Gravity(axis, values)
-    )
+    if group:
+        return model.Gravity(axis, values, model.ids(members[0]), frozenset(members[1]))
+    return model.Gravity(axis, values)
 
 
 def _functions(starter: Starter) -> Iterator[tuple[int, tuple[float, ...]]]:
@@ -504,7 +503,9 @@ def _joints(run: Run, starter: Starter) -> model.Joints:
         if card.words[1:2] == ("PART",) and card.words[2:]
     )
     surfaces = {number_of(card, -1): card for card in of_parts}
-    joints, switched, unknown = list[model.Joint](), list[model.Joint](), list[str]()
+    joints = list[model.Joint]()
+    switched = list[model.Joint]()
+    unknown = list[str]()
     for card in starter.named("INTER", *_OTHER_TIES):
         interface = card.words[:2] == ("INTER", "TYPE2")
         tie = _of_interface(card, starter, surfaces) if interface else None
@@ -534,9 +535,10 @@ def _of_interface(
 ) -> model.Joint | None:
     """Return the joint of a tied interface; None if its nodes or its main part are unknown."""
     rows = below_title(card)
-    group, surface = (
-        (card.integer(rows[0], at).value for at in range(2)) if rows else (0, 0)
-    )
+    if rows:
+        group, surface = (card.integer(rows[0], at).value for at in range(2))
+    else:
+        group, surface = (0, 0)
     members = starter.group_members(group)
     main = frozenset(_listed(surfaces[surface]) if surface in surfaces else ())
     if members is None or len(main) != 1:

@@ -90,10 +90,8 @@ def make_rigid_bodies(
     mains: dict[int, int] = {}
     further_groups: dict[int, list[Group]] = {}
     for merge in merges:
-        main, joined = (
-            by_name.get((merge.main_kind, merge.main)),
-            by_name.get((merge.kind, merge.other)),
-        )
+        main = by_name.get((merge.main_kind, merge.main))
+        joined = by_name.get((merge.kind, merge.other))
         if main is None:
             continue
         if joined and joined is not main:

@@ -253,9 +253,10 @@ def _switches(legs: list[Leg]) -> Iterator[LegSwitch]:
     """Yield the cards of all legs that switch bodies, with their times."""
     previous: Leg | None = None
     for leg in legs:
-        time, stop_field = (
-            (previous.stop.value, previous.stop.field) if previous else (0.0, None)
-        )
+        if previous:
+            time, stop_field = (previous.stop.value, previous.stop.field)
+        else:
+            time, stop_field = (0.0, None)
         for card, rigid, nodes in leg.switched:
             lines = tuple(Switched(node, False, rigid) for node in nodes)
             yield LegSwitch(
@@ -349,7 +350,8 @@ def _by_sensor(
 
 def _always(body: Body) -> Window:
     """Return the window of a part that the starter makes rigid (Irigid) and nothing switches."""
-    unit, by = Unit(body.part), LegSwitch(body.card, "plain", None, (), ())
+    unit = Unit(body.part)
+    by = LegSwitch(body.card, "plain", None, (), ())
     return Window(
         unit, 0.0, None, Event(unit, by, Switched(body.node, False, True)), None
     )
@@ -391,7 +393,8 @@ def rigid_parts(starter: Starter, bodies: Mapping[int, int]) -> dict[int, set[in
 
 def parts_off(run: Run) -> tuple[int, ...]:
     """Return the parts of the bodies that the first leg deactivates, ascending; empty without a starter deck."""
-    nodes, bodies = kept_off(run.legs[:1]), run.starter.bodies if run.starter else ()
+    nodes = kept_off(run.legs[:1])
+    bodies = run.starter.bodies if run.starter else ()
     groups = {
         body.node.value: body.group for body in bodies if body.node.value in nodes
     }
@@ -409,11 +412,10 @@ def find_parts_of_fixed_bodies(run: Run) -> set[int]:
         body for body in bodies
         if not body.sensor and body.node.value not in run.named and (run.legs or body.part)
     ]  # fmt: skip
-    held = (
-        rigid_parts(run.starter, {body.node.value: body.group for body in fixed})
-        if run.starter and fixed
-        else {}
-    )
+    if run.starter and fixed:
+        held = rigid_parts(run.starter, {body.node.value: body.group for body in fixed})
+    else:
+        held = {}
     return set().union(*held.values())
 
 
@@ -424,11 +426,12 @@ def find_sensors_of_parts(starter: Starter) -> dict[int, int]:
         for body in starter.bodies
         if body.sensor and not starter.moved
     }
-    held = (
-        rigid_parts(starter, {node: body.group for node, body in sensors.items()})
-        if sensors
-        else {}
-    )
+    if sensors:
+        held = rigid_parts(
+            starter, {node: body.group for node, body in sensors.items()}
+        )
+    else:
+        held = {}
     return {
         part: sensors[node].sensor for node, parts in held.items() for part in parts
     }
@@ -455,11 +458,12 @@ def left_rigid(run: Run, windows: Sequence[Window]) -> LeftRigid | None:
         for body in run.starter.bodies
         if not body.sensor and body.node.value not in run.named
     ]
-    parts = (
-        rigid_parts(run.starter, {body.node.value: body.group for body in bodies})
-        if bodies
-        else {}
-    )
+    if bodies:
+        parts = rigid_parts(
+            run.starter, {body.node.value: body.group for body in bodies}
+        )
+    else:
+        parts = {}
     bodies = [body for body in bodies if parts.get(body.node.value)]
     rigid_parts_listed = sorted(
         {part for body in bodies for part in parts[body.node.value]}

@@ -72,7 +72,8 @@ def active_spans(
     card = starter.sensors.get(number)
     if card is None or number in above:
         return f"sensor {number}, which {'asks for itself' if card else 'the deck has not'}"
-    rows, kind = below_title(card), card.words[1]
+    rows = below_title(card)
+    kind = card.words[1]
     if kind in _OF_FORCES:
         return _while_pushed(starter, number, rows, course)
     if kind not in ("TIME", "OR", "AND", "NOT"):
@@ -155,7 +156,8 @@ def find_contacts_of_sensor(
         card = starter.sensors.get(sensor)
         rows = below_title(card) if card and card.words[1] in _OF_FORCES else ()
         if card and len(rows) > 1:
-            kind, entity = _OF_FORCES[card.words[1]], card.integer(rows[1], 0).value
+            kind = _OF_FORCES[card.words[1]]
+            entity = card.integer(rows[1], 0).value
             force_spans.append(course.find_contacts(kind, entity))
     spans = [contacts for contacts in force_spans if contacts is not None]
     return either(spans) if spans else None
@@ -165,11 +167,9 @@ def _asked(starter: Starter, number: int) -> Sequence[int]:
     """Sensors that another one asks for."""
     card = starter.sensors.get(number)
     rows = below_title(card) if card and card.words[1] in ("OR", "AND", "NOT") else ()
-    return (
-        [card.integer(rows[1], at).value for at in range(2)]
-        if card and len(rows) > 1
-        else []
-    )
+    if card and len(rows) > 1:
+        return [card.integer(rows[1], at).value for at in range(2)]
+    return []
 
 
 def only_force(starter: Starter) -> bool:
@@ -187,7 +187,8 @@ def either(several: Sequence[Spans]) -> Spans:
     joined: list[tuple[float, float]] = []
     for start, stop in sorted(span for spans in several for span in spans):
         if joined and start <= joined[-1][1]:
-            start, stop = joined[-1][0], max(stop, joined.pop()[1])
+            start = joined[-1][0]
+            stop = max(stop, joined.pop()[1])
         joined.append((start, stop))
     return tuple(joined)
 

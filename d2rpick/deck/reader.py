@@ -35,6 +35,67 @@ _CONTINUED = " +"
 _FACTORS, _OF_TIME = 3, 1  # factors of mass, time and length; index of the time factor
 UNKNOWN_KIND = "this kind of include is not read"
 
+_KEPT: Final = (
+    *(
+        "DEFORMABLE_TO_RIGID",
+        "RIGID_DEFORMABLE",
+        "CONTROL_TERMINATION",
+        "DATABASE_GLSTAT",
+        "DATABASE_MATSUM",
+    ),
+    *(
+        "PART",
+        "SET_PART",
+        "MAT_",
+        "ELEMENT_",
+        "SECTION_",
+        "NODE",
+        "CONTACT_",
+        "RIGIDWALL_",
+    ),
+    *(
+        "SET_NODE",
+        "CONSTRAINED_",
+        "DATABASE_HISTORY_NODE",
+        "BOUNDARY_SPC",
+        "BOUNDARY_PRESCRIBED_MOTION",
+    ),
+    *("LOAD_", "AIRBAG_", "INITIAL_VELOCITY", "DEFINE_CURVE"),
+    *("SENSOR_CONTROL", "SENSOR_SWITCH", "SENSOR_DEFINE"),
+)
+_READ_INCLUDES: Final = ("INCLUDE", "INCLUDE_TRANSFORM")
+# Both are relative to the folder of the main deck.
+_PATHS: Final = (
+    "INCLUDE_PATH",
+    "INCLUDE_PATH_RELATIVE",
+)
+_LONG: Final = r"\bLONG\s*=\s*([YSK])"  # compiled on use
+# Keywords that seem to be switching cards.
+SWITCHING: Final = re.compile(r"\*\s*(DEFORMABLE|RIGID.DEFORMABLE)", re.IGNORECASE)
+_SUFFIXES: Final = "+-%"
+_DEEPEST = 60  # levels of nested includes
+_MOST_FILES = 10_000
+_MESH: Final = (
+    r"\*(ELEMENT_|NODE\b)|"
+    r"/(NODE|SHELL|SH3N|BRICK|TETRA4|TETRA10|PENTA6|QUAD|TRIA|BEAM|TRUSS|SPRING|BRIC20|SHEL16|SPHCEL|XELEM)(/|\s*\Z)"
+)
+# Keywords of engine files that need values: a file that ends with one of them alone is truncated.
+_WITH_VALUES: Final = (
+    "RUN",
+    "RBODY",
+    "DT",
+    "DTIX",
+    "STOP",
+    "INIV",
+    "SENS",
+    "TFILE",
+    "VERS",
+    "BCS",
+    "BCSR",
+    "DEL",
+    "END",
+)
+
 
 class Unread(NamedTuple):
     """An include that was not read: its name as written, and the reason."""
@@ -90,9 +151,10 @@ def _transform(card: Card, rows: list[Row]) -> tuple[Transform, tuple[Problem, .
         card.integer(rows[row], position) if row < len(rows) else None
         for row, position in positions
     ]
-    factors = (
-        [card.real(rows[2], at, 1.0) for at in range(_FACTORS)] if len(rows) > 2 else []
-    )
+    if len(rows) > 2:
+        factors = [card.real(rows[2], at, 1.0) for at in range(_FACTORS)]
+    else:
+        factors = []
     factor = factors[_OF_TIME] if factors else None
     node, part, material, set_, other_id = (
         value.value if value else 0 for value in offsets
@@ -124,48 +186,6 @@ def _folder(file: str) -> Path:
 def _portable(name: str) -> str:
     """Return a file name with forward slashes."""
     return name.replace("\\", "/")
-
-
-_KEPT: Final = (
-    *(
-        "DEFORMABLE_TO_RIGID",
-        "RIGID_DEFORMABLE",
-        "CONTROL_TERMINATION",
-        "DATABASE_GLSTAT",
-        "DATABASE_MATSUM",
-    ),
-    *(
-        "PART",
-        "SET_PART",
-        "MAT_",
-        "ELEMENT_",
-        "SECTION_",
-        "NODE",
-        "CONTACT_",
-        "RIGIDWALL_",
-    ),
-    *(
-        "SET_NODE",
-        "CONSTRAINED_",
-        "DATABASE_HISTORY_NODE",
-        "BOUNDARY_SPC",
-        "BOUNDARY_PRESCRIBED_MOTION",
-    ),
-    *("LOAD_", "AIRBAG_", "INITIAL_VELOCITY", "DEFINE_CURVE"),
-    *("SENSOR_CONTROL", "SENSOR_SWITCH", "SENSOR_DEFINE"),
-)
-_READ_INCLUDES: Final = ("INCLUDE", "INCLUDE_TRANSFORM")
-# Both are relative to the folder of the main deck.
-_PATHS: Final = (
-    "INCLUDE_PATH",
-    "INCLUDE_PATH_RELATIVE",
-)
-_LONG: Final = r"\bLONG\s*=\s*([YSK])"  # compiled on use
-# Keywords that seem to be switching cards.
-SWITCHING: Final = re.compile(r"\*\s*(DEFORMABLE|RIGID.DEFORMABLE)", re.IGNORECASE)
-_SUFFIXES: Final = "+-%"
-_DEEPEST = 60  # levels of nested includes
-_MOST_FILES = 10_000
 
 
 @dataclass(eq=False, repr=False)
@@ -278,10 +298,8 @@ def read_deck(path: str, content: bytes | SourceFile | None = None) -> Deck:
     main = content if isinstance(content, SourceFile) else SourceFile(path, content)
     if next(main.blocks(), None) is None:
         if main.marks:
-            problem, expected = (
-                "only *END was found, no keyword before it",
-                "*KEYWORD and the cards",
-            )
+            problem = "only *END was found, no keyword before it"
+            expected = "*KEYWORD and the cards"
         else:
             problem = "no keyword was found"
             expected = "an LS-DYNA deck (lines that begin with *) or a file of a Radioss run (/BEGIN, /RUN)"
@@ -445,12 +463,6 @@ def _keyword(head: str) -> tuple[str, str]:
     return name.upper(), suffix
 
 
-_MESH: Final = (
-    r"\*(ELEMENT_|NODE\b)|"
-    r"/(NODE|SHELL|SH3N|BRICK|TETRA4|TETRA10|PENTA6|QUAD|TRIA|BEAM|TRUSS|SPRING|BRIC20|SHEL16|SPHCEL|XELEM)(/|\s*\Z)"
-)
-
-
 def cuts(deck: Deck) -> Iterator[tuple[Block, str]]:
     """Yield the last block of each file that seems to be truncated, and the sign of it.
 
@@ -478,24 +490,6 @@ def holds_mesh(block: Block) -> bool:
     return re.match(_MESH, block.head, re.IGNORECASE) is not None
 
 
-# Keywords of engine files that need values: a file that ends with one of them alone is truncated.
-_WITH_VALUES: Final = (
-    "RUN",
-    "RBODY",
-    "DT",
-    "DTIX",
-    "STOP",
-    "INIV",
-    "SENS",
-    "TFILE",
-    "VERS",
-    "BCS",
-    "BCSR",
-    "DEL",
-    "END",
-)
-
-
 def _is_whole(block: Block) -> bool:
     """Return True if a last line without line end lacks nothing: it is a comment, or a keyword without values."""
     *above, last = block.source.text(block.start, block.end).split("\n")
@@ -511,7 +505,8 @@ def _is_whole(block: Block) -> bool:
 
 def _sign_of_cut(block: Block, *, main: bool) -> str:
     """Return the sign that a file is truncated, or an empty text."""
-    mesh, radioss = holds_mesh(block), block.head.startswith("/")
+    mesh = holds_mesh(block)
+    radioss = block.head.startswith("/")
     if not block.source.ends_with_line() and not _is_whole(block):
         return f"the file ends within a line of {'its mesh' if mesh else block.head.strip()}"
     if main and mesh:

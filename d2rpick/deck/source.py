@@ -31,6 +31,17 @@ _PGP: Final = b"-----BEGIN PGP MESSAGE"
 _ANCHOR: Final = _PGP.index(b"G")
 BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"  # byte order mark of UTF-8
 
+_PIECE: Final = 4 << 20  # bytes of whole lines that are processed together
+# Line ends are counted in this fraction of a piece, which stays in the processor's cache.
+_COUNTED: Final = 16
+_GZIP: Final = b"\x1f\x8b\x08"
+_FIRST: Final = 1 << 16  # bytes that are searched for the first line end
+_HEAD: Final = 1024  # bytes of a keyword line that are read
+_BEFORE: Final = 4096  # bytes before a keyword that are searched for its comments
+_SILENCE: Final = (
+    r"[$#]\s*d2rpick:\s*ignore\b[\s:]*((?:D2R\w*[\s,]*)+|\S*)"  # compiled on use
+)
+
 
 def find_marks(
     file: Held | OnDisk,
@@ -58,11 +69,10 @@ class _Search:
 
     def __init__(self, file: Held | OnDisk, piece: int) -> None:
         self._file, self._piece = file, piece
-        self._first = (
-            len(BYTE_ORDER_MARK)
-            if file.read(0, len(BYTE_ORDER_MARK)) == BYTE_ORDER_MARK
-            else 0
-        )
+        if file.read(0, len(BYTE_ORDER_MARK)) == BYTE_ORDER_MARK:
+            self._first = len(BYTE_ORDER_MARK)
+        else:
+            self._first = 0
         self.pieces = range(self._first, file.size, piece)
         self._room: Callable[[Iterable[int]], MutableSequence[int]] = (
             list if len(self.pieces) == 1 else _compact
@@ -99,11 +109,12 @@ class _Search:
                 offsets = _starred(piece, begin - low, size) + _encrypted(
                     piece, begin - low, size
                 )
-                marks_by_piece[begin] = (
-                    self._room([low + offset for offset in sorted(offsets)])
-                    if offsets
-                    else ()
-                )
+                if offsets:
+                    marks_by_piece[begin] = self._room(
+                        [low + offset for offset in sorted(offsets)]
+                    )
+                else:
+                    marks_by_piece[begin] = ()
         self._found |= (
             marks_by_piece  # only now it is certain that the file has not changed
         )
@@ -136,7 +147,8 @@ def _compact(offsets: Iterable[int]) -> MutableSequence[int]:
 
 def _starred(piece: bytearray, first: int, end: int) -> list[int]:
     """Return the offsets of each ``*`` that begins a line."""
-    offsets, at = [], piece.find(b"*", first, end)
+    offsets = []
+    at = piece.find(b"*", first, end)
     while at >= 0:
         blanks = piece[max(0, at - _LOOKBACK) : at].rstrip(b" ")
         if blanks.endswith(b"\n") or (not blanks and at < _LOOKBACK):
@@ -154,7 +166,8 @@ def _below(piece: bytearray, letter: bytes, at: int, end: int) -> int:
 def _encrypted(piece: bytearray, first: int, end: int) -> list[int]:
     # A head that continues in the next piece is found there, because that piece begins with the end of this one.
     """Return the offsets of the heads of encrypted blocks."""
-    offsets, at = [], piece.find(b"G", max(0, first - len(_PGP) + _ANCHOR + 1), end)
+    offsets = []
+    at = piece.find(b"G", max(0, first - len(_PGP) + _ANCHOR + 1), end)
     while at >= 0:
         start = at - _ANCHOR
         preceding = bytes(piece[max(0, start - 1) : max(0, start)])
@@ -166,18 +179,6 @@ def _encrypted(piece: bytearray, first: int, end: int) -> list[int]:
             offsets.append(start)
         at = _below(piece, b"G", at, end)
     return offsets
-
-
-_PIECE: Final = 4 << 20  # bytes of whole lines that are processed together
-# Line ends are counted in this fraction of a piece, which stays in the processor's cache.
-_COUNTED: Final = 16
-_GZIP: Final = b"\x1f\x8b\x08"
-_FIRST: Final = 1 << 16  # bytes that are searched for the first line end
-_HEAD: Final = 1024  # bytes of a keyword line that are read
-_BEFORE: Final = 4096  # bytes before a keyword that are searched for its comments
-_SILENCE: Final = (
-    r"[$#]\s*d2rpick:\s*ignore\b[\s:]*((?:D2R\w*[\s,]*)+|\S*)"  # compiled on use
-)
 
 
 class SourceFile:

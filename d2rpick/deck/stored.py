@@ -98,7 +98,8 @@ class OnDisk:
         return bytes(room)
 
     def _fill(self, file: FileIO, room: bytearray, begin: int, end: int) -> int:
-        done, wanted = 0, memoryview(room)[: end - begin]
+        done = 0
+        wanted = memoryview(room)[: end - begin]
         while done < len(wanted):  # a single call may return fewer bytes
             count = _read_at(file, wanted[done:], begin + done)
             if not count:

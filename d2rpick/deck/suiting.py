@@ -93,10 +93,8 @@ def _lie_on(
 
     cards = element_cards(deck, searched=True)
     other_parts = read_parts(deck).materials.keys() - set(parts)
-    nodes_on_parts, nodes_elsewhere = (
-        first_parts(cards, parts),
-        first_parts(cards, other_parts),
-    )
+    nodes_on_parts = first_parts(cards, parts)
+    nodes_elsewhere = first_parts(cards, other_parts)
     return all(
         constraint.part in parts
         or (

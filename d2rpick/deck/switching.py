@@ -184,11 +184,12 @@ def _simple(card: Card, kind: Kind, restart: Restart | None) -> SwitchSet:
             for at in range(count)
         ]
         missing = _INERTIA_ROWS[len(rows) :]
-        problem = (
-            f"{' and '.join(missing)} {'are' if len(missing) > 1 else 'is'} missing"
-            if missing
-            else ""
-        )
+        if missing:
+            problem = (
+                f"{' and '.join(missing)} {'are' if len(missing) > 1 else 'is'} missing"
+            )
+        else:
+            problem = ""
         return SwitchSet(
             card, kind, None, (), (*part, *reals), problem, next(iter(part), None)
         )
@@ -211,7 +212,8 @@ def _automatic(card: Card) -> SwitchSet:
     lines = rows[_HEADER_ROWS:]
     if header.to_rigid.problem or header.to_deformable.problem:
         return _with(card, "automatic", header, [])
-    rigid, deformable = header.to_rigid.value, header.to_deformable.value
+    rigid = header.to_rigid.value
+    deformable = header.to_deformable.value
     problem = ""
     if rigid < 0 or deformable < 0:
         problem = (
@@ -229,7 +231,8 @@ def _automatic(card: Card) -> SwitchSet:
         problem = f"D2R and R2D are 0, so the card switches nothing{lost}"
     elif any(row.blank for row in lines):
         problem = "a line is empty where a part was expected"
-    rigid, deformable = max(rigid, 0), max(deformable, 0)
+    rigid = max(rigid, 0)
+    deformable = max(deformable, 0)
     switched = [
         _line(card, row, to_rigid=True, ptype=True)
         for row in lines[:rigid]
@@ -312,11 +315,10 @@ _Line = tuple[Switched, Value[str]]
 
 def _line(card: Card, row: Row, *, to_rigid: bool, ptype: bool) -> _Line:
     """Read a part line: part, LRB on a D2R line, and PTYPE (column 21 of a D2R line, column 11 of an R2D line)."""
-    kind = (
-        card.word(row, 2 if to_rigid else 1, "PART")
-        if ptype
-        else Value("PART", card.here)
-    )
+    if ptype:
+        kind = card.word(row, 2 if to_rigid else 1, "PART")
+    else:
+        kind = Value("PART", card.here)
     if kind.value not in _PTYPES:
         kind = Value(
             "PART",
@@ -339,11 +341,9 @@ def _line(card: Card, row: Row, *, to_rigid: bool, ptype: bool) -> _Line:
 
 def _moved(value: Value[int], offset: int) -> Value[int]:
     """Add the offset of the include to an id; 0 stays 0."""
-    return (
-        value
-        if value.problem or not value.value or not offset
-        else replace(value, value=value.value + offset)
-    )
+    if value.problem or not value.value or not offset:
+        return value
+    return replace(value, value=value.value + offset)
 
 
 def _with(

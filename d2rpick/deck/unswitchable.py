@@ -22,17 +22,6 @@ if TYPE_CHECKING:
     from d2rpick.deck.radioss_deck import Starter
     from d2rpick.deck.reader import Deck
 
-
-class Unswitchable(NamedTuple):
-    """Why a part must not be switched.
-
-    ``flows``: its material flows through the mesh, else its law keeps a reference.
-    """
-
-    flows: bool
-    reason: str
-
-
 # Formulations (ELFORM of *SECTION_SOLID) in which material flows through the mesh.
 _FLOWING: Final = {5: "ALE", 6: "Eulerian", 7: "Eulerian", 11: "ALE", 12: "ALE"}
 # *MAT keywords of laws with a stress-free reference, by name and number; a number may have leading zeros.
@@ -63,6 +52,16 @@ _ISMSTR: Final = 1  # field of Ismstr in the first line of the property
 _GAINS: Final = "so it may gain stress when it is switched back"
 
 
+class Unswitchable(NamedTuple):
+    """Why a part must not be switched.
+
+    ``flows``: its material flows through the mesh, else its law keeps a reference.
+    """
+
+    flows: bool
+    reason: str
+
+
 def find_unswitchable_in_ls_dyna(deck: Deck, parts: Parts) -> dict[int, Unswitchable]:
     """Return the parts of an LS-DYNA deck that must not be switched, by part id, from their sections and materials."""
     sections = read_sections(deck)
@@ -73,10 +72,8 @@ def find_unswitchable_in_ls_dyna(deck: Deck, parts: Parts) -> dict[int, Unswitch
     }
     reasons: dict[int, Unswitchable] = {}
     for part, material in parts.materials.items():
-        section, law = (
-            sections.get(parts.sections.get(part, 0)),
-            laws.get(material, "").removesuffix("_TITLE"),
-        )
+        section = sections.get(parts.sections.get(part, 0))
+        law = laws.get(material, "").removesuffix("_TITLE")
         if section and section.kind == "SOLID" and section.elform in _FLOWING:
             reasons[part] = _flowing(
                 f"{_FLOWING[section.elform]}, ELFORM {section.elform}"

@@ -44,6 +44,9 @@ _ONCE = {
     "END",
 }
 
+_NOT_REPEATED: Final = {"RFILE"}  # a leg writes the restart file only at its end
+_IN_A_SECOND: Final = {"s": 1.0, "ms": 1e3, "mus": 1e6, "us": 1e6}
+
 
 def write_deck(
     main: str, card: PrintedCard, folder: str, *, overwrite: bool = False
@@ -108,7 +111,8 @@ def write_deck(
 
 def _ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
     """Yield name and content of each file of an LS-DYNA deck with cards."""
-    deck, source = read_deck(main), SourceFile("the card", card.text.encode())
+    deck = read_deck(main)
+    source = SourceFile("the card", card.text.encode())
     if (
         len(card.files) != 1
         or not source.marks
@@ -139,7 +143,8 @@ def _ls_dyna(main: str, card: PrintedCard) -> Iterator[tuple[str, bytes]]:
 
 def _refuse_switched(deck: Deck, printed: Deck) -> None:
     """Raise DeckError if the deck switches a part of the printed cards, or uses one of their switch sets."""
-    sets, printed_sets = read_switching(deck), read_switching(printed)
+    sets = read_switching(deck)
+    printed_sets = read_switching(printed)
     parts = {
         line.part.value for switch_set in printed_sets for line in switch_set.switched
     }
@@ -276,7 +281,8 @@ def _with_sensors(source: SourceFile, sensors: Mapping[int, int]) -> bytes:
     DeckError
         If a body has a sensor already.
     """
-    content, edits = source.read(0), dict[int, tuple[int, bytes]]()
+    content = source.read(0)
+    edits = dict[int, tuple[int, bytes]]()
     for block in blocks(source) if sensors else ():
         if keyword(block)[:1] in {("BEGIN",), ("RBODY",)}:
             edits.update(_edit(block, sensors))
@@ -378,9 +384,6 @@ def text_of(block: Block) -> bytes:
 
 
 # Legs that are decided while the run is computed.
-
-_NOT_REPEATED: Final = {"RFILE"}  # a leg writes the restart file only at its end
-_IN_A_SECOND: Final = {"s": 1.0, "ms": 1e3, "mus": 1e6, "us": 1e6}
 
 
 class DrivenDeck(NamedTuple):
@@ -499,6 +502,6 @@ def _second(run: Run) -> float | None:
     """Return the length of a second in the time unit of the deck [time]; None if it names none."""
     assert run.starter
     rows = next((card.rows for card in run.starter.named("BEGIN")), ())
-    return (
-        _IN_A_SECOND.get(rows[3].text[40:60].strip().lower()) if len(rows) > 3 else None
-    )
+    if len(rows) > 3:
+        return _IN_A_SECOND.get(rows[3].text[40:60].strip().lower())
+    return None

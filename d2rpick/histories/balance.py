@@ -51,6 +51,18 @@ _GLOBAL_VELOCITIES: Final = ("globalxvelocity", "globalyvelocity", "globalzveloc
 _MOMENTA: Final = ("x_momentum", "y_momentum", "z_momentum")
 _VELOCITIES: Final = ("x_velocity", "y_velocity", "z_velocity")
 
+# Normalised names of the energy of springs: Radioss; glstat of LS-DYNA and its branch of a binout.  In tables the names
+# may mean anything.
+_SPRINGS: Final = frozenset({"springenergy", "springanddamperenergy"})
+# Below this share of the peak internal energy, springs have no energy: single precision and glstat have six digits.
+_NONE: Final = 1e-6
+# Least energy of springs [energy]: LS-DYNA prints 1e-20 for zero.
+_FLOOR: Final = 1e-15
+# Tolerance of the sum of spring energies, as a share of the peak: matsum prints five digits of each.
+_ADDS_UP: Final = 1e-3
+# Threshold between the factors 0 and 1 of parts in a sum.
+_HALF: Final = 0.5
+
 
 def balance_of(
     databases: Sequence[Legs],
@@ -137,7 +149,8 @@ def _terms(whole: Legs, until: float) -> Balance | None:
         terms["kinetic"] = terms["kinetic"] + rotation
     walls = (columns.called(name) for name in _WALLS)
     terms["wall"] = next((energy for energy in walls if energy is not None), None)
-    total, work = terms["total"], terms["external_work"]
+    total = terms["total"]
+    work = terms["external_work"]
     is_less_work = _LESS_WORK.issubset(map(normalised, columns.used))
     if total is not None and work is not None and is_less_work:
         terms["total"] = total + work
@@ -171,7 +184,8 @@ class _Columns:
 
     def mass(self, momenta: Samples) -> float:
         """Return the mass of the model: as written, or the least mass with these momenta, (n, 1, 3)."""
-        written, kinetic = self.quantity("mass"), self.quantity("kinetic_energy")
+        written = self.quantity("mass")
+        kinetic = self.quantity("kinetic_energy")
         if written is not None and written.size:
             return float(median(written))
         if kinetic is None or not (kinetic > 0).any():
@@ -254,19 +268,6 @@ def _hourglass_of(
         )
         return tuple(zip(parts, *highest, strict=True))
     return ()
-
-
-# Normalised names of the energy of springs: Radioss; glstat of LS-DYNA and its branch of a binout.  In tables the names
-# may mean anything.
-_SPRINGS: Final = frozenset({"springenergy", "springanddamperenergy"})
-# Below this share of the peak internal energy, springs have no energy: single precision and glstat have six digits.
-_NONE: Final = 1e-6
-# Least energy of springs [energy]: LS-DYNA prints 1e-20 for zero.
-_FLOOR: Final = 1e-15
-# Tolerance of the sum of spring energies, as a share of the peak: matsum prints five digits of each.
-_ADDS_UP: Final = 1e-3
-# Threshold between the factors 0 and 1 of parts in a sum.
-_HALF: Final = 0.5
 
 
 def spring_energy(database: Legs) -> tuple[str, Samples] | None:

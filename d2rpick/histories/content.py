@@ -201,7 +201,8 @@ class OnDisk(Content):
             low = int(addresses[first])
             near = self.view(low, int(addresses[end - 1]) + width)
             fields[first:end] = _gathered(near, addresses[first:end] - low, width)
-        alone, room = firsts[~several], fields.reshape(-1).data
+        alone = firsts[~several]
+        room = fields.reshape(-1).data
         for start, address in zip(
             (alone * width).tolist(), addresses[alone].tolist(), strict=True
         ):

@@ -35,6 +35,19 @@ _MOST_BACK: Final = 0.1
 # Significant digits by bytes per number: 24 bits hold 7 digits; 17 digits restore every double.
 DIGITS: Final = {4: 7, 8: 17}
 
+# Output stops if an interval is this many times the median interval.
+_LONG = 30.0
+# Number of states whose time steps are compared together; they stay in the cache and need no new memory.
+_PIECE: Final = 1 << 15
+# Two databases may be of one run if at least this share of the states of the coarser are at times of the other one
+# Output intervals may differ, but a solver writes at its own cycles.
+_FEWEST = 0.5
+# The databases of a run end within this many of their longest output interval: a killed run has not written all states.
+_ENDS_APART = 2.0
+# Tolerance by which parts may have more internal energy than the model, as a share of the largest energy, plus
+# round-off relative to the kinetic energy.  In files of solvers their sum exceeds it by less than 0.1 % of the largest.
+_MORE, _ROUND_OFF = 0.1, 1e-6
+
 
 class Database:
     """The states of one leg of a run, in the units of the run; each reader defines what its files have.
@@ -126,12 +139,6 @@ class Database:
     def precisions(self, names: Sequence[str]) -> tuple[Precision, Precision]:  # noqa: ARG002
         """Return the precision of the times and of these channels, or of the parts without channels."""
         return Precision(self.digits), Precision(self.digits)
-
-
-# Output stops if an interval is this many times the median interval.
-_LONG = 30.0
-# Number of states whose time steps are compared together; they stay in the cache and need no new memory.
-_PIECE: Final = 1 << 15
 
 
 class Legs:
@@ -306,7 +313,8 @@ class Legs:
     ) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
         """Return which states are valid, and notes on the others."""
         for leg, time in zip(self._legs, times, strict=True):
-            back, steps = int(np.count_nonzero(time[1:] < time[:-1])), time.size - 1
+            back = int(np.count_nonzero(time[1:] < time[:-1]))
+            steps = time.size - 1
             if back > 1 and back > _MOST_BACK * steps:
                 problem = f"{leg.source}: time steps back at {back} of {steps} states, increasing times were expected"
                 raise FormatError(
@@ -379,18 +387,6 @@ def _holes(time: Samples) -> tuple[str, ...]:
     )
 
 
-# Two databases may be of one run if at least this share of the states of the coarser are at times of the other one
-# Output intervals may differ, but a solver writes at its own cycles.
-_FEWEST = 0.5
-
-# The databases of a run end within this many of their longest output interval: a killed run has not written all states.
-_ENDS_APART = 2.0
-
-# Tolerance by which parts may have more internal energy than the model, as a share of the largest energy, plus
-# round-off relative to the kinetic energy.  In files of solvers their sum exceeds it by less than 0.1 % of the largest.
-_MORE, _ROUND_OFF = 0.1, 1e-6
-
-
 def check_sum(whole: Legs, holder: Legs, energies: Samples) -> None:
     """Raise FormatError if parts have more internal energy than the whole model at the same times.
 
@@ -434,7 +430,8 @@ def doubts(databases: Sequence[Legs]) -> Iterator[str]:
         if abs(times[0][-1] - times[1][-1]) > _ENDS_APART * longest_step:
             ends = f"{first.source} ends at {times[0][-1]:.6g} and {second.source} at {times[1][-1]:.6g}"
             yield f"{ends}; are they from the same run, or is one cut?"
-        low, high = max(t[0] for t in times), min(t[-1] for t in times)
+        low = max(t[0] for t in times)
+        high = min(t[-1] for t in times)
         coarse, fine = sorted((t[window(t, low, high)] for t in times), key=np.size)
         shared = _coincident(coarse, fine, _room((first, second), times))[0].size
         if shared < _FEWEST * coarse.size:

@@ -16,6 +16,14 @@ _DIGITS: Final = 6  # significant digits of a printed time
 # Significant digits of a sum of times: more than files have, fewer than those of a double.
 _EXACT: Final = 12
 
+# Shares of a record in which a time is rarely meant.  A number in the first 1 % is assumed to be in another unit.
+_NEVER_MEANT: Final = 0.01
+# If a smaller unit would lead to the first 5 %, the record was more likely cut before the time.
+_HARDLY_MEANT: Final = 0.05
+# A td with fewer states before it is rarely meant: they show no period, and hardly any time is saved.  That a thousand
+# times its value is in the record too takes at least a thousand states, or a td before the second one.
+_FIRST_STATES: Final = 10
+
 
 def as_read(time: float) -> float:
     """Return the time that a user types after reading this one.
@@ -81,7 +89,8 @@ def window_as_read(start: float, end: float) -> str:
     >>> window_as_read(0.08800000000000001, 0.3108), window_as_read(0.10005206, 0.10005208)
     ('0.0880001 to 0.3108', '0.10005206 to 0.10005208')
     """
-    low, high = not_before(start), not_after(end)
+    low = not_before(start)
+    high = not_after(end)
     if low > high:
         return f"{float(start)!r} to {float(end)!r}"
     return f"{low:.{_DIGITS}g} to {high:.{_DIGITS}g}"
@@ -120,22 +129,14 @@ def _next(printed: float) -> float:
     return float(f"{int(mantissa.replace('.', '')) + 1}e{int(exponent) - _DIGITS + 1}")
 
 
-# Shares of a record in which a time is rarely meant.  A number in the first 1 % is assumed to be in another unit.
-_NEVER_MEANT: Final = 0.01
-# If a smaller unit would lead to the first 5 %, the record was more likely cut before the time.
-_HARDLY_MEANT: Final = 0.05
-# A td with fewer states before it is rarely meant: they show no period, and hardly any time is saved.  That a thousand
-# times its value is in the record too takes at least a thousand states, or a td before the second one.
-_FIRST_STATES: Final = 10
-
-
 def in_smaller_unit(record: Samples, times: Sequence[float], argument: str) -> str:
     """Return the question whether an argument outside a ``record`` (n,) was given in a smaller unit, or an empty text.
 
     The question is asked if the argument is inside the record in ms or us. An argument that misses the record by less
     than its length is assumed to be in the unit of the record.
     """
-    first, last = float(record[0]), float(record[-1])
+    first = float(record[0])
+    last = float(record[-1])
     if (
         any(first <= time <= last for time in times if time)
         or times[-1] < 2 * last - first
@@ -173,7 +174,8 @@ def in_the_record(
     >>> in_the_record(record, [0.064]), in_the_record(record, [0.64]), in_the_record(record, [0.0])
     ([64.0], [], [])
     """
-    first, last = float(record[0]), float(record[-1])
+    first = float(record[0])
+    last = float(record[-1])
     early = float(record[min(_FIRST_STATES, record.size) - 1])
     if (
         unit == "s"

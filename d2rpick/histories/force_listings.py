@@ -89,7 +89,8 @@ def _of_file(source: Source) -> Iterator[ContactForce]:
         raise FormatError(
             f"{source.name}: no forces of {listed} can be read in it; is it a whole {name} of LS-DYNA?"
         )
-    kind, titles = "rigid wall" if is_wall else "contact", _titles(data[:_HEAD])
+    kind = "rigid wall" if is_wall else "contact"
+    titles = _titles(data[:_HEAD])
     for id_ in dict.fromkeys(rows.ids.astype(int).tolist()):
         mine = rows.ids == id_
         title = titles.get(id_, "")

@@ -13,6 +13,62 @@ from typing import Final
 from d2rpick.base.errors import FormatError
 from d2rpick.base.tuples import NamedTuple
 
+_NAME_DATABASE: Final = "name the glstat, matsum or binout of the run"
+_NAME_TIME_HISTORY: Final = "name the T01 of the run"
+_SAVE_SHEET: Final = "save the sheet as csv, with a line of headings"
+_FROM_FRAME: Final = (
+    "load it in Python and give the columns to d2rpick.from_frame, or write them as csv"
+)
+_EXPORT: Final = "export time and internal energy as csv, with a line of headings"
+# ASCII databases of LS-DYNA without internal energy of the model or its parts, by their file name and by words that
+# only they contain.
+_DYNA_DATABASES: Final = (
+    ("nodout", rb"n o d a l   p r i n t   o u t"),
+    ("elout", rb"e l e m e n t   s t r e s s"),
+    ("rbdout", rb"r i g i d   b o d y   m o t i o n"),
+    ("jntforc", rb"j o i n t   f o r c e   o u t p u t"),
+    ("nodfor", rb"n o d a l   f o r c e   g r o u p"),
+    ("bndout", rb"n o d a l   f o r c e/e n e r g y"),
+    ("spcforc", rb"single point constraint forces"),
+    ("sleout", rb"contact interface energy output|interface energies"),
+    ("rcforc", rb"\n *(?:slave|master|surfa|surfb) +\d+ +time"),
+    ("rwforc", rb"normal-force"),
+    ("secforc", rb"section#|\n +total-force"),
+    ("deforc", rb"spring/damper"),
+    ("abstat", rb"airbag/cv"),
+    ("swforc", rb"spotweld|constraint #"),
+    *(
+        (name, b"")
+        for name in (
+            "ncforc",
+            "gceout",
+            "sbtout",
+            "ssstat",
+            "sphout",
+            "trhist",
+            "disbout",
+            "dbfsi",
+            "curvout",
+        )
+    ),
+    *(
+        (name, b"")
+        for name in (
+            "defgeo",
+            "dcfail",
+            "tprint",
+            "atdb",
+            "pllyout",
+            "prtube",
+            "cpmfor",
+            "massout",
+        )
+    ),
+)
+_DYNA_HEAD: Final = rb"\n(?:\{BEGIN LEGEND\}| {10,}ls-dyna )"
+# A keyword at the start of a line: of LS-DYNA, or of a starter or engine file of Radioss.
+_DECK: Final = rb"\*[A-Za-z][A-Za-z_]{2}|#RADIOSS|/BEGIN|/[A-Z]{3,8}(?:/|\s|\Z)"
+
 
 class ForeignFormat(NamedTuple):
     """A format without an energy history: ``pattern`` matches the first bytes of its files."""
@@ -21,14 +77,6 @@ class ForeignFormat(NamedTuple):
     name: str
     cure: str
 
-
-_NAME_DATABASE: Final = "name the glstat, matsum or binout of the run"
-_NAME_TIME_HISTORY: Final = "name the T01 of the run"
-_SAVE_SHEET: Final = "save the sheet as csv, with a line of headings"
-_FROM_FRAME: Final = (
-    "load it in Python and give the columns to d2rpick.from_frame, or write them as csv"
-)
-_EXPORT: Final = "export time and internal energy as csv, with a line of headings"
 
 # Formats recognised by their first bytes, special ones before general ones.
 _BINARY_FORMATS: Final = (
@@ -130,55 +178,6 @@ _TEXT_FORMATS: Final = (
     ForeignFormat(rb"# vtk DataFile", "a VTK file", _EXPORT),
     ForeignFormat(rb"ISO-10303|solid \w+\s*\n\s*facet", "a geometry", _EXPORT),
 )
-
-# ASCII databases of LS-DYNA without internal energy of the model or its parts, by their file name and by words that
-# only they contain.
-_DYNA_DATABASES: Final = (
-    ("nodout", rb"n o d a l   p r i n t   o u t"),
-    ("elout", rb"e l e m e n t   s t r e s s"),
-    ("rbdout", rb"r i g i d   b o d y   m o t i o n"),
-    ("jntforc", rb"j o i n t   f o r c e   o u t p u t"),
-    ("nodfor", rb"n o d a l   f o r c e   g r o u p"),
-    ("bndout", rb"n o d a l   f o r c e/e n e r g y"),
-    ("spcforc", rb"single point constraint forces"),
-    ("sleout", rb"contact interface energy output|interface energies"),
-    ("rcforc", rb"\n *(?:slave|master|surfa|surfb) +\d+ +time"),
-    ("rwforc", rb"normal-force"),
-    ("secforc", rb"section#|\n +total-force"),
-    ("deforc", rb"spring/damper"),
-    ("abstat", rb"airbag/cv"),
-    ("swforc", rb"spotweld|constraint #"),
-    *(
-        (name, b"")
-        for name in (
-            "ncforc",
-            "gceout",
-            "sbtout",
-            "ssstat",
-            "sphout",
-            "trhist",
-            "disbout",
-            "dbfsi",
-            "curvout",
-        )
-    ),
-    *(
-        (name, b"")
-        for name in (
-            "defgeo",
-            "dcfail",
-            "tprint",
-            "atdb",
-            "pllyout",
-            "prtube",
-            "cpmfor",
-            "massout",
-        )
-    ),
-)
-_DYNA_HEAD: Final = rb"\n(?:\{BEGIN LEGEND\}| {10,}ls-dyna )"
-# A keyword at the start of a line: of LS-DYNA, or of a starter or engine file of Radioss.
-_DECK: Final = rb"\*[A-Za-z][A-Za-z_]{2}|#RADIOSS|/BEGIN|/[A-Z]{3,8}(?:/|\s|\Z)"
 
 
 def refuse_foreign(source: str, head: bytes) -> None:

@@ -300,7 +300,8 @@ class History:
     known: Memory = field(default_factory=Memory, init=False)
 
     def __post_init__(self) -> None:
-        time, energy = frozen(self.time), frozen(self.energy)
+        time = frozen(self.time)
+        energy = frozen(self.energy)
         where = ", ".join(self.source)
         if time.ndim != 1 or time.shape != energy.shape:
             shapes = f"{where}: time has shape {time.shape}, energy {energy.shape}"
@@ -378,7 +379,8 @@ class History:
 
     def check(self, *times: float, argument: str = "") -> None:
         """Raise RangeError unless all times of an ``argument`` are in the record."""
-        low, high = self.time[0], self.time[-1]
+        low = self.time[0]
+        high = self.time[-1]
         if all(low <= time <= high for time in times):
             return
         from d2rpick.histories.digits import in_smaller_unit
@@ -427,8 +429,10 @@ class History:
         states_before = np.searchsorted(self.time, times, side="right") - 1
         start = np.clip(states_before, 0, max(last_index - 1, 0))
         end = np.minimum(start + 1, last_index)
-        t0, e0 = self.time[start], self.energy[start]
-        t1, e1 = self.time[end], self.energy[end]
+        t0 = self.time[start]
+        e0 = self.energy[start]
+        t1 = self.time[end]
+        e1 = self.energy[end]
         slope = np.divide(
             e1 - e0, t1 - t0, out=np.zeros(np.shape(times)), where=t1 > t0
         )

@@ -42,6 +42,39 @@ _BEFORE: Final = (
 )
 _SHORT: Final = 7  # digits of an abbreviated commit
 
+WITH_AN_ERROR: Final = "with an error"
+# Texts at the end of Radioss' engine listing, and of LS-DYNA's messag and d3hsp.
+_ENDINGS: Final = {
+    b"ERROR TERMINATION": WITH_AN_ERROR,
+    b"E r r o r   t e r m i n a t i o n": WITH_AN_ERROR,
+    b"NORMAL TERMINATION": "normally",
+    b"N o r m a l    t e r m i n a t i o n": "normally",
+}
+_STOPPED: Final = b"USER BREAK"
+_NUMBER: Final = rb"([-+]?[.\d]+(?:[Ee][-+]?\d+)?)"
+_RADIOSS_ELEMENTS: Final = rb"(?m)^ *ELEMENT FORCES\.*: *" + _NUMBER
+_RADIOSS_TOTAL: Final = rb"(?m)^ *TOTAL\.*: *" + _NUMBER
+_RADIOSS_CYCLES: Final = rb"TOTAL NUMBER OF CYCLES *: *(\d+)"
+_SUMMARY: Final = b"CUMULATIVE CPU TIME SUMMARY"
+_TIMING: Final = b"T i m i n g   i n f o r m a t i o n"
+_D3HSP_ROW: Final = rb" *\.* +" + _NUMBER + rb" +" + _NUMBER + rb" +" + _NUMBER
+_D3HSP_ELEMENTS: Final = rb"(?m)^ *Element processing" + _D3HSP_ROW
+_D3HSP_TOTAL: Final = rb"(?m)^ *T o t a l s" + _D3HSP_ROW
+_D3HSP_SETUP: Final = (
+    rb"(?m)^ *(?:Keyword Processing|Initialization|MPP Decomposition)" + _D3HSP_ROW
+)
+_D3HSP_CYCLES: Final = rb"Problem cycle *= *(\d+)"
+_ZONE: Final = rb"(?m)^ time(?:\.{5,}| per zone cycle\.\(nanosec\)\.\.) +" + _NUMBER
+_PER_ZONE: Final = b" time per zone"
+_STEP_NUMBER: Final = rb"([-+.\dEe]+)"
+_STEP: Final = (
+    rb"(?m)is controlled by +[\w ]*?\d+ +of part +(\d+)|^ time step\.+ +" + _STEP_NUMBER
+)
+_TABLE: Final = rb"smallest timesteps *\r?\n[^\n]*\n[^\n]*part +timestep *\r?\n((?:[^\n]*\n)*?) *(?:\n|\Z)"
+_ROW: Final = rb"(?m)^ *[a-z][a-z ]* +\d+ +(\d+) +" + _STEP_NUMBER + rb"\s*$"
+_SEARCHED: Final = 64 << 20  # bytes at the start of a file that are searched
+_D3HSP: Final = "d3hsp"
+
 
 def wrong_energies(histories: Iterable[str]) -> Iterator[str]:
     """Yield the listings of restarts whose engine reports a wrong internal energy, and what shows it.
@@ -56,17 +89,6 @@ def wrong_energies(histories: Iterable[str]) -> Iterator[str]:
             old = _before_the_fix(*_ends(listing))
             if old:
                 yield f"{listing}: {old}"
-
-
-WITH_AN_ERROR: Final = "with an error"
-# Texts at the end of Radioss' engine listing, and of LS-DYNA's messag and d3hsp.
-_ENDINGS: Final = {
-    b"ERROR TERMINATION": WITH_AN_ERROR,
-    b"E r r o r   t e r m i n a t i o n": WITH_AN_ERROR,
-    b"NORMAL TERMINATION": "normally",
-    b"N o r m a l    t e r m i n a t i o n": "normally",
-}
-_STOPPED: Final = b"USER BREAK"
 
 
 def ending(history: str) -> str | None:
@@ -105,11 +127,9 @@ def _before_the_fix(head: bytes, tail: bytes) -> str:
     """Return what shows that an engine that switches rigid bodies is older than the fix; empty if nothing does."""
     if b"OpenRadioss" not in head or not re.search(_SWITCHED, head):
         return ""
-    commit, built, ran = (
-        re.search(_COMMIT, head),
-        re.search(_BUILT, head),
-        re.search(_RAN, tail),
-    )
+    commit = re.search(_COMMIT, head)
+    built = re.search(_BUILT, head)
+    ran = re.search(_RAN, tail)
     if commit and commit[1][:_SHORT].decode() in _BEFORE:
         return f"commit {commit[1].decode()[:9]}"
     if built and int(built[1]) < _FIXED[0]:
@@ -117,23 +137,6 @@ def _before_the_fix(head: bytes, tail: bytes) -> str:
     if ran and tuple(map(int, ran.groups())) < _FIXED:
         return f"run on {b'-'.join(ran.groups()).decode()}"
     return ""
-
-
-_NUMBER: Final = rb"([-+]?[.\d]+(?:[Ee][-+]?\d+)?)"
-_RADIOSS_ELEMENTS: Final = rb"(?m)^ *ELEMENT FORCES\.*: *" + _NUMBER
-_RADIOSS_TOTAL: Final = rb"(?m)^ *TOTAL\.*: *" + _NUMBER
-_RADIOSS_CYCLES: Final = rb"TOTAL NUMBER OF CYCLES *: *(\d+)"
-_SUMMARY: Final = b"CUMULATIVE CPU TIME SUMMARY"
-_TIMING: Final = b"T i m i n g   i n f o r m a t i o n"
-_D3HSP_ROW: Final = rb" *\.* +" + _NUMBER + rb" +" + _NUMBER + rb" +" + _NUMBER
-_D3HSP_ELEMENTS: Final = rb"(?m)^ *Element processing" + _D3HSP_ROW
-_D3HSP_TOTAL: Final = rb"(?m)^ *T o t a l s" + _D3HSP_ROW
-_D3HSP_SETUP: Final = (
-    rb"(?m)^ *(?:Keyword Processing|Initialization|MPP Decomposition)" + _D3HSP_ROW
-)
-_D3HSP_CYCLES: Final = rb"Problem cycle *= *(\d+)"
-_ZONE: Final = rb"(?m)^ time(?:\.{5,}| per zone cycle\.\(nanosec\)\.\.) +" + _NUMBER
-_PER_ZONE: Final = b" time per zone"
 
 
 class Timing(NamedTuple):
@@ -233,16 +236,6 @@ def _of_d3hsp(name: str, data: bytes) -> Timing | None:
     return Timing(
         name, int(cycles[1]), float(total[column]) - setup, float(elements[column])
     )
-
-
-_STEP_NUMBER: Final = rb"([-+.\dEe]+)"
-_STEP: Final = (
-    rb"(?m)is controlled by +[\w ]*?\d+ +of part +(\d+)|^ time step\.+ +" + _STEP_NUMBER
-)
-_TABLE: Final = rb"smallest timesteps *\r?\n[^\n]*\n[^\n]*part +timestep *\r?\n((?:[^\n]*\n)*?) *(?:\n|\Z)"
-_ROW: Final = rb"(?m)^ *[a-z][a-z ]* +\d+ +(\d+) +" + _STEP_NUMBER + rb"\s*$"
-_SEARCHED: Final = 64 << 20  # bytes at the start of a file that are searched
-_D3HSP: Final = "d3hsp"
 
 
 def printed_steps(run: Run, *neighbours: str) -> dict[int, tuple[float, str]]:

@@ -76,6 +76,8 @@ _LIKE_AN_ENERGY: Final = (
     r"all[a-z]{2,3}|ke|ie|hge?|e?kin[a-z]*|.*(?:energ|エネルギー|能量|에너지).*"
 )
 
+_MOST_NAMED: Final = 6  # energies listed in one note
+
 
 class Meaning(NamedTuple):
     """The meaning of a name: a quantity, the rank of the match, and the words for something else."""
@@ -93,7 +95,6 @@ def _list_phrases() -> Iterator[tuple[str, str]]:
 
 
 _PHRASES: Final[Mapping[str, str]] = dict(_list_phrases())
-_MOST_NAMED: Final = 6  # energies listed in one note
 
 
 @lru_cache(maxsize=1 << 16)  # the same names are looked up repeatedly
@@ -198,7 +199,8 @@ def find_internal_energies(names: Sequence[str]) -> list[int]:
 
     A total is not preferred to the energies of parts: only the user knows which energy is to be locked in.
     """
-    exact, inexact = list[int](), list[int]()
+    exact = list[int]()
+    inexact = list[int]()
     for index, name in enumerate(names):
         meaning = find_meaning(name)
         if meaning is None or meaning.quantity != "internal_energy":

@@ -87,6 +87,9 @@ _BRACKETS = re.compile(r"[(\[]\s*([^()\[\]]*?)\s*[)\]]")
 _TAIL = re.compile(r"^(.*[^/_,\s])\s*[/_,\s]\s*([^/_,\s]+)$")
 _TWO_WORD_UNIT = re.compile(r"[/_,\s]\s*(k?N\s+m{1,2})$")
 
+# A number or range of part ids; a text with more digits is a title.
+_RANGE = r"(\d{1,18})(?:\s*-\s*(\d{1,18}))?"
+
 
 def unit_of(name: str) -> str:
     """Return the unit at the end of a column name: in brackets, or after ``in``, ``/``, ``_``, ``,`` or a blank.
@@ -275,10 +278,6 @@ def with_namesakes(parts: Iterable[Part]) -> tuple[Part, ...]:
     return tuple(Namesake(*part) if counts[part.title] > 1 else part for part in listed)
 
 
-# A number or range of part ids; a text with more digits is a title.
-_RANGE = r"(\d{1,18})(?:\s*-\s*(\d{1,18}))?"
-
-
 class Selection(NamedTuple):
     """The selected columns (by name, number or label) and parts (by number, range or title).
 
@@ -352,7 +351,8 @@ def _piece(
                 f"{where}: no part {piece!r}{near}; there are: {menu(parts)}"
             )
         return [_only(titled, piece, where)]
-    low, high = int(numbers[1]), int(numbers[2] or numbers[1])
+    low = int(numbers[1])
+    high = int(numbers[2] or numbers[1])
     inside = [part for part in parts if low <= part.id <= high]
     if titled and titled != inside:
         problem = f"{where}: {piece!r} is the title of part {titled[0].id}, as a number it means"

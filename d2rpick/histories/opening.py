@@ -36,6 +36,11 @@ _DEFAULT = Selection()
 _LONGEST_LEGEND: Final = 1 << 24  # bytes; the legend of an ASCII database is shorter
 _DIGITS: Final = "0123456789"  # of the number of a later file of a family
 
+# Legs belong to different runs if their energies at a common time differ by more than this share of the largest.
+_SAME = 0.01
+# Number of parts whose energies are compared.
+_COMPARED = 50
+
 
 class Reader(Protocol):
     """The functions that a module must define to be a reader; a table format also defines ``write``."""
@@ -329,12 +334,6 @@ def _head_of(source: Source) -> bytes:
     return head
 
 
-# Legs belong to different runs if their energies at a common time differ by more than this share of the largest.
-_SAME = 0.01
-# Number of parts whose energies are compared.
-_COMPARED = 50
-
-
 def check_companions(databases: Sequence[Legs]) -> None:
     """Raise FormatError if two databases have no time in common."""
     for first, second in combinations(databases, 2):
@@ -353,7 +352,8 @@ def check_legs(legs: Sequence[Database]) -> None:
     the same time are copies, or of different runs: then all states at common times are compared.
     """
     for first, second in combinations(legs, 2):
-        held_by_first, held_by_second = _held(first), _held(second)
+        held_by_first = _held(first)
+        held_by_second = _held(second)
         both_hold = held_by_first and held_by_second
         if both_hold and held_by_first.isdisjoint(held_by_second):
             raise FormatError(

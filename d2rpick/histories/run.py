@@ -110,11 +110,10 @@ class Run:
         """
         history = self._energy(selection)
         notes = (*history.notes, *self.unused_energies(selection))
-        flying = (
-            select_parts(selection.flying, self.parts, self.name)
-            if selection.flying
-            else None
-        )
+        if selection.flying:
+            flying = select_parts(selection.flying, self.parts, self.name)
+        else:
+            flying = None
         evidence = _Written(self, history.parts, flying)
         return replace(
             history, evidence=evidence, surroundings=self.surroundings, notes=notes
@@ -140,7 +139,8 @@ class Run:
 
         ``chosen`` are the parts to switch (None: all), ``flying`` those known to fly together, if any.
         """
-        of_parts, of_whole = self._part_momenta, self._whole_momentum
+        of_parts = self._part_momenta
+        of_whole = self._whole_momentum
         if of_parts and of_parts.parts:
             ids = [part.id for part in of_parts.parts]
             members = tuple(
@@ -187,7 +187,8 @@ class Run:
 
         As written, or momentum over velocity along the axis with most momentum; None if neither is written.
         """
-        momenta, holder = self._part_momenta, self._with_parts()
+        momenta = self._part_momenta
+        holder = self._with_parts()
         return self._masses(momenta.values, holder) if momenta and holder else None
 
     def _masses(self, momenta: Samples, holder: Legs) -> Samples | None:
@@ -199,7 +200,8 @@ class Run:
         momentum = momenta[:, :, axis]
         if velocity is None:
             return None
-        square, product = (velocity**2).sum(axis=0), (velocity * momentum).sum(axis=0)
+        square = (velocity**2).sum(axis=0)
+        product = (velocity * momentum).sum(axis=0)
         massless = ~momentum.any(axis=0) & ~velocity.any(axis=0)
         ratios = np.divide(
             product, square, out=np.full(square.shape, np.nan), where=square > 0
@@ -372,7 +374,8 @@ class Run:
         """Return the history of the whole model without the energy of springs and dampers, if it has other energy."""
         from d2rpick.histories.balance import spring_energy
 
-        whole, springs = self._of_channels((channel,)), spring_energy(database)
+        whole = self._of_channels((channel,))
+        springs = spring_energy(database)
         if springs is None:
             return whole
         note = _left_out(f"all springs and dampers, {springs[0]},")
@@ -494,9 +497,9 @@ class _Written(Given):
         if parts is None:
             return super().kinetic_energy(parts)
         values = if_written(lambda: self._run.part_kinetic_energies(parts))
-        return (
-            None if values is None else Track(self._run.part_time, values.sum(axis=1))
-        )
+        if values is None:
+            return None
+        return Track(self._run.part_time, values.sum(axis=1))
 
 
 def _selected_channels(database: Legs, selection: Selection) -> list[str]:

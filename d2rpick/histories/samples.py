@@ -16,6 +16,17 @@ if TYPE_CHECKING:
 
     Samples = NDArray[np.float64]
 
+# If at least this share of the states repeats the time of the state before, a table may have rows for several parts.
+_REPEATED: Final = 0.49
+FEWEST_TIMES: Final = 3  # with fewer times, rows of equal time may be chance
+# Ratio of output intervals before and after a restart; another curve or an unsorted table has another interval.
+_ALIKE = 2.0
+# Number of adjacent windows that are combined into one; with eight the table of them stays small and quick to search.
+_TOGETHER: Final = 8
+# A root that moves by less than this share of its time has converged to rounding.
+_STILL: Final = 8 * float(np.finfo(np.float64).eps)
+HALVINGS: Final = 50  # halvings of a bracket down to rounding
+
 
 def window(time: Samples, start: float, end: float) -> slice:
     """Return the slice of ascending times from ``start`` to ``end``, both included [time].
@@ -100,7 +111,8 @@ def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
     if np.all(time[1:] > time[:-1]):  # the usual case
         return np.ones(time.size, dtype=bool), ()
     step = np.diff(time)
-    equal, back = int(np.count_nonzero(step == 0)), int(np.count_nonzero(step < 0))
+    equal = int(np.count_nonzero(step == 0))
+    back = int(np.count_nonzero(step < 0))
     later = np.minimum.accumulate(time[::-1])[::-1]
     keep = np.append(time[:-1] < later[1:], np.ones(min(1, time.size), dtype=bool))
     notes = []
@@ -119,11 +131,6 @@ def newest_states(time: Samples) -> tuple[NDArray[np.bool_], tuple[str, ...]]:
     return keep, tuple(notes)
 
 
-# If at least this share of the states repeats the time of the state before, a table may have rows for several parts.
-_REPEATED: Final = 0.49
-FEWEST_TIMES: Final = 3  # with fewer times, rows of equal time may be chance
-
-
 def count_rows_per_time(time: Samples) -> int:
     """Return the median number of rows with the same time (n,); 1 if most times are in one row only.
 
@@ -138,10 +145,6 @@ def count_rows_per_time(time: Samples) -> int:
     first_rows = np.flatnonzero(np.append(True, time[1:] != time[:-1]))
     rows = np.diff(np.append(first_rows, time.size))
     return int(np.sort(rows)[rows.size // 2])
-
-
-# Ratio of output intervals before and after a restart; another curve or an unsorted table has another interval.
-_ALIKE = 2.0
 
 
 def of_one_run(time: Samples, place: Callable[[int], str]) -> Samples:
@@ -222,7 +225,8 @@ def find_crossings(
     if not off_level.size:
         return np.zeros(0), np.zeros(0, dtype=bool)
     turn = np.flatnonzero(np.diff(side[off_level]))
-    index_before, index_after = off_level[turn], off_level[turn + 1]
+    index_before = off_level[turn]
+    index_after = off_level[turn + 1]
     # if there are samples on the level in between, the crossing is at the first of them: a share of 1
     share = np.where(
         index_after == index_before + 1,
@@ -233,12 +237,11 @@ def find_crossings(
     at = time[index_before] + share * (time[index_before + 1] - time[index_before])
     rising = side[index_after] > 0
     if off_level[0] > 0:
-        at, rising = np.append(time[0], at), np.append(side[off_level[0]] > 0, rising)
+        at = np.append(time[0], at)
+        rising = np.append(side[off_level[0]] > 0, rising)
     if off_level[-1] < side.size - 1:
-        at, rising = (
-            np.append(at, time[off_level[-1] + 1]),
-            np.append(rising, side[off_level[-1]] < 0),
-        )
+        at = np.append(at, time[off_level[-1] + 1])
+        rising = np.append(rising, side[off_level[-1]] < 0)
     return at, rising
 
 
@@ -261,10 +264,6 @@ def find_turns(energy: Samples) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
 def _sides(values: Samples, limits: Samples | float) -> NDArray[np.int8]:
     """Return 1 where values (n,) are above the limits, -1 where they are below, else 0; one byte each saves memory."""
     return np.asarray((values > limits).view(np.int8) - (values < limits).view(np.int8))
-
-
-# Number of adjacent windows that are combined into one; with eight the table of them stays small and quick to search.
-_TOGETHER: Final = 8
 
 
 def stretches(states: NDArray[np.bool_], fewest: int = 1) -> tuple[slice, ...]:
@@ -296,7 +295,8 @@ def first_above(
     [2, 4, 3]
     """
     # tops[i] is the largest of ``_TOGETHER**i`` values from each index on
-    tops, width = [np.append(values, np.inf)], 1
+    tops = [np.append(values, np.inf)]
+    width = 1
     indices = np.arange(values.size + 1)
     while width < values.size:
         later = (
@@ -351,11 +351,6 @@ def outline(time: Samples, values: Samples, stretches: int) -> Samples:
     return np.stack([time[at], values[at]])
 
 
-# A root that moves by less than this share of its time has converged to rounding.
-_STILL: Final = 8 * float(np.finfo(np.float64).eps)
-HALVINGS: Final = 50  # halvings of a bracket down to rounding
-
-
 class Roots(NamedTuple):
     """The narrowed brackets: the end ``within`` on the positive side, the other end ``beyond``, the root ``at``."""
 
@@ -393,11 +388,13 @@ def narrow(
     >>> f"{found.at[0]:.12f}"
     '1.414213562373'
     """
-    at, still = (within + beyond) / 2, np.zeros(np.shape(within), dtype=bool)
+    at = (within + beyond) / 2
+    still = np.zeros(np.shape(within), dtype=bool)
     for _ in range(steps):
         value = inside(at)
         good = value > 0
-        within, beyond = np.where(good, at, within), np.where(good, beyond, at)
+        within = np.where(good, at, within)
+        beyond = np.where(good, beyond, at)
         following = (within + beyond) / 2
         if slope is not None:
             rise = slope(at)

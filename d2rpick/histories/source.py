@@ -30,6 +30,9 @@ _BLOCK = 1 << 16  # packed bytes unpacked at a time, which become 68 MB at most
 _LIKENESS = 0.8
 _NUMBER = r"\d+\.?\d*|\.\d+"
 
+# A name and the number of the leg after it: runT01, binout0001, glstat02; the first leg may have no number.
+_NUMBERED: Final = re.compile(r"(.*?)(\d*)(\.gz)?", re.DOTALL)
+
 
 class Source(NamedTuple):
     """The unpacked bytes of one file (a large file stays on disk), under the name that the user gave it.
@@ -322,10 +325,6 @@ def _pieces(name: str, packed: bytes, *, keep: bool = True) -> tuple[list[bytes]
                 raise FormatError(f"{name}: its packed data become {too_much}")
             unread = unpacker.unused_data
     return pieces, not unpacker.eof
-
-
-# A name and the number of the leg after it: runT01, binout0001, glstat02; the first leg may have no number.
-_NUMBERED: Final = re.compile(r"(.*?)(\d*)(\.gz)?", re.DOTALL)
 
 
 def later_legs(names: Sequence[str]) -> list[str]:

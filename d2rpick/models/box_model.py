@@ -149,7 +149,8 @@ def build(parameters: Parameters) -> Structure:
     ring = _ring(p.mesh)
     outer = _scaled(ring, p.width, p.height)
     inner = _scaled(ring, p.width - 2 * p.wall, p.height - 2 * p.wall)
-    cells, top = ring.size, p.mesh // 4
+    cells = ring.size
+    top = p.mesh // 4
     toes = outer[[0, top]] + p.wall
     upright = np.concatenate([outer, inner, toes]) - toes[0]
     positions = upright * np.exp(-1j * np.radians(p.tilt))
@@ -203,7 +204,8 @@ def _walls(cells: int) -> list[tuple[int, int]]:
 
 def _step(cells: int, top: int) -> list[tuple[int, int]]:
     """Return the bars of the step: between its two points, from both to the skin next to them and to points inside."""
-    low, high = 2 * cells, 2 * cells + 1
+    low = 2 * cells
+    high = 2 * cells + 1
     to_skin = [(toe, skin) for toe in (low, high) for skin in (0, top)]
     return [
         (low, high),

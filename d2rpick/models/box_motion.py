@@ -41,6 +41,11 @@ FASTEST, FALL = 4.0, 5.0
 # Pushes within this time are one contact [s]: corners rattle, a flight takes longer.
 SAME_CONTACT = 2e-3
 
+# Safety factor of the time step on 2/omega, the limit of linear bars: these bars rotate, yield and touch.
+_SAFETY = 0.9
+# Times within this share of a time step count as a multiple of it, since they are written in decimals.
+_SAME = 1e-6
+
 
 class Face(NamedTuple):
     """Forces of a face on points (n,) [N]: normal to it, and the friction along it."""
@@ -155,7 +160,8 @@ class Contact:
         to_ground = float(positions[self._skin].imag.min()) + self._p.ground
         if self._p.drop is not None:
             return to_ground
-        skin, toes = on_sled[self._skin], on_sled[self._toes]
+        skin = on_sled[self._skin]
+        toes = on_sled[self._toes]
         to_floor = np.maximum(skin.imag, skin.real - CURB_THICKNESS).min()
         to_curb = np.maximum(-toes.real, toes.imag - self._p.curb).min()
         return float(min(to_floor, to_curb, to_ground))
@@ -234,12 +240,6 @@ class RigidBody:
         self.arms *= complex(np.exp(1j * dt * self.spin))
 
 
-# Safety factor of the time step on 2/omega, the limit of linear bars: these bars rotate, yield and touch.
-_SAFETY = 0.9
-# Times within this share of a time step count as a multiple of it, since they are written in decimals.
-_SAME = 1e-6
-
-
 @dataclass
 class Accounts:
     """Energy and momentum exchanged with the surroundings since time 0.
@@ -308,7 +308,8 @@ class Motion:
         # a last evaluation, so that bars that yield now do so before they are frozen
         self.box.forces(self.places)
         of_box = slice(self.structure.of_box)
-        masses, deformable = self.structure.masses[of_box], self.velocities[of_box]
+        masses = self.structure.masses[of_box]
+        deformable = self.velocities[of_box]
         self.body = RigidBody(masses, self.places[of_box], deformable)
         rigid = self.body.velocities
         self.accounts.lost += (
@@ -324,7 +325,8 @@ class Motion:
 
     def advance(self) -> Plane:
         """Advance the velocities to half a step after the places; return their mean over the step, (n,) [m/s]."""
-        s, old_velocities = self.structure, self.velocities
+        s = self.structure
+        old_velocities = self.velocities
         push = self.contact.push(self.time, self.places, old_velocities)
         outer = self._weight + push.forces if push else self._weight
         forces = outer + self.step.forces(self.places)
@@ -354,7 +356,8 @@ class Motion:
 
     def _account(self, mean: Plane, outer: Plane, push: Push | None) -> None:
         """Add what acted from outside during a time step, with the mean velocities over it."""
-        accounts, dt = self.accounts, self.dt
+        accounts = self.accounts
+        dt = self.dt
         momenta = self.structure.masses * mean
         drag = self.damping * momenta
         accounts.external_work -= dt * GRAVITY * float(momenta.sum().imag)

@@ -27,6 +27,14 @@ _REALS, _PLANES = 12, 4
 # Number of states whose results are computed together: for a single one, calling numpy would take most of the time.
 _BLOCK: Final = 256
 
+# Default output interval [s]: 25 states in a period of a 400 Hz mode, and not much longer than a time step.
+INTERVAL = 1e-4
+# Limit of time steps, which take some minutes; more are hardly intended.
+MOST_STEPS = 5_000_000
+# Distance between the times of a scan [s] while the load may last and after it, and of the last one before td.  In the
+# flight the energy vibrates at 40 Hz, twice the lowest mode: six times in each period resolve it.
+_FINE, _COARSE, _LAST = 0.003, 0.004, 0.03
+
 
 class Record(NamedTuple):
     """States of a run over ``time`` (n,); SI units, vectors x + i z.
@@ -127,7 +135,9 @@ class Recorder:
 
     def note(self, mean: Plane) -> None:
         """Store the state of the motion, with the velocities ``mean`` (n,) [m/s] over the time step around it."""
-        motion, accounts, at = self._motion, self._motion.accounts, self._next % _BLOCK
+        motion = self._motion
+        accounts = self._motion.accounts
+        at = self._next % _BLOCK
         self._places[at], self._means[at] = motion.places, mean
         self._rests[0][at], self._rests[1][at] = motion.box.rest, motion.step.rest
         self._reals[self._next] = (
@@ -141,11 +151,16 @@ class Recorder:
     def _work_out(self) -> None:
         """Compute the results of the states stored since the last block was full."""
         count = (self._next - 1) % _BLOCK + 1
-        states, s = slice(self._next - count, self._next), self._motion.structure
-        n, positions, means = s.of_box, self._places[:count], self._means[:count]
-        momenta, arms = s.masses * means, self._arms(positions)
+        states = slice(self._next - count, self._next)
+        s = self._motion.structure
+        n = s.of_box
+        positions = self._places[:count]
+        means = self._means[:count]
+        momenta = s.masses * means
+        arms = self._arms(positions)
         kinetic = (np.conj(means) * momenta).real / 2
-        of_box, of_step = momenta[:, :n].sum(axis=1), momenta[:, n:].sum(axis=1)
+        of_box = momenta[:, :n].sum(axis=1)
+        of_step = momenta[:, n:].sum(axis=1)
         spin = (np.conj(arms) * momenta[:, :n]).imag.sum(axis=1)
         reals = self._reals[states].T
         reals[1] = np.angle(np.conj(arms) @ self._start)
@@ -164,7 +179,9 @@ class Recorder:
         """Return the collected states; raise RangeError if a number is not finite."""
         if self._next % _BLOCK:
             self._work_out()
-        motion, real, plane = self._motion, self._reals.T, self._planes.T
+        motion = self._motion
+        real = self._reals.T
+        plane = self._planes.T
         if not (np.isfinite(real).all() and np.isfinite(plane).all()):
             raise RangeError(
                 "the motion of the box becomes infinite: these parameters are beyond what the model can do"
@@ -206,12 +223,6 @@ class Recorder:
 def _updates(motion: Motion) -> int:
     """Return how many bar forces were computed so far."""
     return motion.box.evaluations + motion.step.evaluations
-
-
-# Default output interval [s]: 25 states in a period of a 400 Hz mode, and not much longer than a time step.
-INTERVAL = 1e-4
-# Limit of time steps, which take some minutes; more are hardly intended.
-MOST_STEPS = 5_000_000
 
 
 @dataclass(frozen=True)
@@ -309,11 +320,6 @@ def history_of(record: Record) -> History:
     )
 
 
-# Distance between the times of a scan [s] while the load may last and after it, and of the last one before td.  In the
-# flight the energy vibrates at 40 Hz, twice the lowest mode: six times in each period resolve it.
-_FINE, _COARSE, _LAST = 0.003, 0.004, 0.03
-
-
 class Outcome(NamedTuple):
     """One switched run compared with the reference run.
 
@@ -404,7 +410,8 @@ def _switched(branch: tuple[Motion, float, RigidWindow]) -> Record:
 def compare(reference: Record, switched: Record, tr: float, td: float) -> Outcome:
     """Compare a switched run, which may begin at tr, with the reference run at td and from td to the landing."""
     interval = _interval(reference)
-    at, end = round(td / interval), round(comparison_end(reference, td) / interval)
+    at = round(td / interval)
+    end = round(comparison_end(reference, td) / interval)
     begin = round(float(switched.time[0]) / interval)
     after_td = slice(at, end)
     after_td_switched = slice(at - begin, end - begin)

@@ -235,10 +235,8 @@ def configuration_for(
         nearest.table, nearest.source, other_keys
     )
     nearest_configuration.verify(RULES)
-    select, ignore = (
-        override.select or nearest_configuration.select,
-        override.ignore or nearest_configuration.ignore,
-    )
+    select = override.select or nearest_configuration.select
+    ignore = override.ignore or nearest_configuration.ignore
     return nearest_configuration._replace(
         select=select, ignore=ignore, notes=nearest.notes
     )
@@ -293,7 +291,8 @@ def check_deck(
             finding.rule,
         )
     )
-    windows, remarks = tuple(_told(case.windows.windows)), tuple(_remarks(case.deck))
+    windows = tuple(_told(case.windows.windows))
+    remarks = tuple(_remarks(case.deck))
     return Checked(
         path,
         windows,
@@ -350,7 +349,8 @@ def _rules_for(
 
 def _findings(case: Case, configuration: Configuration) -> Iterator[Finding]:
     """Yield the findings of the selected rules, except those that a comment in the deck silences."""
-    solver, silences = case.solver, case.deck.silences
+    solver = case.solver
+    silences = case.deck.silences
     for rule in _rules_for(solver, *configuration[:2], case.judge is not None):
         for field, message in rule.check(case):
             if silences(rule.id, field.file, field.line):

@@ -104,11 +104,9 @@ class Unreadable(NamedTuple):
     @property
     def reason(self) -> str:
         """Return one line that names the deck and the error."""
-        return (
-            f"{self.deck}: {one_line(self.error)}"
-            if self.code == INTERNAL_ERROR
-            else one_line(self.error)
-        )
+        if self.code == INTERNAL_ERROR:
+            return f"{self.deck}: {one_line(self.error)}"
+        return one_line(self.error)
 
 
 @dataclass(eq=False, repr=False)
@@ -358,7 +356,8 @@ class RunCase(Case):
         )  # not above: start-up
         from d2rpick.rules.by_force import Forced
 
-        starter, forced = self.run.starter, []
+        starter = self.run.starter
+        forced = []
         for body in starter.bodies if starter and self.judge else ():
             body_windows = tuple(
                 window
@@ -427,9 +426,9 @@ class RunCase(Case):
             find_unswitchable_in_radioss,
         )  # not above: start-up
 
-        return (
-            find_unswitchable_in_radioss(self.run.starter) if self.run.starter else {}
-        )
+        if self.run.starter:
+            return find_unswitchable_in_radioss(self.run.starter)
+        return {}
 
     @cached_property
     def flaws(self) -> tuple[Flaw, ...]:

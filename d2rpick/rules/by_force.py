@@ -103,11 +103,10 @@ def follow_forced_switches(
         last_seen: _Seen | None = None
         for event in by_card[rigid_card]:
             seen_contacts = _see_contacts(deck, rigid_card, event.unit, judge)
-            seen_back = (
-                _see_contacts(deck, back_card, event.unit, judge)
-                if back_card
-                else seen_contacts
-            )
+            if back_card:
+                seen_back = _see_contacts(deck, back_card, event.unit, judge)
+            else:
+                seen_back = seen_contacts
             if seen_contacts is None or seen_back is None:
                 continue
             last_seen = seen_contacts
@@ -121,12 +120,12 @@ def follow_forced_switches(
                 for tr, td in spans
             )
         if last_seen:
-            cards = (
-                (rigid_card.card, back_card.card) if back_card else (rigid_card.card,)
-            )
+            cards = [rigid_card.card]
+            if back_card:
+                cards.append(back_card.card)
             yield Forced(
                 rigid_card.card,
-                cards,
+                tuple(cards),
                 tuple(windows),
                 last_seen.contacts,
                 "TIME3",
@@ -186,7 +185,8 @@ def find_spans_of_force(
         # a file of switching cards alone defines no contacts
         alone = not entities.found and number > 0
         return judge.find_force_spans(kind, number, least) if alone else None
-    name, is_order = entity.id or entity.number, kind == "rigid wall"
+    name = entity.id or entity.number
+    is_order = kind == "rigid wall"
     if is_order and any(entry.id not in (0, entry.number) for entry in entities.found):
         if len(entities.found) > 1:
             return None
@@ -209,7 +209,8 @@ def _read_waiting(card: SwitchSet) -> ForceSwitch | None:
     """Return the conditions of a switch set; None if it does not wait for a force, or one of its fields is
     unreadable.
     """
-    header, factor = card.header, card.card.transform.time
+    header = card.header
+    factor = card.card.transform.time
     if header is None or header.code.value not in _CODES or not card.switched:
         return None
     if any(

@@ -34,15 +34,6 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History
     from d2rpick.histories.opening import Run, Selection
 
-
-class Fault(NamedTuple):
-    """An objection of an energy history to a window: the rule, the end of the window (td or tr) and the message."""
-
-    rule: str
-    at_td: bool
-    message: str
-
-
 # Codes of warnings of verify that no rule reports, so the check passes them on.
 _KEPT: Final = (
     "truncated-input",
@@ -54,6 +45,14 @@ _KEPT: Final = (
     WRONG_ENERGY,
 )
 _UNKNOWN: Final = "the history does not show when the load ends; give that time with --after (in Python: after)"
+
+
+class Fault(NamedTuple):
+    """An objection of an energy history to a window: the rule, the end of the window (td or tr) and the message."""
+
+    rule: str
+    at_td: bool
+    message: str
 
 
 @dataclass
@@ -120,11 +119,10 @@ class HistoryJudge:
     def _reference(self, parts: tuple[int, ...]) -> Reference:
         """Return the reference run with the energy of some parts, or of the whole model if there are none."""
         if parts not in self._references:
-            chosen = (
-                self.selection._replace(parts=tuple(map(str, parts)))
-                if parts
-                else self.selection
-            )
+            if parts:
+                chosen = self.selection._replace(parts=tuple(map(str, parts)))
+            else:
+                chosen = self.selection
             self._references[parts] = Reference.of(self.run, chosen)
         return self._references[parts]
 
@@ -145,11 +143,9 @@ class HistoryJudge:
         ):
             problem = f"not in the history, which has {name_units(history_parts)}; correct the id, or write its energy"
             return (Fault("D2R205", False, problem),)
-        parts = (
-            ()
-            if window.part is None
-            else tuple(part for part in history_parts if part in {*together})
-        )
+        parts: tuple[int, ...] = ()
+        if window.part is not None:
+            parts = tuple(part for part in history_parts if part in {*together})
         tr = window.tr
         if by_force:
             tr, td = narrow_to_states(self._reference(parts).history.time, tr, td)
@@ -189,8 +185,8 @@ class HistoryJudge:
     def pushed(self, parts: Collection[int]) -> ContactTimes | None:
         """Return the same spans as `contacts`, with their uncertainty."""
         chosen = [part for part in self.run.parts if part.id in parts]
-        momenta = (
-            next(
+        if chosen:
+            momenta = next(
                 (
                     part_momenta
                     for part_momenta in self.run.momenta(chosen, None)
@@ -198,9 +194,8 @@ class HistoryJudge:
                 ),
                 None,
             )
-            if chosen
-            else None
-        )
+        else:
+            momenta = None
         return find_contact_times(momenta) if momenta else None
 
     def find_force_spans(
@@ -216,16 +211,17 @@ class HistoryJudge:
 
     @property
     def _known(self) -> tuple[int, ...]:
-        return (
-            () if self.selection.energy else tuple(part.id for part in self.run.parts)
-        )
+        if self.selection.energy:
+            return ()
+        return tuple(part.id for part in self.run.parts)
 
     def _judged(
         self, parts: tuple[int, ...], tr: float, td: float | None
     ) -> Iterator[Fault]:
         reference = self._reference(parts)
         history = reference.history
-        first, last = float(history.time[0]), float(history.time[-1])
+        first = float(history.time[0])
+        last = float(history.time[-1])
         times = [("tr", tr)] if td is None else [("tr", tr), ("td", td)]
         outside = [
             (name == "td", name, time)
@@ -314,7 +310,8 @@ def _of_load(history: History, tr: float, settings: Settings) -> Iterator[Fault]
 
 def _of_flight(verdict: Verdict) -> Iterator[Fault]:
     """Yield objections to times outside the flight: tr before the end of the load, or td after the next contact."""
-    situation, tr = verdict.situation, verdict.candidate.tr
+    situation = verdict.situation
+    tr = verdict.candidate.tr
     earliest = situation.earliest_tr
     if earliest is None:
         yield Fault("D2R204", False, situation.flight.refusal or _UNKNOWN)
@@ -330,7 +327,8 @@ def _of_flight(verdict: Verdict) -> Iterator[Fault]:
 
 def _of_error(verdict: Verdict) -> Iterator[Fault]:
     """Yield an objection to the locked-in deformation: a wrong sign, or an error above the tolerance."""
-    candidate, situation = verdict.candidate, verdict.situation
+    candidate = verdict.candidate
+    situation = verdict.situation
     tolerance = situation.most_error
     if situation.at_rest:
         return  # Nothing vibrates, so the energy is that of td at any tr, up to rounding.
@@ -339,18 +337,19 @@ def _of_error(verdict: Verdict) -> Iterator[Fault]:
         yield Fault("D2R202", False, f"{quantity}; {_way_out(verdict)}")
         return
     if candidate.lock_in_error is not None:
-        error, quantity = candidate.lock_in_error, "lock-in error"
+        error = candidate.lock_in_error
+        quantity = "lock-in error"
     elif candidate.level_error is not None:
-        error, quantity = candidate.level_error, "level error"
+        error = candidate.level_error
+        quantity = "level error"
     else:
         return
     if error > tolerance:
         parts = situation.history.parts or ()
-        of_parts = (
-            f" of the {len(parts)} parts that are switched together"
-            if len(parts) > 1
-            else ""
-        )
+        if len(parts) > 1:
+            of_parts = f" of the {len(parts)} parts that are switched together"
+        else:
+            of_parts = ""
         levels = f"the energy{of_parts} is {candidate.energy:.4g} at tr and {situation.energy_td:.4g} at td"
         expected = (
             f"{quantity} {above(error, tolerance)}, expected at most {tolerance:g}"

@@ -40,12 +40,6 @@ _CURES: Final = {
 }
 _INNER = THERE + BACK + END
 
-
-def _transformed(factor: str) -> Example:
-    include = f"*INCLUDE_TRANSFORM\nswitch.k\n{'0':>10s}\n{'0':>10s}\n{'1.0':>10s}{factor:>10s}\n{'0':>10s}\n"
-    return Example(HEAD + PARTS + include + END, {"switch.k": _INNER})
-
-
 _PARAMETER = "*PARAMETER\nR tr           0.02\n"
 _BY_NAME = PARTS + automatic(1, "&tr", rigid=["1"]) + BACK + END
 _CODES: Final = {
@@ -55,14 +49,17 @@ _CODES: Final = {
     4: "when contact {} has a force",
     5: "by a *SENSOR_CONTROL of type DEF2RIG",
 }
-
-
 _INERTIA: Final = """\
 *DEFORMABLE_TO_RIGID_INERTIA
          1
        0.0       0.0       0.0      12.5
        1.0       0.0       0.0       1.0       0.0       1.0
 """
+
+
+def _transformed(factor: str) -> Example:
+    include = f"*INCLUDE_TRANSFORM\nswitch.k\n{'0':>10s}\n{'0':>10s}\n{'1.0':>10s}{factor:>10s}\n{'0':>10s}\n"
+    return Example(HEAD + PARTS + include + END, {"switch.k": _INNER})
 
 
 def _elements(keyword: str) -> Example:
@@ -224,7 +221,8 @@ def _ambiguous(case: Case) -> Iterator[Objection]:
             ]
             if first and differing and (card, name) not in reported:
                 reported.add((card, name))
-                later, first_place = differing[0], first.place
+                later = differing[0]
+                first_place = first.place
                 problem = f"&{name} is {first.value} at {first_place.at} but {later.value} at {later.place.at}"
                 yield (
                     value.field,
@@ -392,11 +390,10 @@ def _inertias(case: Case) -> Iterator[Objection]:
         if card.kind != "inertia" or card.part is None:
             continue
         part = card.part.value
-        used = (
-            ""
-            if part in rigid_parts or unknown
-            else f"; no card of this deck makes part {part} rigid"
-        )
+        if part in rigid_parts or unknown:
+            used = ""
+        else:
+            used = f"; no card of this deck makes part {part} rigid"
         yield (
             card.card.here,
             f"the card replaces mass and inertia of part {part} while it is rigid{used}",

@@ -16,6 +16,31 @@ if TYPE_CHECKING:
 
 MAIN_DECK: Final = "main.k"  # default file name of an example deck
 
+HEAD = """\
+*KEYWORD
+*CONTROL_TERMINATION
+       0.2
+*DATABASE_GLSTAT
+    0.0001
+*DATABASE_MATSUM
+    0.0001
+"""
+PARTS = """\
+*PART
+door
+         1         1         1
+*PART
+frame
+         2         1         1
+"""
+END = "*END\n"
+GROUP: Final = "/GRNOD/PART/7\nbox\n         1\n"
+_SHELL: Final = "/SHELL/1\n         1         1         2         3         4\n"
+_BODY: Final = (
+    "/RBODY/1\nbox\n{}         0         0         0                   0         7\n"
+)
+WINDOW: Final = (("0.02", "OFF"), ("0.09", "ON"), ("0.2", "OFF"))
+
 
 class Example(NamedTuple):
     """An example deck with the files that it includes or that belong to its run; ``name`` is the file name of the deck.
@@ -54,24 +79,6 @@ class Rule(NamedTuple):
 
 # Pieces of LS-DYNA decks and Radioss runs for the examples.
 
-HEAD = """\
-*KEYWORD
-*CONTROL_TERMINATION
-       0.2
-*DATABASE_GLSTAT
-    0.0001
-*DATABASE_MATSUM
-    0.0001
-"""
-PARTS = """\
-*PART
-door
-         1         1         1
-*PART
-frame
-         2         1         1
-"""
-
 
 def automatic(
     swset: int,
@@ -106,7 +113,6 @@ def automatic(
 
 THERE = automatic(1, "0.02", rigid=["1"])
 BACK = automatic(2, "0.09", deformable=["1"])
-END = "*END\n"
 GOOD = HEAD + PARTS + THERE + BACK + END
 
 
@@ -121,12 +127,6 @@ def window(tr: str, td: str, more: str = "") -> Example:
 
 
 PASS = Example(GOOD)
-
-GROUP: Final = "/GRNOD/PART/7\nbox\n         1\n"
-_SHELL: Final = "/SHELL/1\n         1         1         2         3         4\n"
-_BODY: Final = (
-    "/RBODY/1\nbox\n{}         0         0         0                   0         7\n"
-)
 
 
 def starter_deck(group: str = GROUP, body: str = "      1808", more: str = "") -> str:
@@ -154,7 +154,6 @@ def run_of(files: dict[str, str], deck: str = "") -> Example:
     return Example(deck or starter_deck(), files, name="box_0000.rad")
 
 
-WINDOW: Final = (("0.02", "OFF"), ("0.09", "ON"), ("0.2", "OFF"))
 GOOD_RUN: Final = run_of(engine_files(*WINDOW))
 
 

@@ -35,23 +35,26 @@ _MIXED: Final = {
     for name, text in engine_files(*WINDOW).items()
 }
 
+_LEGS: Final = engine_files(*WINDOW)
+_KEEPS: Final = (
+    starter_deck()
+    .partition("/GRNOD")[0]
+    .replace("         7\n", "         7         1\n")
+)  # Ikrem
+# Arguments of a matsum history in which only the third part deforms.
+_SPRING: Final = "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.3 --dt 1e-3 --write-as matsum"
+
 
 def _row(*fields: float | str, width: int = 10) -> str:
     """Return a line of fields, right-aligned in columns of this width."""
     return "".join(f"{field:>{width}}" for field in fields) + "\n"
 
 
-_LEGS: Final = engine_files(*WINDOW)
 _NODES: Final = "/GRNOD/NODE/8\nnodes of the box\n" + _row(1, 2, 3, 4)
 _MAIN: Final = "/GRNOD/NODE/9\nmain node\n" + _row(1808)
 _PLACES: Final = "/NODE\n" + "".join(
     _row(n)[:-1] + _row(0.1 * n, 0.0, 0.05, width=20) for n in (1, 2, 3, 4)
 )
-_KEEPS: Final = (
-    starter_deck()
-    .partition("/GRNOD")[0]
-    .replace("         7\n", "         7         1\n")
-)  # Ikrem
 
 
 def _wall(added: int, left_out: int = 0, reach: float = 0.0) -> str:
@@ -83,10 +86,6 @@ def _start(state: str, *nodes: int) -> Example:
     files = engine_files(("0.02", state), ("0.2", "OFF"))
     files["box_0001.rad"] += "/INIV/TRA/X/1\n10.0\n" + _row(*nodes)
     return run_of(files, starter_deck(_NODES.replace("NODE/8", "NODE/7")))
-
-
-# Arguments of a matsum history in which only the third part deforms.
-_SPRING: Final = "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.3 --dt 1e-3 --write-as matsum"
 
 
 def _wheel(
@@ -198,11 +197,10 @@ def _main_nodes(case: RunCase) -> Iterator[Objection]:
                 if node.problem or node.value == 0 or node.value in bodies:
                     continue
                 mixed = by_id.get(node.value)
-                hint = (
-                    f"it is the id of rigid body {mixed.id}: write its main node {mixed.node.value}"
-                    if mixed
-                    else ""
-                )
+                if mixed:
+                    hint = f"it is the id of rigid body {mixed.id}: write its main node {mixed.node.value}"
+                else:
+                    hint = ""
                 if main := joined_to.get(node.value):
                     hint = f"its body is merged into {main.name}: write main node {main.node.value}"
                 main_nodes = (
@@ -234,11 +232,12 @@ def _never_off(case: RunCase) -> Iterator[Objection]:
         return
     starter = case.run.starter
     is_readable = starter is not None and not starter.moved and not case.unread
-    switched_nodes = (
-        {*case.run.named} - {body.node.value for body in starter.bodies}
-        if starter and is_readable
-        else set[int]()
-    )
+    if starter and is_readable:
+        switched_nodes = {*case.run.named} - {
+            body.node.value for body in starter.bodies
+        }
+    else:
+        switched_nodes = set[int]()
     for leg in case.run.legs:
         for card, rigid, nodes in leg.switched:
             late = [

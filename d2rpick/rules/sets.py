@@ -33,6 +33,19 @@ _OF_CONTACT: Final = {2, 4}
 _FAMILIES: Final = (_OF_WALL, _OF_CONTACT)
 _WITHOUT_FORCE, _WITH_FORCE = {1, 2}, {3, 4}
 
+_ENTITIES: Final[tuple[tuple[set[int], str, Literal["CONTACT", "RIGIDWALL"]], ...]] = (
+    (_OF_CONTACT, "contact", "CONTACT"), (_OF_WALL, "rigid wall", "RIGIDWALL"),
+)  # fmt: skip
+_MOST_LISTED = 8
+_BY_ORDER: Final = "*CONTACT_NODES_TO_SURFACE\n" + 3 * ("         0" * 8 + "\n")
+_WALL: Final = (
+    "*RIGIDWALL_PLANAR_ID\n         3ground\n         0         0         0\n       "
+    "0.0       0.0       0.0\n"
+)
+_CONTROL: Final = "*SENSOR_CONTROL\n         5   DEF2RIG{:10d}        ON\n         3\n"
+# Arguments of the history of a box that lands on its edge and rattles.
+_LANDING: Final = "--drop 0.2 --tilt 20 --mesh 4 --ground-stiffness 2e6 --t-end 0.7 --dt 5e-4 --write-as matsum"
+
 
 def _pair(
     codes: tuple[int, int], signs: tuple[int, int] = (1, -1), back: int = 1
@@ -42,12 +55,6 @@ def _pair(
         2, "0.0", deformable=["1"], code=codes[1], pair=(back, signs[1])
     )
     return deck(rigid_card + back_card)
-
-
-_ENTITIES: Final[tuple[tuple[set[int], str, Literal["CONTACT", "RIGIDWALL"]], ...]] = (
-    (_OF_CONTACT, "contact", "CONTACT"), (_OF_WALL, "rigid wall", "RIGIDWALL"),
-)  # fmt: skip
-_MOST_LISTED = 8
 
 
 def _force(code: int, entno: int, time3: str = "1.0e-3", contact: str = "") -> Example:
@@ -64,11 +71,6 @@ def _contact(name: str, number: int = 7) -> str:
 
 
 _FLOOR: Final = _contact("SURFACE_TO_SURFACE")
-_BY_ORDER: Final = "*CONTACT_NODES_TO_SURFACE\n" + 3 * ("         0" * 8 + "\n")
-_WALL: Final = (
-    "*RIGIDWALL_PLANAR_ID\n         3ground\n         0         0         0\n       "
-    "0.0       0.0       0.0\n"
-)
 
 
 _with_floor = partial(_force, contact=_FLOOR)
@@ -174,7 +176,8 @@ def _units(case: Case, card: SwitchSet, *, to_rigid: bool) -> set[Unit]:
 
 def _alone(header: Header) -> str:
     """Return what is wrong with RELSW and PAIRED of one header; empty if nothing is."""
-    relsw, paired = header.relsw.value, header.paired.value
+    relsw = header.relsw.value
+    paired = header.paired.value
     if relsw and not paired:
         return f"RELSW names set {relsw} but PAIRED is 0"
     if paired and not relsw:
@@ -297,11 +300,12 @@ def _able(case: Case) -> Iterator[Objection]:
             able_entities = [
                 candidate for candidate in entities.found if candidate.triggers
             ]
-            able = (
-                f" (here: {_listed(entities._replace(found=tuple(able_entities)))})"
-                if able_entities
-                else ""
-            )
+            if able_entities:
+                able = (
+                    f" (here: {_listed(entities._replace(found=tuple(able_entities)))})"
+                )
+            else:
+                able = ""
             problem = f"ENTNO {header.entno.value} is *{entity.keyword}, whose force triggers no switch"
             yield (
                 header.entno.field,
@@ -316,9 +320,6 @@ def _listed(entities: Entities) -> str:
         for entity in entities.found
     ]
     return listing(texts, most=_MOST_LISTED)
-
-
-_CONTROL: Final = "*SENSOR_CONTROL\n         5   DEF2RIG{:10d}        ON\n         3\n"
 
 
 def _sensed(control: str) -> Example:
@@ -423,10 +424,6 @@ def _unnamed(case: Case) -> Iterator[Objection]:
             yield header.entno.field, f"{problem}; give its id"
 
 
-# Arguments of the history of a box that lands on its edge and rattles.
-_LANDING: Final = "--drop 0.2 --tilt 20 --mesh 4 --ground-stiffness 2e6 --t-end 0.7 --dt 5e-4 --write-as matsum"
-
-
 def _landed(wait: str) -> Example:
     """Return a deck with a pair of sets and the history of the landing box; ``wait`` is TIME3."""
     landed = _delayed(wait).deck.replace("       0.2", "       0.7", 1)  # ENDTIM
@@ -451,11 +448,10 @@ def _chatters(case: Case) -> Iterator[Objection]:
             wait = switch.contacts and find_delay_without_chatter(
                 switch.lasting, switch.contacts
             )
-            cure = (
-                f"; set {switch.wait} to {wait:.3g} or more, which leaves {len(switch.lasting)}"
-                if wait
-                else ""
-            )
+            if wait:
+                cure = f"; set {switch.wait} to {wait:.3g} or more, which leaves {len(switch.lasting)}"
+            else:
+                cure = ""
             problem = f"{switch.switches} switches in the history, in {len(switch.times)} windows"
             yield (
                 switch.place.here,

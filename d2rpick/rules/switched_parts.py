@@ -36,6 +36,23 @@ _TOUCHING = """\
        2       2       3       4       5       6
 """
 
+_DELETED = 1  # value of NRBF and NCSF that deletes constraints
+_MESH: Final = "*ELEMENT_SHELL\n       1       1       1       2       3       4\n"
+_SET: Final = "*SET_NODE_LIST\n         5\n         3         4        99\n"
+_NODAL: Final = "*CONSTRAINED_NODAL_RIGID_BODY\n         9         0         5\n"
+_EXTRA: Final = "*CONSTRAINED_EXTRA_NODES_NODE\n         8         3\n"
+_JOINT: Final = (
+    "*CONSTRAINED_JOINT_REVOLUTE\n"
+    + "".join(f"{node:10d}" for node in (3, 3, 50, 51, 52, 53))
+    + "\n"
+)
+_COUNTS: Final = "         0         0         0       0.0         1         0"
+_RESTART: Final = "*RIGID_DEFORMABLE_D2R\n{:10d}\n*RIGID_DEFORMABLE_R2D\n{:10d}\n"
+_TWO: Final = _MESH + "       2       2       5       6       7       8\n"
+_JOINING: Final = (
+    "*SET_NODE_LIST\n         5\n         3         6        99\n" + _NODAL
+)
+
 
 def _both(*lines: str) -> Example:
     """Return a deck whose two parts share nodes; ``lines`` are the D2R lines of the first card."""
@@ -56,19 +73,6 @@ _LAYERS, _BEAMS = (
         ),
     )
 )
-
-
-_DELETED = 1  # value of NRBF and NCSF that deletes constraints
-_MESH: Final = "*ELEMENT_SHELL\n       1       1       1       2       3       4\n"
-_SET: Final = "*SET_NODE_LIST\n         5\n         3         4        99\n"
-_NODAL: Final = "*CONSTRAINED_NODAL_RIGID_BODY\n         9         0         5\n"
-_EXTRA: Final = "*CONSTRAINED_EXTRA_NODES_NODE\n         8         3\n"
-_JOINT: Final = (
-    "*CONSTRAINED_JOINT_REVOLUTE\n"
-    + "".join(f"{node:10d}" for node in (3, 3, 50, 51, 52, 53))
-    + "\n"
-)
-_COUNTS: Final = "         0         0         0       0.0         1         0"
 
 
 def _constrained(text: str, flags: str = "         0         0") -> Example:
@@ -124,9 +128,6 @@ def _never_rigid(case: Case) -> Iterator[Objection]:
             field,
             f"{unit_names} switched back, but no card makes it rigid before; add a D2R line or remove this R2D line",
         )
-
-
-_RESTART: Final = "*RIGID_DEFORMABLE_D2R\n{:10d}\n*RIGID_DEFORMABLE_R2D\n{:10d}\n"
 
 
 @passes(PASS, Example(_RESTART.format(1, 2)))
@@ -206,9 +207,10 @@ def _exists(case: Case) -> Iterator[Objection]:
             absent for line in card.switched for absent in _absent(line, case.parts)
         )
         for kind in sorted(missing, key=["part set", "part", "lead part"].index):
-            nearest_ids = (
-                "" if kind == "part set" else _nearest(missing[kind][0], case.parts)
-            )
+            if kind == "part set":
+                nearest_ids = ""
+            else:
+                nearest_ids = _nearest(missing[kind][0], case.parts)
             problem = f"{name_units(missing[kind], kind)} not in the deck{nearest_ids}"
             yield (
                 card.card.here,
@@ -251,11 +253,10 @@ def _absent(line: Switched, parts: Parts) -> Iterator[tuple[str, int]]:
             if set_id not in parts.sets
         )
     if not line.part.problem:
-        members = (
-            (parts.members(line.part.value) or ())
-            if line.by_set
-            else (line.part.value,)
-        )
+        if line.by_set:
+            members = parts.members(line.part.value) or ()
+        else:
+            members = (line.part.value,)
         yield from (("part", part) for part in members if part not in parts.materials)
     if line.lead and line.lead.value and line.lead.value not in parts.materials:
         yield "lead part", line.lead.value
@@ -358,16 +359,15 @@ def _held(case: Case, *, nodal: bool) -> Iterator[Objection]:
         part_of_nodes = (
             owner[node] for node in sorted(constraint.nodes) if node in owner
         )
-        part = (
-            constraint.part
-            if constraint.part in switched
-            else next(part_of_nodes, None)
-        )
+        part = next(part_of_nodes, None)
+        if constraint.part in switched:
+            part = constraint.part
         if part is None:
             continue
-        name = (
-            f"{constraint.kind} {constraint.id}" if constraint.id else constraint.kind
-        )
+        if constraint.id:
+            name = f"{constraint.kind} {constraint.id}"
+        else:
+            name = constraint.kind
         flag = f"{'NRBF' if nodal else 'NRBF and NCSF'} {switched[part].nrbf}"
         problem = f"{name} on part {part}, which is made rigid at {switched[part].place.at} with {flag}"
         cure = "set the flag to 1 there and to 2 on the card that switches back"
@@ -395,7 +395,8 @@ class _Flags(NamedTuple):
 def _find_flags(case: Case, card: SwitchSet) -> _Flags | None:
     """Return the flags of a card; those of a restart are on its *RIGID_DEFORMABLE_CONTROL.  A plain card has none."""
     if card.header:
-        nrbf, ncsf = card.header.nrbf, card.header.ncsf
+        nrbf = card.header.nrbf
+        ncsf = card.header.ncsf
         return _Flags(nrbf.value, ncsf.value, nrbf.field)
     if card.kind != "restart":
         return None
@@ -408,7 +409,8 @@ def _find_flags(case: Case, card: SwitchSet) -> _Flags | None:
     values = next((control.values for control in controls if control.values), None)
     if values is None:
         return _Flags(0, 0, card.card.here)
-    nrbf_value, ncsf_value = values[0].value, values[1].value
+    nrbf_value = values[0].value
+    ncsf_value = values[1].value
     return _Flags(int(nrbf_value), int(ncsf_value), values[0].field)
 
 
@@ -461,15 +463,14 @@ def _unturned(case: Case) -> Iterator[Objection]:
 
 def _unswitchable(case: Case, *, flows: bool) -> Iterator[Objection]:
     """Yield the parts that a card makes rigid at any time although they must not be switched."""
-    reasons = (
-        {
+    if case.sets:
+        reasons = {
             part: unswitchable.reason
             for part, unswitchable in case.unswitchable.items()
             if unswitchable.flows == flows
         }
-        if case.sets
-        else {}
-    )
+    else:
+        reasons = {}
     opened = [
         event
         for event in case.windows.events
@@ -537,12 +538,6 @@ def _d2r112(case: Case) -> Iterator[Objection]:
     Fix: Set NRBF to 1 on the card that makes the part rigid and to 2 on the card that switches it back.
     """
     return _held(case, nodal=True)
-
-
-_TWO: Final = _MESH + "       2       2       5       6       7       8\n"
-_JOINING: Final = (
-    "*SET_NODE_LIST\n         5\n         3         6        99\n" + _NODAL
-)
 
 
 def _joined(*lines: str) -> Example:

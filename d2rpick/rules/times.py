@@ -44,6 +44,15 @@ _SECOND: Final = automatic(3, "0.1", rigid=["2"]) + automatic(
     4, "0.1", deformable=["2"]
 )
 
+_DECADES = 3.0  # decimal powers between two units of time
+# Decades by which the end of the history may differ: a reference run may end at half of the time.
+_NEAR = math.log10(2)
+_HISTORY: Final = (
+    "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.15 --dt 1e-4"
+)
+_GOOD_PAIR: Final = (".0135867", ".0687534")
+_WITHOUT_END: Final = HEAD.replace("*CONTROL_TERMINATION\n       0.2\n", "")
+
 
 @fails(
     window("0.02", "0.2"),
@@ -255,7 +264,8 @@ def _mixed(times: list[float], end: float, run_end: str) -> str | None:
     later = [time for time in times if time > 0]
     if not later:
         return None
-    latest, earliest = max(later), min(later)
+    latest = max(later)
+    earliest = min(later)
     if 10 * end < latest < _THOUSAND * end and earliest >= end:
         direction = "later: milliseconds for seconds"
     elif end / 50 <= _THOUSAND * latest < end:
@@ -293,24 +303,12 @@ def _thousand(case: Case) -> Iterator[Objection]:
         yield _timed(case)[0][1].time1.field, problem
 
 
-_DECADES = 3.0  # decimal powers between two units of time
-# Decades by which the end of the history may differ: a reference run may end at half of the time.
-_NEAR = math.log10(2)
-
-_HISTORY: Final = (
-    "--stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.15 --dt 1e-4"
-)
-_GOOD_PAIR: Final = (".0135867", ".0687534")
-
-
 def _pair(
     tr: str, td: str, options: str = "", head: str = HEAD, history: str = _HISTORY
 ) -> Example:
     """Return a deck with one window for part 1, checked by a history of `d2rpick replay` with these arguments."""
-    rigid_card, back_card = (
-        automatic(1, tr, rigid=["1"]),
-        automatic(2, td, deformable=["1"]),
-    )
+    rigid_card = automatic(1, tr, rigid=["1"])
+    back_card = automatic(2, td, deformable=["1"])
     return Example(
         head + PARTS + rigid_card + back_card + END, history=history, options=options
     )
@@ -340,9 +338,6 @@ def _faults(case: Case, rule_id: str) -> Iterator[Objection]:
                 objections.append((key, judged_window.unit.id))
     for (card, kind, message), ids in grouped(objections).items():
         yield card.time_field, f"{name_units(ids, kind)}: {message}"
-
-
-_WITHOUT_END: Final = HEAD.replace("*CONTROL_TERMINATION\n       0.2\n", "")
 
 
 @passes(*_PASSING, PASS)

@@ -13,6 +13,9 @@ from d2rpick.base.tuples import NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+# Formats whose data fill a family of files (d3plot, d3plot01, ...), of which only the first file identifies the format.
+FAMILIES: Final = ("d3thdt", "d3plot")
+
 
 class Listed(NamedTuple):
     """A format as it is known before its reader, the ``module``, is imported.
@@ -46,5 +49,3 @@ READERS: Final[Mapping[str, Listed]] = {
     "d3thdt": Listed("d3thdt", b"", "LS-DYNA", r"(?i:d3thdt(?:\d{2,})?)"),
     "d3plot": Listed("d3plot", b"", "LS-DYNA", r"(?i:d3plot(?:\d{2,})?)"),
 }
-# Formats whose data fill a family of files (d3plot, d3plot01, ...), of which only the first file identifies the format.
-FAMILIES: Final = ("d3thdt", "d3plot")

@@ -235,7 +235,8 @@ class Branch(Database):
             legend = layout.variables.get("legend")
             if legend is None or not ids.size or legend.count % ids.size:
                 continue  # the titles cannot be separated: their length is not constant
-            raw, width = file.raw(start, legend), legend.count // ids.size
+            raw = file.raw(start, legend)
+            width = legend.count // ids.size
             for i, id_ in enumerate(ids.tolist()):
                 titles[id_] = plain_text(raw[i * width : (i + 1) * width])
         return titles

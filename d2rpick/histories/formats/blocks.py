@@ -24,6 +24,16 @@ UNSURE: Final = -1  # offset of a field that is cut, or occurs twice in the bloc
 
 _OVERLONG: Final = 512  # bytes of a line that no solver writes
 
+CHUNK: Final = 1 << 20  # bytes compared together, which stay in the cache
+_FOLD: Final = 16  # adjacent blocks compared as one row, which halves the time
+_LONGEST: Final = 1 << 22  # bytes; a longer block is walked record by record
+_NUMBER: Final = re.compile(
+    rb" *([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]\d+)|[EeDd](\d+))?"
+)
+_EXACT: Final = 22  # 10**22 is the largest power of ten that a double holds exactly
+# Flags added to the two digits of an exponent, which fill a byte: negative exponent, negative number.
+_SHRINKS, _NEGATIVE = 1 << 8, 1 << 9
+
 
 class BlockLayout(NamedTuple):
     """The layout of a block: which field is where.
@@ -104,10 +114,6 @@ def written_head(title: str, database: str) -> str:
     return f" {title}\n{' ' * 25}d2rpick {__version__}, layout of ls-dyna {database}\n"
 
 
-CHUNK: Final = 1 << 20  # bytes compared together, which stay in the cache
-_FOLD: Final = 16  # adjacent blocks compared as one row, which halves the time
-
-
 class Stretch(NamedTuple):
     """``repeats`` blocks of ``stride`` bytes from byte ``start`` on, with the layout of the block at ``example``."""
 
@@ -162,9 +168,10 @@ def like_example(
         alike = not (differing & literal).any()
         if not alike:
             rows = rows[: int(((rows ^ example) & literal).any(axis=1).argmax())]
-            differing = (
-                _differing(rows, example) if len(rows) else np.zeros_like(example)
-            )
+            if len(rows):
+                differing = _differing(rows, example)
+            else:
+                differing = np.zeros_like(example)
         if varied is not None:
             varied |= differing
         if take is not None:
@@ -197,9 +204,6 @@ def _reduce_rows(operation: np.ufunc, rows: Bytes, size: int) -> Bytes:
     """Combine all blocks of some rows, each of one or more blocks of ``size`` bytes, into one block."""
     folded = operation.reduce(rows, axis=0).reshape(-1, size)
     return np.asarray(operation.reduce(folded))
-
-
-_LONGEST: Final = 1 << 22  # bytes; a longer block is walked record by record
 
 
 def repeats(
@@ -264,14 +268,6 @@ def _decimals(blocks: Bytes, fields: Sequence[tuple[int, int]]) -> NDArray[np.in
     return numbers
 
 
-_NUMBER: Final = re.compile(
-    rb" *([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]\d+)|[EeDd](\d+))?"
-)
-_EXACT: Final = 22  # 10**22 is the largest power of ten that a double holds exactly
-# Flags added to the two digits of an exponent, which fill a byte: negative exponent, negative number.
-_SHRINKS, _NEGATIVE = 1 << 8, 1 << 9
-
-
 @cache
 def _scales(decimals: int) -> tuple[Samples, Samples]:
     """Return factors and divisors of mantissas without point, by exponent and signs: one is 1, or NaN if inexact."""
@@ -331,8 +327,10 @@ def decode(fields: NDArray[np.bytes_], decimals: int) -> Samples:
     column = np.ascontiguousarray(
         np.ascontiguousarray(fields).view(np.uint8).reshape(-1, width).T
     )
-    point, mark = width - 5 - decimals, width - 4
-    negative, shrinks = column[point - 2] == ord("-"), column[mark + 1] == ord("-")
+    point = width - 5 - decimals
+    mark = width - 4
+    negative = column[point - 2] == ord("-")
+    shrinks = column[mark + 1] == ord("-")
     # uint8 wraps around below "0", so that one comparison is enough
     digits = column[
         [point - 1, *range(point + 1, mark), mark + 2, mark + 3]

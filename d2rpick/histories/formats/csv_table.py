@@ -32,6 +32,26 @@ if TYPE_CHECKING:
     from d2rpick.histories.names import Selection
     from d2rpick.histories.source import Source
 
+# Names that spreadsheets, pandas and others give to the column of row numbers.
+_ROW_NUMBERS: Final = frozenset(
+    {
+        "column 1",
+        "unnamed: 0",
+        "index",
+        "nr",
+        "nr.",
+        "no",
+        "no.",
+        "row",
+        "id",
+        "#",
+        "state",
+        "increment",
+        "inc",
+        "step",
+    }
+)
+
 
 def labelled(layout: Layout, time: int) -> dict[str, int]:
     """Return the columns apart from the time by their names; a name that is not unique gets the column number."""
@@ -114,27 +134,6 @@ def time_column(
     return first, [
         f"no column has the name of a time; {layout.name(first)!r}, the first, was used as the time"
     ]
-
-
-# Names that spreadsheets, pandas and others give to the column of row numbers.
-_ROW_NUMBERS: Final = frozenset(
-    {
-        "column 1",
-        "unnamed: 0",
-        "index",
-        "nr",
-        "nr.",
-        "no",
-        "no.",
-        "row",
-        "id",
-        "#",
-        "state",
-        "increment",
-        "inc",
-        "step",
-    }
-)
 
 
 def internal_energy(
@@ -257,7 +256,8 @@ class Table(Database):
 
     def _split_channels(self) -> tuple[tuple[str, ...], list[str]]:
         """Return the columns that contain numbers, and a note on each named column without numbers."""
-        channels, notes = list[str](), list[str]()
+        channels = list[str]()
+        notes = list[str]()
         for name, column in self._columns.items():
             if column in self._numeric:
                 channels.append(name)

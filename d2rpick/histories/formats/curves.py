@@ -163,11 +163,10 @@ class Curves(Database):
     @property
     def energy_channel(self) -> str:
         """The only curve, or the only one named like an internal energy; FormatError lists all curves otherwise."""
-        fitting = (
-            range(1)
-            if len(self.channels) == 1
-            else find_internal_energies(self.channels)
-        )
+        if len(self.channels) == 1:
+            fitting = [0]
+        else:
+            fitting = find_internal_energies(self.channels)
         if len(fitting) != 1:
             count = f"{len(fitting)} curves are" if fitting else "no curve is"
             problem = f"{self.source}: {count} named like an internal energy"
@@ -221,7 +220,8 @@ class Curves(Database):
         numbers = np.array([as_number(cell, ".") for cell in cells], dtype=np.float64)
         bad = np.flatnonzero(~np.isfinite(numbers))
         if bad.size:
-            line, cell = curve.lines[bad[0]], cells[bad[0]][:60]
+            line = curve.lines[bad[0]]
+            cell = cells[bad[0]][:60]
             problem = (
                 f"{self.source}:{line}: {cell!r} of {name!r}, a number was expected"
             )

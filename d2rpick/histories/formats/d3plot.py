@@ -188,7 +188,8 @@ class D3plot(Database):
 
 def _states_of(files: Sequence[Source], head: Head) -> _States:
     """Read the first words of all states of a family; in its first file the states begin after the head."""
-    real, values = head.form.real, 1 + head.globals
+    real = head.form.real
+    values = 1 + head.globals
     contents = [content_of(file.data) for file in files]
     begins = [head.begin] + [0] * (len(files) - 1)
     counts = [
@@ -242,13 +243,15 @@ def _whole_states(
     file: Source, head: Head, begin: int, rows: Rows, word_after: bytes
 ) -> _States:
     """Return the states of one file up to its end mark; ``word_after`` is the word after the last whole state."""
-    content, name = content_of(file.data), file.name
+    content = content_of(file.data)
+    name = file.name
     ends = np.flatnonzero(rows[:, 0] == END)
     if ends.size:
         rows = rows[: ends[0]]
     end = begin + head.state * len(rows)
     while len(rows) and _is_blank(content, end - head.state, head.state):
-        rows, end = rows[:-1], end - head.state
+        rows = rows[:-1]
+        end = end - head.state
     ended = bool(ends.size) or word_after == np.array(END, head.form.real).tobytes()
     if begin and not len(rows) and _is_blank(content, begin, len(content) - begin):
         ended = True  # states begin in the next file
@@ -284,7 +287,8 @@ def _is_blank(content: Content, begin: int, size: int) -> bool:
 def _refuse_other_states(content: Content, name: str, head: Head, begin: int) -> None:
     """Raise FormatError if the end mark of a file is within a state: then states are longer or shorter."""
     first = max(begin, len(content) - _TAIL)
-    tail, mark = content[first : len(content)], np.array(END, head.form.real).tobytes()
+    tail = content[first : len(content)]
+    mark = np.array(END, head.form.real).tobytes()
     at = tail.rfind(mark)
     if at >= 0 and not tail[at + len(mark) :].strip(b"\0"):
         problem = (

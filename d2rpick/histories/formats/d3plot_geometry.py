@@ -96,7 +96,8 @@ class Geometry:
 
     def _airbag_flags(self) -> None:
         """Skip the flags of particle airbags; count their values in a state."""
-        airbags, version = self._control["npefg"] % 1000, self._control["npefg"] // 1000
+        airbags = self._control["npefg"] % 1000
+        version = self._control["npefg"] // 1000
         if self._control["npefg"] <= 0:
             return
         of_geometry, of_particle, particles, of_airbag = self._next(4)
@@ -108,7 +109,8 @@ class Geometry:
 
     def _nodes_and_elements(self) -> None:
         """Skip nodes and elements; the two additional nodes of solids follow the solids or, in other releases, all."""
-        control, solids = self._control, abs(self._control["nel8"])
+        control = self._control
+        solids = abs(self._control["nel8"])
         self.at += dimensions_of(control) * control["numnp"] + 9 * solids
         shells = 9 * control["nelt"] + 6 * control["nel2"] + 5 * control["nel4"]
         more_nodes = 2 * solids if control["nel8"] < 0 else 0
@@ -140,7 +142,8 @@ class Geometry:
 
     def _ids(self, head: tuple[int, ...], size: int) -> tuple[tuple[int, ...], ...]:
         """Read the ids of the parts, sorted and as defined, from a section of numbers of ``size`` words."""
-        form, count = self._words.form, self._control["nmmat"]
+        form = self._words.form
+        count = self._control["nmmat"]
         long = self._control["filetype"] >= LONG_IDS
         width = 8 if long else form.width
         expected = _PART_NUMBERING + (sum(head[5:]) + 3 * count) * width // form.width
@@ -177,7 +180,8 @@ class Geometry:
 
     def _extra_nodes(self) -> None:
         """Skip the additional nodes of elements of higher order."""
-        control, kinds = self._control, dict(_EXTRA_NODES)
+        control = self._control
+        kinds = dict(_EXTRA_NODES)
         if control["quadr"]:
             kinds |= _FULL_QUADRATIC
         if control["cubic"]:

@@ -178,8 +178,10 @@ def _words_of_state(control: Mapping[str, int], geometry: Geometry) -> int:
 def _values_of_node(control: Mapping[str, int]) -> int:
     """Count the words of a node in a state."""
     vectors = sum(control[name] != 0 for name in ("iu", "iv", "ia"))
-    heat, scaled_mass = control["it"] % 10, control["it"] // 10 % 10 == 1
-    rates, residuals = control["idtdt"] % 10 == 1, control["idtdt"] // 10 % 10 == 1
+    heat = control["it"] % 10
+    scaled_mass = control["it"] // 10 % 10 == 1
+    rates = control["idtdt"] % 10 == 1
+    residuals = control["idtdt"] // 10 % 10 == 1
     contact = control["penout"] + (control["engout"] == 1)
     return (
         dimensions_of(control) * vectors

@@ -64,7 +64,8 @@ def form_of(head: bytes) -> Form | None:
             continue
         words = np.frombuffer(head[: CONTROL * form.width], form.integer)
         counts = words[[_PLACES[name] for name in ("numnp", "nglbv", "nmmat")]]
-        kind, dimensions = int(words[_PLACES["filetype"]]), int(words[_PLACES["ndim"]])
+        kind = int(words[_PLACES["filetype"]])
+        dimensions = int(words[_PLACES["ndim"]])
         is_known = kind % LONG_IDS in _FAMILIES and kind // LONG_IDS in (0, 1)
         if is_known and dimensions in _DIMENSIONS and (counts >= 0).all():
             return form

@@ -84,7 +84,8 @@ class Blocks(Database):
         self._end = self._data.rfind(b"\n", 0, len(self._data)) + 1
         # Packed, so that a file whose blocks all differ does not fill the memory.
         self._runs = array("q")
-        data, end = self._data, self._end  # not self: a cycle would keep the file open
+        data = self._data
+        end = self._end  # not self: a cycle would keep the file open
         self.layout = lru_cache(maxsize=16)(
             lambda at, size: grammar.layout(data[at : min(at + size, end)])
         )
@@ -135,7 +136,8 @@ class Blocks(Database):
             taken, self._ahead = self._ahead, taken
         # memory that is never written costs nothing
         values = np.zeros((self.states, len(names)))
-        is_scattered, row = np.ones(self.states, bool), 0
+        is_scattered = np.ones(self.states, bool)
+        row = 0
         for run in self:
             rows = slice(row, row := row + run.repeats)
             offsets = self._offsets(run, names)
@@ -333,7 +335,8 @@ class Blocks(Database):
 
     def _count(self, position: int, example: int, stride: int) -> int:
         """Count the blocks from ``position`` on that resemble the example and are followed by another block."""
-        literal, start = self.layout(example, stride).literal, self._grammar.start
+        literal = self.layout(example, stride).literal
+        start = self._grammar.start
         run = Stretch(position, stride, (self._end - position) // stride, example)
         if self._compared and run.repeats >= self.many:
             count = self._count_and_take(run, literal)
@@ -345,18 +348,14 @@ class Blocks(Database):
             count = like_example(
                 self._data, run._replace(repeats=count), stride - 1, literal[-1:]
             )
-        return (
-            count
-            if self.text(position + count * stride, len(start)) == start
-            else max(0, count - 1)
-        )
+        if self.text(position + count * stride, len(start)) == start:
+            return count
+        return max(0, count - 1)
 
     def _count_and_take(self, run: Stretch, literal: Bytes) -> int:
         """Count the blocks like the example; remember the bits that vary and copy the numbers needed first."""
-        varied, fields = (
-            np.zeros_like(literal),
-            self.layout(run.example, run.stride).fields,
-        )
+        varied = np.zeros_like(literal)
+        fields = self.layout(run.example, run.stride).fields
         offsets = np.array(
             [fields.get(name, UNSURE) for name in self._asked_ahead], dtype=np.int64
         )
@@ -426,7 +425,9 @@ class Blocks(Database):
 
     def _compare_in_full(self, names: Sequence[Hashable]) -> None:
         """Compare all blocks in full; raise FormatError if there are other states than before."""
-        states, is_complete, notes = self.states, self.complete, self.notes
+        states = self.states
+        is_complete = self.complete
+        notes = self.notes
         self._compared, self._asked_ahead = True, tuple(names)
         self._walk()
         self.complete, self.notes = is_complete, notes

@@ -142,7 +142,8 @@ def _describe(
     for line in lines:
         # a line between these lost some of its columns
         is_mixed |= name in fields and b"..." in block[end : line.start()]
-        name, end = line[1].rstrip(b".").rstrip().decode("latin-1"), line.end()
+        name = line[1].rstrip(b".").rstrip().decode("latin-1")
+        end = line.end()
         value = _VALUE.match(line[2])
         if value is None:
             fields[name] = UNSURE

@@ -32,6 +32,9 @@ _BOOKKEEPING: Final = ("_i_", "#")  # index trees of PyTables, references of MAT
 _ERF_BLOCK: Final = "/erfblock"
 _WIDEST: Final = 64  # columns; a wider matrix without names is not a table of histories
 
+# Share of a file; a smaller dataset is copied, since a view of it would keep the whole file in memory.
+_LARGE: Final = 1 / 4
+
 
 class Column(NamedTuple):
     """One column: the ``path`` by which a user names it, and where it is in the file.
@@ -150,10 +153,6 @@ def _standard_types() -> tuple[h5py.h5t.TypeID, ...]:
     )
 
 
-# Share of a file; a smaller dataset is copied, since a view of it would keep the whole file in memory.
-_LARGE: Final = 1 / 4
-
-
 def _values(dataset: h5py.Dataset, content: bytes) -> Any:
     """Return the numbers of a dataset; one that is contiguous and most of the file is a view of ``content``."""
     start = dataset.id.get_offset()  # None for data in chunks or in other files
@@ -208,7 +207,9 @@ def _dataset_columns(name: str, dataset: h5py.Dataset) -> Iterator[Column]:
     """Yield the columns of a dataset: members of a compound type, a vector, or the columns of a matrix."""
     import h5py
 
-    plan, shape, dtype = dataset.id.get_create_plist(), dataset.shape, dataset.dtype
+    plan = dataset.id.get_create_plist()
+    shape = dataset.shape
+    dtype = dataset.dtype
     if (
         shape is None
         or plan.get_layout() == h5py.h5d.VIRTUAL

@@ -54,6 +54,14 @@ _DAMAGED: Final = (
     MemoryError,
 )
 
+# Offset of the end-of-file address in superblocks of version 0 to 3 with addresses of eight bytes, as all writers use.
+_END_OF_FILE: Final = {0: 40, 1: 44, 2: 28, 3: 28}
+_VERSION, _SIZE, _ADDRESS_SIZE = 8, {0: 13, 1: 13, 2: 9, 3: 9}, 8
+# Time-out of a reading: 60 s plus 1 s per 100 kB.  A longer reading means a cyclic B-tree in a damaged file.
+_SECONDS: Final = 60
+_SLOWEST: Final = 100_000  # bytes per second
+_USER_BLOCK: Final = 512  # bytes that MATLAB puts before the file
+
 
 def recognises(data: bytes) -> bool:
     """Return True if ``data`` is the start of an HDF5 file; MATLAB puts 512 bytes before its signature."""
@@ -100,9 +108,9 @@ class Columns(Database):
         self._file, self.source = file, source
         with _opened(file, source) as opened:
             self._columns = columns_of(opened)
-        self._named_time = (
-            _named(selection.time, self._columns, source) if selection.time else None
-        )
+        self._named_time: Column | None = None
+        if selection.time:
+            self._named_time = _named(selection.time, self._columns, source)
         self._energies = [
             _named(path, self._columns, source) for path in selection.energy
         ]
@@ -183,11 +191,10 @@ class Columns(Database):
         """The column of the selection, or the time nearest to the energy."""
         if self._named_time:
             return self._named_time
-        energy = (
-            self._energies[0]
-            if self._energies
-            else _only_energy(self._columns, None, self.source)
-        )
+        if self._energies:
+            energy = self._energies[0]
+        else:
+            energy = _only_energy(self._columns, None, self.source)
         return _only_time(self._columns, energy, self.source)
 
     def _load(self, column: Column) -> Samples:
@@ -306,11 +313,9 @@ def _line(group: h5py.Group, name: str) -> str:
         return ""
     values = np.ravel(group[name][()])
     text = values[0] if values.size else b""
-    return (
-        text.decode("latin-1").strip("\0 ")
-        if isinstance(text, bytes)
-        else str(text).strip()
-    )
+    if isinstance(text, bytes):
+        return text.decode("latin-1").strip("\0 ")
+    return str(text).strip()
 
 
 def _named(path: str, columns: Sequence[Column], source: str) -> Column:
@@ -391,14 +396,6 @@ def _opened(file: io.BytesIO, source: str) -> Iterator[h5py.File]:
 
 
 # Checks for damage at which the library crashes or loops endlessly.
-
-# Offset of the end-of-file address in superblocks of version 0 to 3 with addresses of eight bytes, as all writers use.
-_END_OF_FILE: Final = {0: 40, 1: 44, 2: 28, 3: 28}
-_VERSION, _SIZE, _ADDRESS_SIZE = 8, {0: 13, 1: 13, 2: 9, 3: 9}, 8
-# Time-out of a reading: 60 s plus 1 s per 100 kB.  A longer reading means a cyclic B-tree in a damaged file.
-_SECONDS: Final = 60
-_SLOWEST: Final = 100_000  # bytes per second
-_USER_BLOCK: Final = 512  # bytes that MATLAB puts before the file
 
 
 def check_file(file: BinaryIO, source: str, seconds: int = _SECONDS) -> None:
@@ -482,7 +479,8 @@ def _read(file: BinaryIO, source: str) -> None:
     """Read the description of all data, and data in chunks; raise FormatError if the bounds are exceeded."""
     import h5py
 
-    size, unpacked = _head_and_size(file)[1], 0
+    size = _head_and_size(file)[1]
+    unpacked = 0
 
     def visit(name: bytes, info: h5py.h5o.ObjInfo) -> None:
         nonlocal unpacked

@@ -78,14 +78,16 @@ def read_header(
         return Header(_commented_names(lines, separator, columns), units)
     if composed := _compose_names(rows, columns):
         return Header(tuple(composed), units)
-    names, title = rows[-1], ""
+    names = rows[-1]
+    title = ""
     if len(names) > 1 and not names[-1]:
         names = names[:-1]
         # LS-PrePost writes a line of titles, then "Time," or "Time,A8874,"
         if len(rows) > 1:
             title = next((cell for cell in reversed(rows[-2]) if cell), "")
     if columns == 2 and len(names) == 1 and is_time(names[0]):
-        names, title = [names[0], title], ""
+        names = [names[0], title]
+        title = ""
     if len(names) == 1:
         return Header(units=units, title=names[0])
     sure = _count_sure(where, names, columns)

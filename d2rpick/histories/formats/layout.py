@@ -149,9 +149,9 @@ def with_thousands(table: Layout, rows: Sequence[Sequence[str]]) -> Layout:
         for cell in row
         if not is_number(cell, table.decimal, table.thousands) and not is_missing(cell)
     ]
-    return (
-        table._replace(thousands=find_thousands(odd, table.decimal)) if odd else table
-    )
+    if odd:
+        return table._replace(thousands=find_thousands(odd, table.decimal))
+    return table
 
 
 def _no_table(text: Text, lines: Sequence[str]) -> FormatError:
@@ -190,22 +190,24 @@ def _find_rows(
     sample: Sequence[tuple[int, str]], separator: str, *, with_groups: bool
 ) -> Layout | None:
     """Return the layout in which most lines are rows, with words or without; else any one with rows of numbers only."""
-    forms = (
-        [(separator, decimal) for decimal in ".," if separator != decimal]
-        if separator
-        else _FORMS
-    )
+    forms: Sequence[tuple[str | None, str]]
+    if separator:
+        forms = [(separator, decimal) for decimal in ".," if separator != decimal]
+    else:
+        forms = _FORMS
     for only_numbers in (False, True):
-        best, best_count = None, 0 if only_numbers else len(sample) // 2
+        best = None
+        best_count = 0 if only_numbers else len(sample) // 2
         for sign, decimal in forms:
             if sign and not any(sign in line for _, line in sample):
                 continue
             cells = [(i, split(line, sign)) for i, line in sample]
-            thousands = (
-                find_thousands([cell for _, row in cells for cell in row], decimal)
-                if with_groups
-                else ""
-            )
+            if with_groups:
+                thousands = find_thousands(
+                    [cell for _, row in cells for cell in row], decimal
+                )
+            else:
+                thousands = ""
             if with_groups and not thousands:
                 continue
             form = Layout(sign, decimal, 0, 0, thousands=thousands)

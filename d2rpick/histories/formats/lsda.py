@@ -161,18 +161,25 @@ class Lsda:
 
     def _walk(self, position: int) -> None:
         """Walk the records from a byte on, and collect the directories of the wanted branches."""
-        data, unpack, head = self.data, self._head.unpack_from, self._head.size
+        data = self.data
+        unpack = self._head.unpack_from
+        head = self._head.size
         size, name_length = len(data), head + self._type.size
         near, base = b"", 0  # the bytes around the position
         path: tuple[str, ...] = ()
-        number, start, records, command = -1, position, list[bytes](), 0
+        number = -1
+        start = position
+        records = list[bytes]()
+        command = 0
         # where the last state of each branch began
         anchors: dict[tuple[str, ...], int] = {}
         heads: set[bytes] = set()
         while position + head <= size:
             at = position - base
             if at + _HEAD > len(near):
-                near, base, at = data[position : position + _AROUND], position, 0
+                near = data[position : position + _AROUND]
+                base = position
+                at = 0
             length, command = unpack(near, at)
             end = position + length
             if length < head or end > size or command not in _COMMANDS:
@@ -194,11 +201,14 @@ class Lsda:
                         position += ahead
                         continue
                     anchors[branch] = position
-                path, number, start = entered, int(state[1]) if state else -1, end
+                path = entered
+                number = int(state[1]) if state else -1
+                start = end
                 self.names.update(path[:1])
                 form = self._same_again(path, start) if state else None
                 if form:
-                    records, command = list(form.heads), VARIABLE
+                    records = list(form.heads)
+                    command = VARIABLE
                     end = start + form.length
             elif command == VARIABLE and length > name_length:
                 name_end = at + name_length + 1 + near[at + name_length]
@@ -259,7 +269,8 @@ class Lsda:
             begin = self._head.size + self._type.size + 1
             if command == VARIABLE and len(record) > begin:
                 (code,) = self._type.unpack_from(record, self._head.size)
-                name, values = record[begin:].decode("latin-1"), length - len(record)
+                name = record[begin:].decode("latin-1")
+                values = length - len(record)
                 dtype = np.dtype(self._order + _TYPES.get(code, "V1"))
                 is_whole = name.isprintable() and len(name) == record[begin - 1]
                 if code in _TYPES and is_whole and values % dtype.itemsize == 0:
@@ -326,7 +337,8 @@ class Lsda:
 
     def _alike(self, previous: int, position: int) -> bool:
         """Return True if a search for repetitions is worthwhile, by a quick look at the records one stride apart."""
-        head, stride = self._head.size, position - previous
+        head = self._head.size
+        stride = position - previous
         first = self.data[previous : previous + head]
         ahead = range(position, position + _WORTH * stride, stride)
         return all(self.data[start : start + head] == first for start in ahead)
@@ -338,7 +350,8 @@ class Lsda:
         fixed = np.zeros(end - begin, dtype=np.uint8)
         numbers = []
         block = self.data[begin:end]
-        head, position = self._head.size, begin
+        head = self._head.size
+        position = begin
         while position < end:
             at = position - begin
             length, command = self._head.unpack_from(block, at)

@@ -31,12 +31,14 @@ def plain_rows(
         unquoted = _without_quotes(piece, layout)
         if unquoted is None:
             return None
-        piece, layout = unquoted, layout._replace(separator=_UNIT_SEPARATOR)
+        piece = unquoted
+        layout = layout._replace(separator=_UNIT_SEPARATOR)
     if layout.decimal == ",":
         if b"." in piece:
             return None
         piece = piece.replace(b",", b".")
-    read_columns, chosen = [*range(layout.columns)], None
+    read_columns = [*range(layout.columns)]
+    chosen = None
     separator_bytes = (layout.separator or "\n").encode("latin-1")
     closed = piece[: piece.index(b"\n")].endswith(separator_bytes)
     if layout.separator and (closed or sorted(used) != read_columns):

@@ -150,7 +150,8 @@ class _TextRecords(Records):
             body = body.replace(self._line_end, b"")
         is_run = characters == _RUN_TITLE
         width = _SHORT if is_run or len(body) == _SHORT else _LONG
-        begin, end = first * width, len(body) - last * _SHORT
+        begin = first * width
+        end = len(body) - last * _SHORT
         title = body[begin:end].ljust(RUN - WIDTH if is_run else characters)
         try:
             integers_before = _binary(body[:begin], first, width)

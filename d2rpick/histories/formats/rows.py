@@ -202,7 +202,8 @@ class _Curve:
         self.keep_piece()
         if len(self._read) > 1:
             self._read = [np.concatenate(self._read)]
-        table, below = self._read[0], self._below
+        table = self._read[0]
+        below = self._below
         assert below is not None  # a line below the table was met before this row
         is_first = np.array_equal(table[0], state)
         position = 0 if is_first else self._repeated

@@ -25,6 +25,14 @@ _UTF8: Final = b"\xef\xbb\xbf"
 # Lines in which the form of a text is searched; a form that these do not show is not found.
 HEAD: Final = 10_000
 
+# Digits before and after the point, and the exponent.
+_PARTS = re.compile(r"[+-]?(\d*+)\.?+(\d*+)(?:[eEdD]([+-]?\d++))?")
+# Significant digits that restore every double, and the form of a number without an exponent.
+_LONGEST = 17
+_PLAIN = r"[+-]?(?:0|[1-9]\d+)\.\d+"
+# Every double keeps 15 significant digits; a format that prints so many is treated as lossless.
+_FULL = 15
+
 
 class Text:
     """The lines of a file, each with a line feed as its end; ``unended`` is a last line without end, or empty.
@@ -107,7 +115,9 @@ class Text:
 
     def sample(self, begin: int) -> list[str]:
         """Return lines after byte ``begin`` from the start, the end and evenly between; all of a short text."""
-        data, end, count = self._data, self._end, self.some
+        data = self._data
+        end = self._end
+        count = self.some
         if begin >= end:
             return []
         if end - begin <= self.short:
@@ -184,17 +194,6 @@ def _encoding(data: bytes) -> str:
     return "utf-8"
 
 
-# Digits before and after the point, and the exponent.
-_PARTS = re.compile(r"[+-]?(\d*+)\.?+(\d*+)(?:[eEdD]([+-]?\d++))?")
-
-# Significant digits that restore every double, and the form of a number without an exponent.
-_LONGEST = 17
-_PLAIN = r"[+-]?(?:0|[1-9]\d+)\.\d+"
-
-# Every double keeps 15 significant digits; a format that prints so many is treated as lossless.
-_FULL = 15
-
-
 def precisions(
     time: Sequence[str], energy: Sequence[str], moments: Samples
 ) -> tuple[Precision, Precision]:
@@ -225,7 +224,8 @@ def precisions(
         if digits >= _FULL:
             return EXACT, EXACT
     general = Precision(digits=max(digits, 1))
-    time_decimals, energy_decimals = _fixed_decimals(time), _fixed_decimals(energy)
+    time_decimals = _fixed_decimals(time)
+    energy_decimals = _fixed_decimals(energy)
     time_fixed = time_decimals and not _is_finer_than_its_grid(time_decimals, moments)
     time_precision = energy_precision = general
     if time_fixed:
