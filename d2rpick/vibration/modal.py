@@ -15,6 +15,7 @@ import numpy as np
 
 from d2rpick.base.caching import cached_property
 from d2rpick.base.tuples import NamedTuple
+from d2rpick.vibration import measures
 from d2rpick.vibration.lines import FIRST_PART, even_grid, predict
 from d2rpick.vibration.locked_lines import (
     NOTABLE,
@@ -326,6 +327,7 @@ class ModalVibration:
             (_LEAST_HALF + min(self._wrong, 1.0)) * (1 + np.abs(squared - 1))
             + np.minimum(lines, 1.0)
             + _NOISE_COUNTS * scatter
+            + self._phase_share * squared
             + beside
             + self._of_other_readings(tr, td, squared)
         )
@@ -344,9 +346,7 @@ class ModalVibration:
 
         No square is below zero: where the band reaches there, the middle of the rest is stated instead of ``stated``.
         """
-        squared, half = np.square(stated), self.half_width(tr, td)
-        low, high = np.maximum(squared - half, 0.0), squared + half
-        return np.sqrt((low + high) / 2), np.sqrt(low), np.sqrt(high)
+        return measures.band_about(np.square(stated), self.half_width(tr, td), 0.0, 0.0)
 
     def unseen(self, tr: Samples | float, td: float) -> Samples:
         """Share of the vibration energy at td that the band is worth, from each tr on [-].
@@ -354,6 +354,14 @@ class ModalVibration:
         A hidden mode that stands opposed at tr and td adds four times its share to R^2.
         """
         return self.half_width(tr, td) / 4
+
+    @cached_property
+    def _phase_share(self) -> float:
+        """Share of R^2 that depends on the phases at td, of all modes [-]."""
+        modes = self.reading.modes
+        poles, sizes = modes.poles, np.abs(modes.weights)
+        shares = measures.phase_share(-poles.real, poles.imag / 2)
+        return float(sizes @ shares / max(float(sizes.sum()), 1e-300))
 
     @cached_property
     def _wrong(self) -> float:

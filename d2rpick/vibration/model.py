@@ -31,7 +31,8 @@ from d2rpick.vibration.moments import (
     SampledEnergy,
     moments_of_mode,
 )
-from d2rpick.vibration.span import SMALLEST, residual_bound
+from d2rpick.vibration.oscillator_band import residual_band
+from d2rpick.vibration.span import SMALLEST
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -519,7 +520,7 @@ def energy_at(history: History, td: float, evidence: Evidence) -> Vibration:
         whole.mode,
         *whole.span,
         None,
-        partial(measures.band_up_to, partial(residual_bound, fit)),
+        partial(residual_band, fit),
     )
     return Vibration(
         "oscillator", whole, compared, undescribed="not described by the oscillator"

@@ -238,16 +238,10 @@ class SignedParts(SignedAmplitudes):
     def residual_band(
         self, stated: Samples, tr: Samples, td: float
     ) -> tuple[Samples, Samples, Samples]:
-        """Residual of each tr (n,) as it is stated, which is the least one, and the largest [-]."""
-        return measures.band_up_to(self.residual_bound, stated, tr, td)
-
-    def residual_bound(self, residual: Samples, tr: Samples, td: float) -> Samples:
-        """Largest residual of each tr of shape (n,), if what may be hidden stood opposed at tr and td [-]."""
-        return np.asarray(
-            np.hypot(
-                residual, np.sqrt(self.unseen(tr, td)) + np.sqrt(self.unseen(td, td))
-            )
-        )
+        """Residual of each tr (n,), and its bounds if what may be hidden stood opposed at tr and td [-]."""
+        opposed = np.sqrt(self.unseen(tr, td)) + np.sqrt(self.unseen(td, td))
+        squared, hidden = np.square(stated), np.square(opposed)
+        return measures.band_about(squared, 0.0 * squared, hidden, hidden)
 
     def comparable_since(self, td: float) -> float:
         """Earliest time whose signs can be compared with those at ``td``: the last unclear one before it [time]."""

@@ -396,16 +396,3 @@ def hidden_share(time: Samples, energy: Samples, model: Damped) -> float:
     amplitude = 2 * strongest / float(np.sum(decay**2))
     # the energy of a mode swings by half of its vibration energy about a mean
     return min(2 * amplitude / float(model.vibration_energy(time[0])), 1.0)
-
-
-def residual_bound(
-    fit: Identification, residual: Samples, tr: Samples, td: Samples | float
-) -> Samples:
-    """Largest residual of each tr of shape (n,) with the energy that a hidden mode may have, at worst [-].
-
-    It then stood at tr at one end of its swing and at td at the other, where it is smaller by the damping in between:
-    R^2 grows by its share of the vibration energy times (1 + exp(alpha (td - tr)/2))^2.
-    """
-    assert fit.mode is not None
-    swing = 1 + np.exp(fit.mode.alpha / 2 * (td - tr))
-    return np.sqrt(residual**2 + fit.hidden_share * swing**2)

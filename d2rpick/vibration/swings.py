@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, ClassVar, Final, NamedTuple
 import numpy as np
 
 from d2rpick.histories.samples import find_turns
-from d2rpick.vibration import measures
 from d2rpick.vibration.amplitudes import SignedAmplitudes
 from d2rpick.vibration.measures import Profile, vertices, wrong_sign
 
@@ -107,7 +106,7 @@ class Swings(SignedAmplitudes):
         self, stated: Samples, tr: Samples, td: float
     ) -> tuple[Samples, Samples, Samples]:
         """Residual of each tr (n,) as it is stated, which is the least one, and the largest [-]."""
-        return measures.band_up_to(self.residual_bound, stated, tr, td)
+        return stated, stated, self.residual_bound(stated, tr, td)
 
     def residual_bound(self, residual: Samples, tr: Samples, td: float) -> Samples:
         """Largest residual of each tr (n,): of any spring, with what may hide in the floor at its worst [-]."""
