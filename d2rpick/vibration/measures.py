@@ -347,7 +347,9 @@ class Profile(NamedTuple):
         return tuple(vertices(t, square, at)[0].tolist())
 
     def cell(self, at: Samples) -> Samples:
-        """Interval between the two times around each of ``at`` [time]."""
+        """Interval between the two times around each of ``at``; infinite without two times [time]."""
+        if self.time.size < 2:
+            return np.full(np.shape(at), np.inf)
         after = np.clip(np.searchsorted(self.time, at), 1, self.time.size - 1)
         return np.asarray(self.time[after] - self.time[after - 1])
 

@@ -18,6 +18,7 @@ from d2rpick.base.tuples import NamedTuple
 from d2rpick.vibration import measures
 from d2rpick.vibration.lines import FIRST_PART, even_grid, predict
 from d2rpick.vibration.locked_lines import (
+    ABOVE_SCATTER,
     NOTABLE,
     Stretch,
     find_stretches,
@@ -181,6 +182,8 @@ class ModalVibration:
         Scatter of the record about its lines [energy].
     systematic : float
         Share of the scatter that neighbouring states share, and which is believed [-].
+    states_per_period : float
+        States of the record in a period of the fastest line that is told from noise [-].
     slack : float
         Negative static energy that noise makes, over the mean vibration energy [-].
     source : str
@@ -198,6 +201,7 @@ class ModalVibration:
     doubts: Doubts
     noise: float
     systematic: float
+    states_per_period: float
     slack: float
     source: str = "internal energy"
     second: Reading | None = None
@@ -557,9 +561,18 @@ def _read(
         doubts,
         noise,
         systematic,
+        min(grid.strong, _count_states(spectrum.lines, grid, scatter)),
         slack,
         "kinetic energy" if kinetic else "internal energy",
     )
+
+
+def _count_states(lines: Exponentials, grid: Grid, scatter: float) -> float:
+    """Count the states in a period of the fastest line that is notable, and no scatter."""
+    sizes = np.abs(lines.weights)
+    least = max(NOTABLE * float(sizes.max(initial=0.0)), ABOVE_SCATTER * scatter)
+    fastest = float(lines.poles.imag[sizes > least].max(initial=0.0))
+    return 2 * np.pi / (fastest * grid.spacing) if fastest > 0 else np.inf
 
 
 def _without(lines: Exponentials, stretches: tuple[Stretch, ...]) -> Mask:

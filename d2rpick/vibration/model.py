@@ -400,9 +400,9 @@ class Evidence(NamedTuple):
 
     @property
     def states_per_period(self) -> float | None:
-        """States per period of the fastest strong line of the energy [-]; None if no lines were looked for."""
+        """States per period of the fastest line of the energy [-]; None if no lines were looked for."""
         modal = cast("ModalVibration | None", self.models.get("modal"))
-        return modal.doubts.coarse if modal else None
+        return modal.states_per_period if modal else None
 
     @property
     def has_model(self) -> bool:
