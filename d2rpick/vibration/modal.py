@@ -78,12 +78,12 @@ _FINER: Final = 4
 _LITTLE_LEFT, _LITTLE_MISSED = 0.05, 0.2
 
 # The half-width of R^2, before anything is known to be wrong.
-_LEAST_HALF: Final = 0.01
+_LEAST_HALF: Final = 0.006
 _VAGUE_HALF: Final = (
     0.2  # half-width of the band of R^2; that of well-read modes is 0.02 to 0.1
 )
 _SOME_TIMES: Final = 64  # at which the band is looked at as a whole
-_DRIFT_COUNTS, _NEGATIVE_COUNTS, _NOISE_COUNTS = 0.35, 1.2, 2.5
+_DRIFT_COUNTS, _NEGATIVE_COUNTS, _NOISE_COUNTS = 0.35, 1.2, 1.6
 _DRIFT_OF_NOISE: Final = 0.08
 _HIDDEN_LINES: Final = 12  # as many lines as may hide in what the fit leaves over
 
