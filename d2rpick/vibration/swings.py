@@ -105,15 +105,13 @@ class Swings(SignedAmplitudes):
     def residual_band(
         self, stated: Samples, tr: Samples, td: float
     ) -> tuple[Samples, Samples, Samples]:
-        """Residual of each tr (n,) as it is stated, which is the least one, and the largest [-]."""
-        return stated, stated, self.residual_bound(stated, tr, td)
-
-    def residual_bound(self, residual: Samples, tr: Samples, td: float) -> Samples:
-        """Largest residual of each tr (n,): of any spring, with what may hide in the floor at its worst [-]."""
+        """Residual of each tr (n,), and its bounds for any spring, with what may hide in the floor [-]."""
         hidden = np.minimum(
             _OF_THE_FLOOR * np.sqrt(self.unseen(tr, td)), wrong_sign(0.0)
         )
-        return np.asarray(np.hypot(_OF_ANY_SPRING * residual, hidden))
+        least = np.square(stated / _OF_ANY_SPRING) - np.square(hidden)
+        highest = np.hypot(_OF_ANY_SPRING * stated, hidden)
+        return stated, np.sqrt(np.maximum(least, 0.0)), np.asarray(highest)
 
     def unseen(self, tr: Samples | float, td: float) -> Samples:
         """Share of the vibration energy at td that the floor may hide in another mode, from each tr (n,) on [-].
