@@ -36,7 +36,9 @@ GLSTAT = glstat_text(TIMES, 10 * TIMES)
 MATSUM = matsum_text(TIMES, [7, 3], np.stack([TIMES, 0 * TIMES], axis=1))
 
 
-def opened(files: Mapping[str, bytes], selection: Selection | None = None) -> Run:
+def open_companions(
+    files: Mapping[str, bytes], selection: Selection | None = None
+) -> Run:
     """Open files of different formats, all of a format as legs."""
     legs = {
         kind: [
@@ -81,7 +83,7 @@ def test_the_files_of_one_folder_are_a_family_and_those_of_several_are_legs() ->
         for state in range(1, 8)
     ]
     assert run.notes == (
-        "1 state has the same printed time as the next one; the last of equal times counts",
+        "1 state has the same printed time as the next one; the last of equal times is used",
     )
 
 
@@ -93,7 +95,7 @@ def test_a_missing_branch_is_named_with_what_there_is() -> None:
     )
     with pytest.raises(
         FormatError,
-        match="no matsum in it, but glstat, nodout; name the binout of the run that holds it",
+        match="no matsum in it, but glstat, nodout; name the binout of the run that contains it",
     ):
         no_parts.history(Selection(parts=("3",)))
     with pytest.raises(FormatError, match="no glstat in it, but matsum, nodout"):
@@ -113,7 +115,7 @@ def test_legs_are_ordered_by_their_start_and_the_newer_one_wins() -> None:
     history = history_of(glstat, *legs)
     assert states_of(history) == [(1, 1), (2, 2), (3, 30), (4, 40), (5, 50), (5.5, 55)]
     assert (
-        "time steps back once (restart); where legs overlap the newer one counts"
+        "time steps back once (restart); if legs overlap the newer one is used"
         in history.notes[0]
     )
 
@@ -160,17 +162,17 @@ def test_a_column_that_a_leg_lacks_is_refused() -> None:
 
 
 def test_companions_of_other_times_are_doubted() -> None:
-    assert opened({"glstat": GLSTAT, "matsum": MATSUM}).notes == ()
+    assert open_companions({"glstat": GLSTAT, "matsum": MATSUM}).notes == ()
     coarse = matsum_text(TIMES[::2], [7, 3], np.ones((4, 2)))
-    assert opened({"glstat": GLSTAT, "matsum": coarse}).notes == ()
+    assert open_companions({"glstat": GLSTAT, "matsum": coarse}).notes == ()
     shifted = matsum_text(TIMES + 0.01, [7, 3], np.ones((8, 2)))
-    (note,) = opened({"glstat": GLSTAT, "matsum": shifted}).notes
+    (note,) = open_companions({"glstat": GLSTAT, "matsum": shifted}).notes
     assert (
         note
         == "glstat and matsum have only 0 of 7 states at the same times; are they from the same run?"
     )
     longer = np.arange(30) * (TIMES[1] - TIMES[0]) + TIMES[0]
-    (note,) = opened(
+    (note,) = open_companions(
         {"glstat": GLSTAT, "matsum": matsum_text(longer, [7, 3], np.ones((30, 2)))}
     ).notes
     assert note.startswith(
@@ -180,13 +182,13 @@ def test_companions_of_other_times_are_doubted() -> None:
         FormatError,
         match="glstat and matsum have no time in common, files of one run were expected",
     ):
-        opened(
+        open_companions(
             {"glstat": GLSTAT, "matsum": matsum_text(TIMES + 5, [7], np.ones((8, 1)))}
         )
 
 
 def test_companions_have_legs_of_their_own() -> None:
-    run = opened(
+    run = open_companions(
         {
             "glstat1": glstat_text([1, 2], [1, 2]),
             "matsum": matsum_text([1, 2, 3], [7], [[0.5], [6.0], [7.0]]),
@@ -209,7 +211,7 @@ def test_companions_have_legs_of_their_own() -> None:
 def test_parts_with_more_energy_than_the_model_are_of_another_run(
     parts: list[list[float]], refused: bool
 ) -> None:
-    run = opened(
+    run = open_companions(
         {
             "glstat": glstat_text([1, 2, 3], [10, 20, 9]),
             "matsum": matsum_text([1, 2, 3], [7, 3], parts),
@@ -230,7 +232,7 @@ def test_parts_with_more_energy_than_the_model_are_of_another_run(
 def test_round_off_of_a_free_fall_is_no_energy_of_another_run() -> None:
     """A box that falls has some 1e-18 J in its parts, and another 1e-18 J in all."""
     table = b"time,internal_energy,kinetic_energy\n1,1e-18,5\n2,0,6\n3,0,7\n"
-    run = opened(
+    run = open_companions(
         {"csv": table, "matsum": matsum_text([1, 2, 3], [7], [[2e-18], [3e-18], [0.0]])}
     )
     assert run.history(Selection(parts=("7",))).energy.size == 3
@@ -243,7 +245,7 @@ def test_the_energy_of_the_whole_model_is_the_default_and_binary_files_are_prefe
     None
 ):
     data = bytes(made_binout(range(1, 9)).data)
-    run = opened({"glstat": GLSTAT, "binout": data, "matsum": MATSUM})
+    run = open_companions({"glstat": GLSTAT, "binout": data, "matsum": MATSUM})
     assert run.history(Selection()).energy[0] == values("internal_energy", 1)
     assert (
         run.history(Selection(energy=("internal energy",))).channel == "internal_energy"
@@ -316,7 +318,7 @@ def test_what_is_not_there_is_refused_with_what_there_is(
     files: Mapping[str, bytes], selection: Selection, reason: str
 ) -> None:
     with pytest.raises(FormatError, match=reason):
-        opened(files, selection).history(selection)
+        open_companions(files, selection).history(selection)
 
 
 def test_times_at_random_are_refused_in_every_format(tmp_path: Path) -> None:
@@ -368,7 +370,7 @@ def test_what_is_in_the_files_is_told_where_no_energy_can_be_chosen() -> None:
         "2 curves are named like an internal energy; choose with `energy`: 1 'a IE', 2 'b IE'"
         in curves.notes[0]
     )
-    doubtful = opened(
+    doubtful = open_companions(
         {"glstat": GLSTAT, "matsum": matsum_text(TIMES + 0.01, [7, 3], np.ones((8, 2)))}
     )
     assert "are they from the same run?" in survey(doubtful, Selection()).notes[0]
@@ -406,7 +408,9 @@ def masses(path: Path) -> Samples | None:
     return open_run([str(path)], Selection()).masses
 
 
-def written(path: Path, parts: dict[int, tuple[float, float]], states: int = 4) -> Path:
+def write_matsum(
+    path: Path, parts: dict[int, tuple[float, float]], states: int = 4
+) -> Path:
     """Write a matsum of parts with momentum and velocity along y at the end, half of both in the middle, and so on."""
     text = matsum_head([*parts]).decode()
     for state in range(states):
@@ -423,15 +427,15 @@ def written(path: Path, parts: dict[int, tuple[float, float]], states: int = 4) 
 
 
 def test_of_a_matsum_they_are_momentum_over_velocity(tmp_path: Path) -> None:
-    found = masses(
-        written(
+    masses_read = masses(
+        write_matsum(
             tmp_path / "matsum",
             {1: (30.0, 2.0), 2: (-4.0, -5.0), 7: (0.0, 0.0), 9: (6.0, 0.0)},
         )
     )
-    assert found is not None
-    assert found[:3] == pytest.approx([15.0, 0.8, 0.0], rel=1e-4)
-    assert np.isnan(found[3])  # a solver that does not write the velocity
+    assert masses_read is not None
+    assert masses_read[:3] == pytest.approx([15.0, 0.8, 0.0], rel=1e-4)
+    assert np.isnan(masses_read[3])  # a solver that does not write the velocity
 
 
 def test_of_a_time_history_they_are_written(tmp_path: Path) -> None:

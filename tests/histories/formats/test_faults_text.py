@@ -47,9 +47,9 @@ def check_glstat(faults: list[Fault]) -> bool:
         energy = run.channel("internal energy").tolist()
     except FormatError:
         return False
-    found = list(zip(run.time.tolist(), energy, strict=True))
-    assert is_within(found, states), (found, states)
-    assert len(found) >= len(states) - legs(text), (found, states)
+    states_read = list(zip(run.time.tolist(), energy, strict=True))
+    assert is_within(states_read, states), (states_read, states)
+    assert len(states_read) >= len(states) - legs(text), (states_read, states)
     assert run.complete or run.notes
     return True
 
@@ -68,18 +68,18 @@ def check_matsum(faults: list[Fault], lines: int) -> bool:
             continue
         readable += 1
         for column, id_ in enumerate(ids):
-            found = [
+            states_read = [
                 (time, row[column])
                 for time, row in zip(run.part_time.tolist(), energies, strict=True)
             ]
             states = matsum_states(text, id_)
             # Of a part read alone the lines are compared, not those of other parts that may bear its number.
-            assert is_within(found, states, most=1 if ids == IDS else 2), (
+            assert is_within(states_read, states, most=1 if ids == IDS else 2), (
                 id_,
-                found,
+                states_read,
                 states,
             )
-            assert len(found) >= len(states) - legs(text), (found, states)
+            assert len(states_read) >= len(states) - legs(text), (states_read, states)
         assert run.complete or run.notes
     return readable > 0
 

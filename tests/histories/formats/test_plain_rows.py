@@ -22,11 +22,11 @@ def rounded(texts: list[list[str]]) -> Samples:
 @given(st.lists(st.tuples(HARD, HARD), min_size=1, max_size=40))
 def test_numbers_are_those_of_python(rows: list[tuple[str, str]]) -> None:
     cells = [[*row] for row in rows]
-    found = exact_numbers(
+    numbers = exact_numbers(
         "".join(",".join(row) + "\n" for row in rows).encode(), ",", rounded(cells)
     )
-    assert found is not None
-    assert found.tolist() == [[float(text) for text in row] for row in rows]
+    assert numbers is not None
+    assert numbers.tolist() == [[float(text) for text in row] for row in rows]
 
 
 @pytest.mark.parametrize(
