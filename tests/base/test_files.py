@@ -1,4 +1,4 @@
-"""When a file is at rest: so long after its last change that no write is under way and a later one would show."""
+"""A file is settled so long after its last change that no write is in progress and a later one would show."""
 
 import os
 import stat
@@ -28,8 +28,13 @@ MEGABYTE = 10**6
             100 * MEGABYTE,
             0.55,
             False,
-        ),  # the write of so much may have begun then
-        (200 * MOMENT, 100 * MEGABYTE, 0.05, True),  # but little at a time is appended
+        ),  # a write of this size may have begun then
+        (
+            200 * MOMENT,
+            100 * MEGABYTE,
+            0.05,
+            True,
+        ),  # a write appends only little at a time
         *(
             (WHOLE, 0, 2.05, may_grow) for may_grow in (False, True)
         ),  # times in whole seconds

@@ -17,7 +17,7 @@ class Ours(NamedTuple):
 
     @property
     def both(self) -> str:
-        """The two of them."""
+        """Both values in one text."""
         return f"{self.first} {self.second}"
 
 
@@ -29,13 +29,13 @@ class Theirs(typing.NamedTuple):
 
 
 class Measure(Record):
-    """What others may have too."""
+    """A record whose field others inherit."""
 
     share: float | None = None
 
 
 class Wide(Measure, Record):
-    """It stands between what must be given and what need not be."""
+    """The inherited field is between the required and the optional fields."""
 
     name: str
     kind: str = "any"

@@ -1,4 +1,4 @@
-"""Calls are computed here, by processes, or by a cluster, always the same way; a process that dies stops nothing."""
+"""Calls give the same results here, in processes and on a cluster; a process that dies stops nothing."""
 
 import os
 import signal
@@ -18,7 +18,7 @@ FARMS = [Farm, lambda: Cores(2, __name__)]
 
 
 def square(number: int) -> int:
-    """Work, or fail, or die, as the number asks for."""
+    """Compute, fail or die, depending on the number."""
     if number == 13:
         raise ValueError("thirteen")
     if number == 99:
@@ -62,7 +62,7 @@ def test_a_process_that_dies_is_told_for_its_item_alone() -> None:
 
 
 def children_of(process: int) -> dict[str, list[int]]:
-    """Ids of the processes below one, by what they are; of those that are forked the command is that of the first."""
+    """Return the ids of the child processes by kind; forked processes have the command of the first one."""
     listed = check_output(
         ["ps", "-e", "-ww", "-o", "pid=,ppid=,args="], text=True
     ).splitlines()
@@ -131,13 +131,13 @@ def test_there_is_a_core() -> None:
 def test_an_interrupt_while_the_first_process_imports_is_no_traceback(
     tmp_path: Path,
 ) -> None:
-    """A parent that goes on after the interrupt starts the process anew."""
+    """If the parent continues after the interrupt, it restarts the process."""
     (tmp_path / "slow.py").write_text(
         "import sys; print('importing', flush=True); sys.stdin.readline()"
     )
     code = (
         "import signal; from d2rpick.base.workers import Cores, begin\n"
-        "signal.signal(signal.SIGINT, lambda *_: None)\n"  # an ignored one would be inherited
+        "signal.signal(signal.SIGINT, lambda *_: None)\n"  # an ignored SIGINT would be inherited
         "begin(2, 'slow')\n"
         "with Cores(2, 'slow') as farm: print(next(farm.answers(abs, [-7])).result)\n"
     )
@@ -153,5 +153,5 @@ def test_an_interrupt_while_the_first_process_imports_is_no_traceback(
     ) as process:
         assert process.stdout
         assert process.stdout.readline() == "importing\n"
-        os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the children too
+        os.killpg(process.pid, signal.SIGINT)  # to the children too, as a terminal does
         assert process.communicate("\n", timeout=TIME_LIMIT) == ("importing\n7\n", "")

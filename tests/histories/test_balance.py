@@ -1,4 +1,4 @@
-"""Energy of springs and dampers: found where energies add up, left out of the level, kept where there is no other."""
+"""Energy of springs and dampers: found if energies add up, left out of the level unless it is the only energy."""
 
 from dataclasses import dataclass, field
 
@@ -51,16 +51,16 @@ def test_where_nothing_adds_up_no_part_is_taken_for_a_spring() -> None:
     assert find_spring_ids(Made(0.5 * ENERGIES[:, 0])) == ()
     assert (
         find_spring_ids(Made(ENERGIES[:, 0] + 0.1)) == ()
-    )  # a spring that has no history of its own
+    )  # a spring without its own history
     assert (
         find_spring_ids(Made(np.full(TIME.size, 1e-20))) == ()
-    )  # where LS-DYNA begins to count
+    )  # LS-DYNA prints 1e-20 for zero
     assert (
         find_spring_ids(Made(ENERGIES[:, 3], whole=0.5 * ENERGIES[:, 3])) == ()
-    )  # more than all there is
+    )  # more than the energy of all parts
     assert (
         find_spring_ids(Made(ENERGIES[:, 0], format="csv")) == ()
-    )  # a table may mean something else by the name
+    )  # in a table the name may mean something else
     twins = ENERGIES[:, [0, 0, 2, 3]]
     assert find_spring_ids(Made(twins[:, 0], whole=twins.sum(axis=1)), twins) in (
         (),
@@ -85,7 +85,9 @@ def test_the_springs_of_the_car_are_known_and_left_out_of_the_level() -> None:
     assert whole.channel == "internal_energy - spring_energy"
     np.testing.assert_allclose(parts.energy, body.energy)
     np.testing.assert_allclose(whole.energy, body.energy, rtol=1e-5, atol=1e-3)
-    assert len(sure(parts.parts)) == 17  # they are switched all the same
+    assert (
+        len(sure(parts.parts)) == 17
+    )  # the springs are switched although their energy is left out
     assert [
         note
         for note in parts.notes
@@ -94,7 +96,7 @@ def test_the_springs_of_the_car_are_known_and_left_out_of_the_level() -> None:
     answer = suggest(parts, 0.1464, Settings())
     assert sure(answer.recommended).tr == pytest.approx(
         0.0386, abs=5e-4
-    )  # with them, 0.0496 or, at another td, 0.0824
+    )  # with the springs the result is 0.0496 or, at another td, 0.0824
 
 
 def test_what_is_asked_for_by_name_is_taken_as_it_is() -> None:

@@ -1,4 +1,4 @@
-"""Forces of contacts and rigid walls from every file that tells them."""
+"""Forces of contacts and rigid walls from every kind of file that contains them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 TIMES = np.arange(40) / 8
 ACTS = (TIMES >= 1) & (TIMES <= 2)  # forces at the states
 FORCE = np.where(ACTS, 3.0, 0.0)
-SEEN = ((0.875, 2.125),)  # to one output interval
+SEEN = ((0.875, 2.125),)  # to within one output interval
 ENERGY = glstat_text(TIMES, 1 + TIMES)
 
 
@@ -140,7 +140,7 @@ def test_a_later_leg_of_an_rcforc_goes_on(tmp_path: Path) -> None:
 
 
 def binout(acts: np.ndarray = FORCE) -> bytes:
-    """glstat, rcforc of both sides of contacts 7 and 9 in no order, and rwforc with its inner directory."""
+    """A binout with glstat, rcforc (both sides of contacts 7 and 9 in no order) and rwforc with its inner directory."""
     writer = LsdaWriter()
     writer.cd("/rcforc/metadata")
     writer.put("ids", [9, 7, 7, 9], "i4")

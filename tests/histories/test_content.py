@@ -98,7 +98,7 @@ def test_threads_that_read_one_file_together_get_each_what_it_asks_for(
     starts = np.arange(0, 1960, 40)
 
     def wrong(step: int) -> int:
-        """How many readings of another length by each thread differ from the data."""
+        """Count, for each thread, the readings that differ from the data."""
         found = [
             disk_content[at : at + 7 * step] == data[at : at + 7 * step]
             for at in range(0, 1900, 9)
@@ -205,7 +205,7 @@ def test_a_file_written_anew_is_an_error_and_never_half_of_each(
 def test_a_write_under_way_is_no_file_written_anew(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The system shows the time of a write before its size."""
+    """The system updates the time of a file before its size."""
     file = put(tmp_path / "glstat", ONE)
     disk_content = on_disk(file)
     os.utime(file)
@@ -216,7 +216,9 @@ def test_a_write_under_way_is_no_file_written_anew(
 
 @pytest.mark.parametrize("contents", [(ONE, OTHER), TABLES], ids=["glstat", "csv"])
 @pytest.mark.slow
-@pytest.mark.usefixtures("new_files")  # of one that looks old no half can be told
+@pytest.mark.usefixtures(
+    "new_files"
+)  # if a file looks old, half of a write cannot be detected
 @OPENERS
 def test_a_file_that_is_written_anew_all_the_time_gives_one_of_its_contents_or_an_error(
     opened: Callable[[Path], Run],
@@ -226,7 +228,7 @@ def test_a_file_that_is_written_anew_all_the_time_gives_one_of_its_contents_or_a
 ) -> None:
     monkeypatch.setattr(
         time, "sleep", sleep
-    )  # shorter pauses end before a write does that a busy machine holds up
+    )  # shorter pauses would end before a write that a busy machine delays
     file, done = tmp_path / "run", Event()
     first_content, second_content = contents
     file.write_bytes(first_content)
@@ -324,7 +326,7 @@ def test_what_is_not_there_since_a_file_was_written_anew_is_not_passed_over(
 def fixed_times(
     monkeypatch: pytest.MonkeyPatch, modified: int, changed: int
 ) -> list[float]:
-    """Let files have these times for ever [ns before now]; the pauses that are made."""
+    """Give files constant times [ns before now]; return the list of pauses that are made."""
     pauses: list[float] = []
     now, fstat = time.time_ns(), os.fstat
 

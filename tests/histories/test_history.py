@@ -1,4 +1,4 @@
-"""What a history refuses, and what it tells of one time is what it tells of many."""
+"""What a history refuses; energies at many times are those at each time alone."""
 
 import pickle
 

@@ -1,4 +1,4 @@
-"""What solvers print beside the histories: the engine, what a run took, the smallest steps."""
+"""Listings next to the histories: the engine, the CPU time of a run, the smallest time steps."""
 
 from pathlib import Path
 
@@ -64,18 +64,21 @@ BEFORE, FIX, AFTER = (
             "built in 2022",
         ),
         (listing("1986-2026 Altair Engineering, Inc.", BEFORE), "commit 6068aa23d"),
-        (listing(tag=FIX), "commit 2b7ab50b7"),  # with the regression of the fix
+        (
+            listing(tag=FIX),
+            "commit 2b7ab50b7",
+        ),  # the first fix, which had an error of its own
         (listing(ran="2026/01/12"), "run on 2026-01-12"),
         (listing(ran="2026/01/13"), ""),
         (listing(tag=AFTER), ""),
         (listing(tag="bd4557ba7"), ""),
-        (listing(), ""),  # a build of 2026 that names no commit
+        (listing(), ""),  # a build of 2026 without the name of its commit
         (
             listing("1986-2025 Altair Engineering, Inc.").replace(
                 "OpenRadioss", "Radioss"
             ),
             "",
-        ),  # not known of others
+        ),  # other programs: nothing is known of this error
         (
             listing("1986-2025 Altair Engineering, Inc.").replace(
                 "SET ON", "LOCAL SKEW"
@@ -156,7 +159,7 @@ D3HSP = """
 def test_a_d3hsp_is_read_by_the_clock_where_processor_times_are_rounded_to_nothing(
     tmp_path: Path, elements: str, total: str, found: tuple[float, float]
 ) -> None:
-    """What came before the run does not count."""
+    """Time before the run is not included."""
     timing = read_timing(str(put(tmp_path / "d3hsp", D3HSP.format(elements, total))))
     assert timing.cycles == 640
     assert (timing.total, timing.elements) == pytest.approx(found)

@@ -1,4 +1,4 @@
-"""Quantities by their names: spellings of solvers, postprocessors and colleagues, in tables and in HDF5."""
+"""Quantities by their names: spellings of solvers, postprocessors and users, in tables and in HDF5."""
 
 from collections.abc import Callable
 
@@ -142,7 +142,7 @@ def test_a_name_without_addition_is_preferred() -> None:
     ) == [1]
     assert find_internal_energies(
         ["box IE", "IE_total", "dissipated internal energy"]
-    ) == [0, 1]  # to be chosen
+    ) == [0, 1]  # both are candidates, so the user has to choose
     assert find_quantities(["kinetic_energy", "total_kinetic_energy"]) == {
         "kinetic_energy": ["kinetic_energy"]
     }

@@ -1,4 +1,4 @@
-"""Recognition by content, where the bytes come from, and the errors of both."""
+"""Formats are recognised by content; the sources of bytes; the errors of both."""
 
 import gzip
 import io

@@ -1,4 +1,4 @@
-"""Several files as one run: families, legs, companions; what of them is taken for the energy."""
+"""Several files as one run: families, legs, companions; which energy of them is used."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ MATSUM = matsum_text(TIMES, [7, 3], np.stack([TIMES, 0 * TIMES], axis=1))
 def open_companions(
     files: Mapping[str, bytes], selection: Selection | None = None
 ) -> Run:
-    """Open files of different formats, all of a format as legs."""
+    """Open files of different formats; the files of one format are legs."""
     legs = {
         kind: [
             Source(name, data) for name, data in files.items() if name.startswith(kind)
@@ -59,7 +59,7 @@ def open_companions(
 
 
 def test_the_files_of_one_folder_are_a_family_and_those_of_several_are_legs() -> None:
-    """Branches lie in the files of different ranks, and one goes on in %001; the restart has a folder of its own."""
+    """Branches are in files of different MPI ranks, one continues in %001; the restart has its own folder."""
     whole, parts = made_binout(range(1, 6)), made_binout(range(1, 6), glstat=False)
     globals_only = bytes(whole.data).replace(b"matsum", b"nodout")
     files = {
@@ -121,7 +121,7 @@ def test_legs_are_ordered_by_their_start_and_the_newer_one_wins() -> None:
 
 
 def test_a_leg_that_gives_no_state_is_named() -> None:
-    """Two runs that start alike are hardly legs."""
+    """Two files that start at the same time are hardly legs of one run."""
     history = history_of(
         glstat, glstat_text([1, 2], [1, 2]), glstat_text([1, 2], [3, 4])
     )
@@ -202,9 +202,12 @@ def test_companions_have_legs_of_their_own() -> None:
 @pytest.mark.parametrize(
     ("parts", "refused"),
     [
-        ([[1, 9], [10, 10], [5, 4]], False),  # all of it
-        ([[1, 2], [3, 4], [5, 2]], False),  # others are not written
-        ([[1, 9.9], [10, 10], [5, 4]], False),  # within what solvers round
+        ([[1, 9], [10, 10], [5, 4]], False),  # the parts are the whole model
+        ([[1, 2], [3, 4], [5, 2]], False),  # the other parts are not written
+        (
+            [[1, 9.9], [10, 10], [5, 4]],
+            False,
+        ),  # a difference within the rounding of solvers
         ([[1, 2], [9, 15], [5, 4]], True),
     ],
 )
@@ -230,7 +233,7 @@ def test_parts_with_more_energy_than_the_model_are_of_another_run(
 
 
 def test_round_off_of_a_free_fall_is_no_energy_of_another_run() -> None:
-    """A box that falls has some 1e-18 J in its parts, and another 1e-18 J in all."""
+    """A falling box has some 1e-18 J in its parts, and another 1e-18 J as a whole."""
     table = b"time,internal_energy,kinetic_energy\n1,1e-18,5\n2,0,6\n3,0,7\n"
     run = open_companions(
         {"csv": table, "matsum": matsum_text([1, 2, 3], [7], [[2e-18], [3e-18], [0.0]])}
@@ -238,7 +241,7 @@ def test_round_off_of_a_free_fall_is_no_energy_of_another_run() -> None:
     assert run.history(Selection(parts=("7",))).energy.size == 3
 
 
-# What is taken for the energy.
+# The energy that is used.
 
 
 def test_the_energy_of_the_whole_model_is_the_default_and_binary_files_are_preferred() -> (
@@ -346,7 +349,7 @@ def test_a_time_column_is_no_choice_where_there_is_one_only(tmp_path: Path) -> N
 
 
 def test_what_is_in_the_files_is_told_where_no_energy_can_be_chosen() -> None:
-    """No states, and curves of which none is the one that is meant."""
+    """A file without states, and curves of which none is meant."""
     empty = survey(run_of(glstat, HEAD), Selection())
     assert (empty.states, empty.time_start, empty.sampling, empty.notes) == (
         0,
@@ -435,7 +438,7 @@ def test_of_a_matsum_they_are_momentum_over_velocity(tmp_path: Path) -> None:
     )
     assert masses_read is not None
     assert masses_read[:3] == pytest.approx([15.0, 0.8, 0.0], rel=1e-4)
-    assert np.isnan(masses_read[3])  # a solver that does not write the velocity
+    assert np.isnan(masses_read[3])  # from a solver that does not write velocities
 
 
 def test_of_a_time_history_they_are_written(tmp_path: Path) -> None:
@@ -444,7 +447,7 @@ def test_of_a_time_history_they_are_written(tmp_path: Path) -> None:
     )
     assert masses(tmp_path / "RUNT01") == pytest.approx(
         [value(1, 3, 6), value(1, 12, 6)]
-    )  # the middle of all states
+    )  # the middle of all states is not the middle of the states with a mass
     (tmp_path / "ENERGYT01").write_bytes(
         t01(3, (MadePart(3, "box", codes=(1, 2)),)).data
     )

@@ -1,4 +1,4 @@
-"""The rollover box: what mechanics asks of it, what switching keeps, and that it is the study's time table."""
+"""The rollover box: the laws of mechanics, what switching keeps, and the times of the published study."""
 
 from functools import cache
 
@@ -37,7 +37,7 @@ TIMES = st.integers(0, 12).map(lambda count: count / 100)
 
 
 def momenta(motion: Motion) -> tuple[complex, float]:
-    """Momentum and angular momentum about the origin, of everything."""
+    """Return momentum and angular momentum about the origin of the whole model."""
     point_momenta = motion.structure.masses * motion.velocities
     return complex(point_momenta.sum()), float(
         np.vdot(motion.places, point_momenta).imag
@@ -45,23 +45,25 @@ def momenta(motion: Motion) -> tuple[complex, float]:
 
 
 @cache
-def known(time: float) -> Motion:
-    """A run that has come to ``time``, which is left as it is."""
+def advance_to(time: float) -> Motion:
+    """Return a motion advanced to ``time``; it is cached and must not be changed."""
     motion = (
-        known(round(time - 0.01, 2)).copy() if time > 0 else Motion(COARSE, INTERVAL)
+        advance_to(round(time - 0.01, 2)).copy()
+        if time > 0
+        else Motion(COARSE, INTERVAL)
     )
     run_to(motion, time)
     return motion
 
 
-def at(time: float) -> Motion:
-    """A run that has come to ``time``, some hundredths."""
-    return known(time).copy()
+def copy_at(time: float) -> Motion:
+    """Return a copy of a motion advanced to ``time``, a multiple of 0.01 s."""
+    return advance_to(time).copy()
 
 
 @cache
 def simulate_box(parameters: Parameters, *windows: RigidWindow) -> Record:
-    """A run through trip or fall, flight and landing."""
+    """Compute a run through trip or fall, flight and landing."""
     return simulate(
         parameters, 1.2 if parameters.drop else 0.42, *windows, interval=INTERVAL
     )
@@ -102,7 +104,7 @@ def test_a_box_that_falls_bounces_and_its_energy_is_balanced_however_often_it_is
     assert len(run.landings) >= 3
     assert run.landed == pytest.approx(
         np.sqrt(2 * 0.4 / GRAVITY), rel=0.01
-    )  # damping brakes the fall a little
+    )  # damping slows the fall a little
     assert run.released is None
     start, end = run.landings[0][1], run.landings[1][0]
     flying = (run.time > start + INTERVAL) & (run.time < end - INTERVAL)
@@ -148,7 +150,7 @@ def test_momentum_and_angular_momentum_change_by_the_impulses_alone(
 def test_the_switch_to_rigid_keeps_both_momenta_and_loses_kinetic_energy(
     tr: float,
 ) -> None:
-    motion = at(tr)
+    motion = copy_at(tr)
     motion.box.forces(motion.places)  # yields where it does at this step
     momenta_before, energy = momenta(motion), motion.box.internal_energy(motion.places)
     kinetic = float(motion.structure.masses @ np.abs(motion.velocities) ** 2) / 2
@@ -165,7 +167,7 @@ def test_the_switch_to_rigid_keeps_both_momenta_and_loses_kinetic_energy(
 def test_the_switch_back_keeps_both_momenta_and_the_frozen_energy_comes_back(
     tr: float, rigid: float
 ) -> None:
-    motion = at(tr)
+    motion = copy_at(tr)
     motion.make_rigid()
     frozen, pulls = (
         motion.box.internal_energy(motion.places),
@@ -192,7 +194,7 @@ def test_the_switch_back_keeps_both_momenta_and_the_frozen_energy_comes_back(
 def test_a_rigid_phase_of_no_length_takes_the_vibration_velocity_and_nothing_else(
     tr: float,
 ) -> None:
-    motion, untouched = at(tr), at(tr)
+    motion, untouched = copy_at(tr), copy_at(tr)
     motion.make_rigid()
     motion.make_deformable()
     np.testing.assert_array_equal(motion.places, untouched.places)
@@ -366,7 +368,7 @@ def test_the_cushion_is_crushed_for_good_at_its_force_until_it_is_solid() -> Non
 
 
 def test_contact_sleeps_in_the_flight_and_misses_nothing() -> None:
-    motion, awake = at(0.1), at(0.1)
+    motion, awake = copy_at(0.1), copy_at(0.1)
     for _ in range(motion.step_at(0.32)):
         awake.contact._sleeps_until = 0.0
         for run in (motion, awake):
@@ -388,7 +390,7 @@ def test_the_mean_energy_of_a_scan_and_its_errors_are_those_of_single_runs() -> 
 
 
 def test_a_run_goes_on_from_a_copy_as_it_would_have() -> None:
-    motion = at(0.08)
+    motion = copy_at(0.08)
     twin = motion.copy()
     assert proceed(twin, 0.12).roll.tolist() == proceed(motion, 0.12).roll.tolist()
 
@@ -429,7 +431,7 @@ def test_what_is_no_model_or_no_window_is_refused() -> None:
 
 @pytest.mark.slow
 def test_the_strength_of_the_roof_acts_after_the_landing_alone() -> None:
-    """It yields when it hits the ground; up to there the run is the same to the last digit."""
+    """The roof yields when it hits the ground; until then the run is the same to the last digit."""
     base, weak = (
         simulate(Parameters(mesh=8, roof_strength=share), 0.42) for share in (1.0, 0.7)
     )

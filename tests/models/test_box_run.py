@@ -1,4 +1,4 @@
-"""The tool on twenty-one structures of many modes: what it recommends, against what happens at every tr."""
+"""The recommendations for twenty-one structures of many modes, compared with a scan over tr."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +12,7 @@ from tests.energies import sure
 from tests.faults import some
 from tests.rehearsals import SETS, rehearse
 
-# The suite takes coarse boxes; tests/benchmarks/rollover.py runs the sets as they are.
+# The suite uses coarse boxes; tests/benchmarks/rollover.py runs the original sets.
 MESH, INTERVAL, EVERY = 4, 3e-4, 18
 
 

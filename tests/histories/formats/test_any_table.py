@@ -1,4 +1,4 @@
-"""Tables as colleagues, spreadsheets and postprocessors write them, which pandas reads with the right options."""
+"""Tables as users, spreadsheets and postprocessors write them; pandas reads them with the right options."""
 
 import io
 from collections.abc import Iterator, Sequence
@@ -14,7 +14,9 @@ from tests.reading import history_of
 
 STATES = 40
 TIME = np.arange(STATES) * 0.25
-ENERGY = np.round(1200 * (1 - np.cos(TIME)) + 0.5, 3)  # up to 2400: thousands matter
+ENERGY = np.round(
+    1200 * (1 - np.cos(TIME)) + 0.5, 3
+)  # values up to 2400, so that there are thousands separators
 KINETIC = np.round(5000 - ENERGY, 3)
 
 
@@ -187,7 +189,7 @@ def test_columns_without_numbers_are_left_out_with_a_note() -> None:
     )
     assert "holds no numbers" not in read_notes(
         lines("time,,IE", "{t},,{e}")
-    )  # nothing stands there
+    )  # an empty cell
 
 
 @pytest.mark.parametrize("hole", ["#NV", "", "n/a", "-"])
@@ -216,7 +218,7 @@ def test_a_hole_in_the_energy_is_refused_with_its_line() -> None:
         (
             "time;IE\n0,001;1.234\n0,002;1.235\n0,003;1.236\n",
             "1.234",
-        ),  # thousands, or another decimal sign?
+        ),  # a thousands separator or a decimal sign: this cannot be known
         ("time;IE\n1.001;12,5\n1.002;12,6\n1.003;12,7\n", "1.001|12,5"),
         (
             "time,IE\n0.0 ms,0.5 mJ\n0.1 ms,0.6 mJ\n",
@@ -294,7 +296,9 @@ def test_the_globals_of_th_to_csv_are_sure_below_a_name_too_many_or_too_few(
     assert (history.energy[0], history.channel) == (1.0, "INTERNAL ENERGY")
     assert history.balance is not None
     assert history.balance.kinetic is not None
-    assert history.balance.kinetic[0] == 2.0 + 8.0  # with rotation
+    assert (
+        history.balance.kinetic[0] == 2.0 + 8.0
+    )  # kinetic energy with the rotation energy
     assert [momenta.values[0, 0].tolist() for momenta in history.momenta] == [
         [3.0, 4.0, 5.0]
     ]

@@ -1,4 +1,4 @@
-"""binout: made files of every style."""
+"""binout: made-up files in every form of the format."""
 
 from collections.abc import Sequence
 from itertools import product
@@ -69,7 +69,7 @@ def test_any_style_gives_the_numbers_that_were_written(
 
 
 def test_a_branch_that_is_written_seldom_keeps_its_states() -> None:
-    """Between two of its states those of the other branch repeat."""
+    """Between two states of one branch, states of the other branch repeat."""
     run = open_binout(made_binout(range(1, 301), matsum_every=100))
     assert run.time.tolist() == expected("time", range(1, 301))
     assert run.part_time.tolist() == expected("time", (100, 200, 300))
@@ -93,7 +93,7 @@ def test_numbers_of_more_digits_go_on_after_999_999() -> None:
 
 
 def test_a_number_left_out_inside_a_file_says_that_records_are_lost() -> None:
-    """What then seems to be one state may be made of two."""
+    """What seems to be one state may then be made of two."""
     run = open_binout(made_binout([1, 2, 3, 5, 6]))
     assert not run.complete
     with pytest.raises(
@@ -117,7 +117,7 @@ def test_states_written_again_by_a_restart_replace_the_older_leg() -> None:
 
 @pytest.mark.parametrize("again", [4, 3])
 def test_a_restart_that_numbers_its_states_anew_goes_on_in_time(again: int) -> None:
-    """Its first state is the one after, or the same as, the last one of the leg before."""
+    """The first state of a leg is the last state of the leg before, or the one after it."""
     first, second = made_binout([1, 2, 3]), made_binout([1, 2, 3], shift=again - 1)
     (leg,) = binout.open_legs(
         [

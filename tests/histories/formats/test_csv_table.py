@@ -468,7 +468,7 @@ ROWS = [
     '{},"1.5"',
     "{}",
 ]
-# With a comma and a point as they stand, whatever the table takes them for.
+# With comma and point as in the file, whatever they mean in the table.
 CELLS = [
     "1_0",
     "0x10",
@@ -497,7 +497,7 @@ LINES = [
 
 
 def in_pieces(data: bytes | OnDisk, size: int) -> object:
-    """States of a table that is read in pieces of so many bytes, or what is wrong with it."""
+    """Return the states of a table read in pieces of this size, or its error."""
     try:
         sized = type("Sized", (Text,), {"piece": size, "large": size})
         table = csv_table.Table(sized(Source("table", data)), Selection())
@@ -529,9 +529,9 @@ def in_pieces(data: bytes | OnDisk, size: int) -> object:
 def test_rows_read_piece_by_piece_or_from_the_disk_are_those_read_line_by_line(
     file: Path, lines: list[str], form: tuple[str, str], tail: str, encoding: str
 ) -> None:
-    good = (
-        ["{0},{0}.5"] * 3
-    )  # before and behind: times that step back would hide what is wrong with a cell
+    good = [
+        "{0},{0}.5"
+    ] * 3  # on both sides, since times that step back would hide the error of a cell
     numbered = [
         line.format(number) for number, line in enumerate([*good, *lines, *good])
     ]
@@ -544,7 +544,7 @@ def test_rows_read_piece_by_piece_or_from_the_disk_are_those_read_line_by_line(
     ).encode(encoding)
     one_by_one = data + '# "\n'.encode(encoding).removeprefix(
         b"\xff\xfe"
-    )  # a quote may hold a separator
+    )  # a quoted cell may contain a separator
     tables = [
         in_pieces(*arguments)
         for arguments in ((data, 8), (data, 1 << 17), (one_by_one, 1 << 17))
@@ -645,7 +645,7 @@ def test_precision_is_read_off_the_text(
 
 finite = st.floats(
     -1e149, 1e149, allow_subnormal=False
-)  # a history holds no energies beyond 1e150
+)  # a history may not contain energies above 1e150
 FORMS = [
     (",", "."),
     (";", "."),
@@ -736,12 +736,12 @@ def test_a_table_cut_inside_its_first_row_has_that_row_or_none(
 @pytest.mark.parametrize(
     ("rows", "states"),
     [
-        ("0,1.00\n1,2.50\n2,3.75", 3),  # two decimals, as always
+        ("0,1.00\n1,2.50\n2,3.75", 3),  # always two decimals, so the number is whole
         ("0,1.00\n1,2.50\n2,3.7", 2),
-        ("0,1.25\n1,2.75\n2,3.75", 2),  # may be %g, and the value 3.751
+        ("0,1.25\n1,2.75\n2,3.75", 2),  # the format may be %g, and the value 3.751
         ("0,1.00e+00\n1,2.50e+00\n2,3.75e-01", 3),
         ("0,1.00e+00\n1,2.50e+00\n2,3.75e-1", 2),
-        ("0,1.00e+00\n1,2.50e+00\n2,3.75e-10", 2),  # may be e-100
+        ("0,1.00e+00\n1,2.50e+00\n2,3.75e-10", 2),  # may be cut from e-100
         ("0,1\n1,2\n2,3", 2),
         ("0,1,\n1,2,\n2,3,", 3),
         ("time,IE,KE\n0,1,9\n1,2,9\n2,3,", 3),

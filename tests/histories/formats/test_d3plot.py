@@ -1,4 +1,4 @@
-"""d3plot and d3thdt, as the writer of the tests writes them."""
+"""d3plot and d3thdt files made by the writer of the tests."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def open_family(folder: Path, files: Mapping[str, bytes]) -> Run:
 def assert_holds(
     run: Run, expected: list[State], ids: tuple[int, ...] = (7, 3)
 ) -> None:
-    """All that the states tell, in the precision of the file."""
+    """Assert that a run has these states, in the precision of the file."""
     (database,) = run.databases
     rounded = np.float32 if database.precisions(())[0].digits == 7 else np.float64
 
@@ -181,7 +181,7 @@ def test_a_restart_writes_states_anew_and_the_newer_count(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("name", ["R712", " R12"])
 def test_rigid_walls_have_their_forces(name: str, tmp_path: Path) -> None:
-    """Of all releases that are named so the number says 960, and their walls have places all the same."""
+    """All releases with such a name have the number 960, yet the states contain positions of rigid walls."""
     run = open_family(
         tmp_path, D3plotWriter(walls=2, name=name).written(states(TIMES, walls=2), 2)
     )
@@ -192,7 +192,7 @@ def test_rigid_walls_have_their_forces(name: str, tmp_path: Path) -> None:
 
 
 def test_parts_that_were_deleted_keep_their_place(tmp_path: Path) -> None:
-    """A deleted part has neither mass nor energy, whatever velocity is left of it."""
+    """A deleted part has neither mass nor energy, even if the file still has a velocity of it."""
     gone = State(
         2.5,
         [4.0, 0.0],
@@ -207,7 +207,7 @@ def test_parts_that_were_deleted_keep_their_place(tmp_path: Path) -> None:
     assert run.databases[0].part_channel("x_momentum", [3])[-1, 0] == 0
 
 
-# What the geometry and the states may have besides: control words, sections, and more words of a state.
+# Optional contents of a d3plot: control words, sections of the geometry, and further words of a state.
 LAYOUTS = {
     "rigid shells": ({"ndim": 5, "maxint": 3}, {"control": [1, 2, 24, 20]}, -9),
     "fluid materials": ({"ialemat": 2}, {"control": [1, 2]}, 0),
@@ -269,7 +269,7 @@ def test_a_d3thdt_is_read_by_itself_and_before_a_d3plot(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("release", [960.0, 971.0])
 def test_older_files_have_fewer_values(release: float, tmp_path: Path) -> None:
-    """Before 971 a rigid wall has its force alone; still older files have no hourglass energy of parts."""
+    """Before release 971 a rigid wall has only its force; even older files have no hourglass energy of parts."""
     old_states = [
         State(
             **{
@@ -328,7 +328,7 @@ def test_times_that_are_none_are_refused(tmp_path: Path) -> None:
     files = D3plotWriter(more_of_state=5).written(STATES, 5)
     files["d3plot01"] = files["d3plot01"].rstrip(b"\0")[
         :-4
-    ]  # without the mark, which would tell
+    ]  # without the end mark, by which the wrong length of the states would be found first
     with pytest.raises(
         FormatError,
         match=r"d3plot01: a state was expected at byte \d+, with a time above that of the state",

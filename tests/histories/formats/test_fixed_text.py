@@ -1,4 +1,4 @@
-"""Numbers taken while blocks are compared are those that are fetched by themselves, in damaged files too."""
+"""Numbers copied while blocks are compared are those that are read alone, in damaged files too."""
 
 import re
 from collections.abc import Callable
@@ -15,12 +15,12 @@ from d2rpick.histories.formats.matsum import Matsum
 from tests.text_files import HEAD, glstat_blocks, glstat_text, matsum_text
 
 IDS = [1, 20, 300]
-Sizes = dict[str, int]  # how many blocks and numbers are looked at together
+Sizes = dict[str, int]  # numbers of blocks and fields that are read together
 
 
 @st.composite
 def damaged(draw: st.DrawFn, *, parts: bool) -> bytes:
-    """States of which some numbers never change, with a few bytes replaced, lost or put in; maybe cut."""
+    """States of which some numbers never change, with a few bytes replaced, lost or inserted, and perhaps cut."""
     states = draw(st.integers(1, 12))
     energies = np.random.default_rng(draw(st.integers(0, 99))).normal(
         size=(states, len(IDS))
@@ -69,14 +69,14 @@ def energies_of_parts(data: bytes, sizes: Sizes) -> tuple[bytes, ...]:
 def answer(
     read: Callable[[bytes, Sizes], tuple[bytes, ...]], data: bytes, sizes: Sizes
 ) -> object:
-    """What is read; None where it is refused, for whichever of several damages."""
+    """Return what is read; None if it is refused, for any of the damages."""
     try:
         return read(data, sizes)
     except FormatError:
         return None
 
 
-# Where these blocks are many, numbers are taken ahead.
+# Numbers are copied in advance only from runs of many blocks.
 SIZES = st.fixed_dictionaries({"many": st.integers(1, 4), "batch": st.integers(1, 12)})
 
 
@@ -91,7 +91,7 @@ def test_numbers_of_a_matsum(data: bytes, sizes: Sizes) -> None:
 
 
 class Noted(Content):
-    """Bytes that remember how many fields were taken out of them."""
+    """A content that counts how many fields are read from it."""
 
     taken = 0
 
@@ -107,7 +107,7 @@ def test_what_is_taken_ahead_is_not_fetched() -> None:
     assert run.channel("internal energy").tolist() == (states**2).tolist()
     assert (
         data.taken == 4
-    )  # of the springs, which never change, and of the last state, behind which no other begins
+    )  # numbers of the springs, which never change, and of the last state, which no other follows
 
 
 def test_all_other_columns_are_read_in_one_pass_and_a_damaged_one_is_refused_alone() -> (

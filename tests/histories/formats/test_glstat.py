@@ -298,7 +298,7 @@ def test_a_file_cut_anywhere_never_yields_a_wrong_number(energy: str) -> None:
         states_read = states_of(history)
         assert states_read == expected[: len(states_read)]
         outcomes.add(len(states_read))
-        # All that lies between two whole lines is told from a whole file by nothing but the missing lines.
+        # A file cut between two lines differs from a whole file only by the missing lines.
         assert not history.complete or whole[:cut].rstrip(b" ").endswith(b"\n")
         assert history.complete or history.notes
     assert outcomes == {"error", 1, 2, 3}
@@ -363,7 +363,7 @@ def test_recognised_by_content(head: str, expected: bool) -> None:
 
 
 def assert_numbers_of_float(data: bytes, name: str) -> None:
-    """All numbers of a glstat are those that ``float`` reads in its columns."""
+    """Return all numbers of a glstat as ``float`` reads them from its columns."""
     run = glstat.Glstat(data, name)
     written: dict[str, list[float]] = {}
     for text in data.decode("latin-1").split("\n"):

@@ -46,7 +46,7 @@ def open_saved_binout(file: io.BytesIO) -> SavedBinout:
 
 
 def make_file(columns: Mapping[str, object]) -> io.BytesIO:
-    """A file of these columns by their paths."""
+    """Return an HDF5 file with these columns by their paths."""
 
     def write(file: h5py.File) -> None:
         for name, values in columns.items():
@@ -234,7 +234,7 @@ SMALL = {
 
 
 def check(layout: str, faults: list[Fault]) -> None:
-    """What can be read of a damaged file must be the numbers that h5py finds at the path."""
+    """Assert that all numbers read from a damaged file are those that h5py finds at their paths."""
     data = damage(SMALL[layout], faults, [])
     group = {"plain": "/", "compound": "/", "lasso": "glstat"}[layout]
     try:
@@ -301,14 +301,14 @@ def test_chunks_that_were_never_written_are_no_zeros() -> None:
 
 
 def odd_float() -> h5py.h5t.TypeFloatID:
-    """A double whose exponents count from elsewhere: all its numbers are four times as large."""
+    """A double with another exponent bias: all its numbers are four times as large."""
     kind = h5py.h5t.IEEE_F64LE.copy()
     kind.set_ebias(1021)
     return kind
 
 
 def odd_integer() -> h5py.h5t.TypeIntegerID:
-    """An integer of which only 24 bits count."""
+    """A damaged integer type with only 24 significant bits."""
     kind = h5py.h5t.STD_I32LE.copy()
     kind.set_precision(24)
     return kind
@@ -374,7 +374,7 @@ def test_a_flipped_bit_in_data_with_a_checksum_is_refused() -> None:
 
 
 class Fatal(io.BytesIO):
-    """A file on which the library crashes when it reads it."""
+    """A damaged file on which the library crashes."""
 
     def readinto(self, _: object) -> int:
         os.kill(os.getpid(), signal.SIGSEGV)
@@ -382,7 +382,7 @@ class Fatal(io.BytesIO):
 
 
 class Endless(io.BytesIO):
-    """A file that the library reads without end."""
+    """A damaged file whose reading by the library never ends."""
 
     def readinto(self, _: object) -> int:
         while True:

@@ -21,7 +21,7 @@ LUMPED = matsum_part(0, 0.0, lines=3)
 STATES = [
     matsum_state(time, IDS, row) for time, row in zip(TIMES, ENERGIES, strict=True)
 ]
-LONG = 150  # states, enough to remember what differs between them
+LONG = 150  # states; from so many on, the reader remembers which bytes differ between blocks
 BEHIND_HEAD = TEXT.index(b"{BEGIN")
 
 
@@ -75,7 +75,7 @@ def test_every_form_gives_the_same_numbers(text: bytes) -> None:
 def test_parts_swapped_within_blocks_of_one_size_are_not_shifted(
     order: tuple[int, ...],
 ) -> None:
-    """States look alike from their time lines, and at both ends; only when a part is read does the difference show."""
+    """States have the same time lines and are alike at both ends; the difference shows only when a part is read."""
     ids, indices = [11, 12, 13, *range(20, 30)], [*order, *range(3, 13)]
     energies = np.arange(8 * 13.0).reshape(8, 13)
     states = [matsum_state(time, ids, row) for time, row in enumerate(energies)]
@@ -177,7 +177,7 @@ def test_id_that_pushes_its_line() -> None:
     [b"=    1             i", b"=   10            i", b"=   1 0             i"],
 )
 def test_damaged_id_makes_no_other_part(id_text: bytes) -> None:
-    """A digit or a blank lost, or one put in: the columns no longer fit."""
+    """If a digit or a blank is lost or inserted, the columns do not fit any more."""
     damaged = STATES[2].replace(
         b"=   10             i", id_text.replace(b"    1 ", b"   1 ")
     )
@@ -195,7 +195,7 @@ def test_damaged_id_makes_no_other_part(id_text: bytes) -> None:
 def test_numbers_that_are_the_same_in_most_states(
     changed: int | None, swapped: bool
 ) -> None:
-    """Whether a number changes in no state, in one or in all, each state has its own."""
+    """Each state has its own number, whether the number changes in no state, in one or in all."""
     times, ids = np.arange(LONG) / 8, [11, 12, 13, 14]
     energies = np.tile([0.0, -0.0, 2.5, 0.0], (LONG, 1))
     energies[:, 3] = np.arange(LONG)
@@ -209,7 +209,7 @@ def test_numbers_that_are_the_same_in_most_states(
     run = read_matsum(matsum_head(ids) + b"".join(states))
     for _ in range(
         2
-    ):  # the whole file is compared when it is asked for the second time, if not before
+    ):  # at the second request at the latest, the whole file is compared
         for chosen in ([11], [12, 13], ids, ids[:3]):
             energies_of_chosen = run.part_channel("internal_energy", chosen)
             assert (

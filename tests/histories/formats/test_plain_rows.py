@@ -1,4 +1,4 @@
-"""An exact reader of many numbers at once is trusted only as far as one that rounds agrees with it."""
+"""Numbers of the exact reader are used only if a reader that rounds agrees with them."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ HARD = st.floats(-1e300, 1e300).map(repr) | st.from_regex(
 
 
 def rounded(texts: list[list[str]]) -> Samples:
-    """What a reader that rounds makes of numbers."""
+    """Return numbers as a reader that rounds would."""
     return np.array([[float(text) * (1 + 1e-12) for text in row] for row in texts])
 
 

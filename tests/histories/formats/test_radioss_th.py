@@ -1,4 +1,4 @@
-"""Radioss T01, binary and as text: computed runs against other readings, made files of every age, damaged texts."""
+"""Radioss T01, binary and text: computed runs compared with other readers, made-up files of every age, damaged text."""
 
 from collections.abc import Callable
 
@@ -158,7 +158,7 @@ def test_something_else_is_not_recognised_and_refused(head: bytes) -> None:
         open_history(head)
 
 
-# As text.
+# Return the same time history as text.
 
 
 def test_numbers_of_a_record_that_five_columns_do_not_count() -> None:

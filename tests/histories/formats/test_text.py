@@ -1,4 +1,4 @@
-"""The lines of a text, of a big one that stays on its disk as of one in memory."""
+"""The lines of a text are the same for a large file on disk and for bytes in memory."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -20,19 +20,19 @@ CONTENTS = st.lists(
 
 
 class Small(Text):
-    """A text of which little is looked at together."""
+    """A text that is read in very small pieces."""
 
     top, piece, short, some = 5, 16, 32, 3
 
 
 class Narrow(InPieces):
-    """Bytes of which hardly any are read together."""
+    """A file on disk that is read in very small blocks."""
 
     gap, window = 8, 16
 
 
 def on_a_disk(file: Path) -> Text:
-    """A text that stays on its disk and is taken apart in small pieces."""
+    """A text on disk that is read in small pieces."""
     return Small(Source("text", on_disk(file, Narrow)))
 
 
@@ -72,7 +72,7 @@ def test_a_text_has_its_lines_from_a_disk_and_from_memory(
 
 def test_a_big_plain_text_is_not_taken_into_memory(tmp_path: Path) -> None:
     class TooBig(OnDisk):
-        """A file that the memory does not hold."""
+        """A file on disk that must not be read into memory as a whole."""
 
         def __bytes__(self) -> bytes:
             raise MemoryError
