@@ -301,7 +301,7 @@ def _block_means(spectrum: Spectrum, time: Samples, grid: Grid) -> Samples:
 def _split(
     poles: Complex, span: float, *, every_decay: bool
 ) -> tuple[Complex, Complex]:
-    """Tell the poles of lines from those of the mean: a constant, a few decays, and swings slower than the record."""
+    """Separate the poles of lines from those of the mean: a constant, a few decays, and very slow swings."""
     decay = np.maximum(-poles.real, -_MOST_GROWTH / span)
     rate = poles.imag
     turns = rate * span / (2 * np.pi)
