@@ -267,7 +267,7 @@ def plan(
     >>> import d2rpick as d2
     >>> found = d2.plan(d2.read("sample_data/rollover_box.matsum"), parts="flying")
     >>> [(round(tr, 3), round(td, 3)) for tr, td in found.windows]
-    [(0.143, 0.345)]
+    [(0.124, 0.37)]
     """
     shortest = arguments.optional("min_rigid", min_rigid, NOT_NEGATIVE)
     windows = arguments.pairs("done", done)

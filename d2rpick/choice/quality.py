@@ -34,6 +34,9 @@ EQUALLY_GOOD = 0.02
 LIKE_LEVELS = TOLERATED_GROWTH
 # Level error that rounding leaves of a crossing at most, of a level above this share of the highest energy.
 ROUNDING: Final = 1e-3
+# Errors are compared to so many decimals.  Pairs of equal error, as on all swings of one mode, differ in the last
+# digits by how the numbers were written: those would decide which pair comes first.
+_DECIMALS: Final = 4
 # Rigid times within this share of the longest are alike: there a body that stays in place is worth more.
 _LIKE_TIMES = 0.1
 
@@ -88,6 +91,7 @@ def order(
     Of these come the longest rigid times first, but behind those within a tenth of the longest those that are ``off``.
     The others follow by error.
     """
+    error = np.round(error, _DECIMALS)
     good = error <= (_extreme(np.minimum, group, error, room.size) + room)[group]
     longest = _extreme(np.maximum, group, np.where(good, rigid, -np.inf), room.size)
     near = good & (rigid >= (1 - _LIKE_TIMES) * longest[group])
@@ -121,7 +125,7 @@ def over_limits(situation: Situation, candidate: Candidate) -> tuple[str, ...]:
 
 
 # Of the vibration [-]: a good pair keeps what the tolerance on tr asks for by default.
-_MOST_GOOD = 0.2
+MOST_GOOD = 0.2
 # What a further mode may make of it at most in a good pair: a good grade is a promise.
 _MOST_HIDDEN: Final = 0.3
 # Of the standard deviation: an energy passes its mean when it gets so far beyond it; noise near it does not count.
@@ -179,7 +183,7 @@ def grade_of_residual(residual: float) -> str:
     """
     if residual > POOR_RESIDUAL:
         return POOR
-    return FAIR if residual > _MOST_GOOD else GOOD
+    return FAIR if residual > MOST_GOOD else GOOD
 
 
 class Quality(NamedTuple):
@@ -326,7 +330,7 @@ def _is_loose(best: Candidate) -> bool:
     if best.tr_high is None or best.timing_tolerance is None:
         return False
     return (
-        TOLERATED_GROWTH * (best.tr_high - best.tr) > _MOST_GOOD * best.timing_tolerance
+        TOLERATED_GROWTH * (best.tr_high - best.tr) > MOST_GOOD * best.timing_tolerance
     )
 
 
@@ -335,7 +339,7 @@ def _fair(situation: Situation, best: Candidate) -> list[Cause]:
         return []
     high = best.residual_high or best.residual
     causes = []
-    if best.residual > _MOST_GOOD:
+    if best.residual > MOST_GOOD:
         worst = f", perhaps by up to {high:.0%}" if high > _MOST_HIDDEN else ""
         causes.append(
             Cause(
@@ -350,7 +354,7 @@ def _fair(situation: Situation, best: Candidate) -> list[Cause]:
                 _way_to_the_modes(situation),
             )
         )
-    if best.residual <= _MOST_GOOD and _is_loose(best):
+    if best.residual <= MOST_GOOD and _is_loose(best):
         reach = (best.tr_high or best.tr) - best.tr
         causes.append(
             Cause(

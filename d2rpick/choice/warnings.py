@@ -89,7 +89,9 @@ def _of_parts(situation: Situation) -> Iterator[Caution]:
     vibration = situation.vibration
     states = situation.evidence.states_per_period
     if vibration.basis == "modal" and states is not None and states < _FEW_STATES:
-        found = f"the fastest strong vibration of the energy has {states:.2g} states per period"
+        found = (
+            f"the fastest vibration in the energy has {states:.2g} states per period"
+        )
         yield Caution(
             "coarse-record",
             f"{found}, and a still faster one is not seen; let the run write more states",
@@ -151,6 +153,8 @@ def _of_grazing(situation: Situation) -> Iterator[Caution]:
     ):
         return
     grazed = f"the force of the contact at {flight.end:.6g} stays below 1 % of the largest one at first"
+    if margin.grazing == "momentum":
+        grazed = f"the contact at {flight.end:.6g} takes less than 10 % of the momentum towards it"
     early = min(margin.time, flight.end - flight.start)
     moved = f"the body grazes it, and if it is out of place at td, that contact comes up to {early:.2g} earlier"
     kept = (

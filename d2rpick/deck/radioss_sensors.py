@@ -1,9 +1,9 @@
-"""Sensors of times: when they are active over the legs of a Radioss run.
+"""Find when the sensors of a Radioss run are active.
 
-A rigid body with a sensor is deformable while that is active and rigid while it is not, whatever /RBODY/ON and OFF say.
-Source: Altair's public help for /SENSOR and /RBODY, the published source of OpenRadioss at bd4557ba7 (sensor_time.F,
-sensor_init.F, rbyonf.F), and runs computed with it: Tstop has a line of its own, and is read in every version of the
-format; the delay of a sensor of others has no effect.
+A rigid body with a sensor is deformable while the sensor is active, and rigid while it is not, whatever /RBODY/ON and
+/RBODY/OFF say. Source: Altair's public help for /SENSOR and /RBODY, the published source of OpenRadioss at bd4557ba7
+(sensor_time.F, sensor_init.F, rbyonf.F), and runs computed with it: Tstop has a line of its own, and is read in every
+version of the format; the delay of a sensor with other sensors as input has no effect.
 """
 
 from __future__ import annotations
@@ -17,28 +17,42 @@ from d2rpick.deck.card import Row
 from d2rpick.deck.radioss_deck import Starter, below_title, reals
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     Spans = tuple[tuple[float, float], ...]  # of time
+    # When the force of an interface or rigid wall acts, by its kind and number; None where that is not known.
+    Forces = Callable[[str, int], Spans | None]
 
-STOPS_SINCE: Final = (
-    2023  # version of the format in whose description a sensor of time has an end
-)
-NEVER: Final = 1e20
-_OF_FORCES: Final = ("INTER", "RWALL")
-# Ties, fluids, and parts of other contacts: they push nothing that flies.
+# Input version from which a time sensor has an end (Tstop).
+STOPS_SINCE: Final = 2023
+NEVER: Final = 1e20  # times from here on never come
+# Kinds of force sensors, with the name that histories use for what exerts the force.
+_OF_FORCES: Final = {"INTER": "interface", "RWALL": "rigid wall"}
+# Types of /INTER without contact force on a flying body: ties, fluids, and parts of other contacts.
 WITHOUT_FORCE: Final = {"TYPE1", "TYPE2", "TYPE9", "TYPE12", "TYPE18", "SUB"}
 _WIDTH: Final = 10
+_SINGLE: Final = (
+    1e-6  # relative rounding of the times in a T01 file, which have seven digits
+)
 
 
 class Course(NamedTuple):
-    """What is known of a run: when sensors are reset for the first time, by number, and when something pushes [time].
+    """Known course of a run.
 
-    ``contacts`` are spans of the only contact or rigid wall of the deck; None where no history shows them.
+    The time of the first reset of each sensor, and the spans in which contact forces act [time].
+
+    ``contacts`` are the spans of the only contact or rigid wall of the deck; None if no history shows them. ``forces``
+    returns the spans of one contact or wall from its written force, and is preferred.
     """
 
     resets: Mapping[int, float] = MappingProxyType({})
     contacts: Spans | None = None
+    forces: Forces | None = None
+
+    def find_contacts(self, kind: str, number: int) -> Spans | None:
+        """Return the spans in which an interface or rigid wall has a force [time]; None if no history shows them."""
+        written = self.forces(kind, number) if self.forces else None
+        return self.contacts if written is None else written
 
 
 _UNKNOWN: Final = Course()
@@ -58,7 +72,8 @@ def active_spans(
     card = starter.sensors.get(number)
     if card is None or number in above:
         return f"sensor {number}, which {'asks for itself' if card else 'the deck has not'}"
-    rows, kind = below_title(card), card.words[1]
+    rows = below_title(card)
+    kind = card.words[1]
     if kind in _OF_FORCES:
         return _while_pushed(starter, number, rows, course)
     if kind not in ("TIME", "OR", "AND", "NOT"):
@@ -74,16 +89,27 @@ def active_spans(
         return ((max(delay, 0.0), stop),) if delay < stop else ()
     if len(rows) < 2:
         return f"sensor {number}, which names no other"
-    asked = [card.integer(rows[1], at).value for at in range(1 if kind == "NOT" else 2)]
-    found = [active_spans(starter, one, course, (*above, number)) for one in asked]
-    for one in found:
-        if isinstance(one, str):
-            return f"sensor {number}, of {one}"
-    known = [one for one in found if not isinstance(one, str)]
+    input_ids = [
+        card.integer(rows[1], at).value for at in range(1 if kind == "NOT" else 2)
+    ]
+    spans_of_inputs = [
+        active_spans(starter, sensor_input, course, (*above, number))
+        for sensor_input in input_ids
+    ]
+    for sensor_input in spans_of_inputs:
+        if isinstance(sensor_input, str):
+            return f"sensor {number}, of {sensor_input}"
+    known_spans = [
+        sensor_input
+        for sensor_input in spans_of_inputs
+        if not isinstance(sensor_input, str)
+    ]
     if kind == "OR":
-        return either(known)
+        return either(known_spans)
     return inactive(
-        either([inactive(one) for one in known]) if kind == "AND" else known[0]
+        either([inactive(sensor_input) for sensor_input in known_spans])
+        if kind == "AND"
+        else known_spans[0]
     )
 
 
@@ -91,8 +117,13 @@ def _while_pushed(
     starter: Starter, number: int, rows: Sequence[Row], course: Course
 ) -> Spans | str:
     """Follow a sensor of any force: active from the force on, or Tmin later, to Tdelay after it."""
-    name = f"sensor {number} (/SENSOR/{starter.sensors[number].words[1]}), which waits for a force"
-    if course.contacts is None or len(rows) < 2:
+    keyword = starter.sensors[number].words[1]
+    name = f"sensor {number} (/SENSOR/{keyword}), which waits for a force"
+    if len(rows) < 2:
+        return name
+    entity = starter.sensors[number].integer(rows[1], 0).value
+    contacts = course.find_contacts(_OF_FORCES[keyword], entity)
+    if contacts is None:
         return name
     lowest, highest, needed = reals(
         Row(rows[1].block, rows[1].distance, rows[1].text[2 * _WIDTH :], _WIDTH), 3
@@ -105,36 +136,44 @@ def _while_pushed(
     return either(
         [
             tuple(
-                (start + needed, end + wait)
-                for start, end in course.contacts
+                (start + needed, (end + wait) * (1 + _SINGLE))
+                for start, end in contacts
                 if end - start >= needed
             )
         ]
     )
 
 
-def waits_for_force(starter: Starter, number: int) -> bool:
-    """Whether a sensor, or one that it asks for, waits for a force."""
-    asked = reached([number], lambda one: _asked(starter, one))
-    return any(
-        one in starter.sensors and starter.sensors[one].words[1] in _OF_FORCES
-        for one in asked
-    )
+def find_contacts_of_sensor(
+    starter: Starter, number: int, course: Course
+) -> Spans | None:
+    """Return when the forces act for which a sensor, or one of its inputs, waits [time].
+
+    None if it waits for none, or if no history shows it.
+    """
+    force_spans = []
+    for sensor in reached([number], lambda asking: _asked(starter, asking)):
+        card = starter.sensors.get(sensor)
+        rows = below_title(card) if card and card.words[1] in _OF_FORCES else ()
+        if card and len(rows) > 1:
+            kind = _OF_FORCES[card.words[1]]
+            entity = card.integer(rows[1], 0).value
+            force_spans.append(course.find_contacts(kind, entity))
+    spans = [contacts for contacts in force_spans if contacts is not None]
+    return either(spans) if spans else None
 
 
 def _asked(starter: Starter, number: int) -> Sequence[int]:
     """Sensors that another one asks for."""
     card = starter.sensors.get(number)
     rows = below_title(card) if card and card.words[1] in ("OR", "AND", "NOT") else ()
-    return (
-        [card.integer(rows[1], at).value for at in range(2)]
-        if card and len(rows) > 1
-        else []
-    )
+    if card and len(rows) > 1:
+        return [card.integer(rows[1], at).value for at in range(2)]
+    return []
 
 
 def only_force(starter: Starter) -> bool:
-    """Whether a deck has one contact or rigid wall that pushes: then what pushes by the momenta is that."""
+    """Return True if a deck has only one contact or rigid wall, so that the momenta show the force of that one."""
     contacts = [
         card
         for card in starter.named("INTER")
@@ -144,17 +183,18 @@ def only_force(starter: Starter) -> bool:
 
 
 def either(several: Sequence[Spans]) -> Spans:
-    """Spans in which one of several is active."""
+    """Return the spans in which at least one of several sensors is active."""
     joined: list[tuple[float, float]] = []
-    for start, stop in sorted(one for spans in several for one in spans):
+    for start, stop in sorted(span for spans in several for span in spans):
         if joined and start <= joined[-1][1]:
-            start, stop = joined[-1][0], max(stop, joined.pop()[1])
+            start = joined[-1][0]
+            stop = max(stop, joined.pop()[1])
         joined.append((start, stop))
     return tuple(joined)
 
 
 def inactive(spans: Spans) -> Spans:
-    """Spans between those in which a sensor is active."""
+    """Return the spans in which a sensor is not active."""
     ends = [0.0, *(end for span in spans for end in span), math.inf]
     pairs = zip(ends[::2], ends[1::2], strict=True)
     return tuple((start, stop) for start, stop in pairs if start < stop)

@@ -180,6 +180,7 @@ def as_sarif(checks: Checks, _: Shown) -> str:
             "id": rule.id,
             "shortDescription": {"text": rule.summary},
             "fullDescription": {"text": rule.explanation},
+            "help": {"text": f"Fix: {rule.fix}"},
             "defaultConfiguration": {"level": _SARIF[rule.severity]},
         }
         for rule in RULES.values()
@@ -357,6 +358,7 @@ def as_text(rule: Rule, width: int) -> str:
     title = f"{rule.id} ({rule.severity}): {rule.summary}"
     explained = wrap(rule.explanation, width, break_on_hyphens=False)
     lines = [tables.wrapped(title, width), "", *explained]
+    lines += ["", *wrap(f"Fix: {rule.fix}", width, break_on_hyphens=False)]
     for title, examples in (("Passes", rule.passing), ("Fails", rule.failing)):
         for example in examples:
             lines += ["", *_example(title, example, width)]

@@ -1,44 +1,50 @@
-"""Switches by the force of a contact or rigid wall, in a run whose history shows when something pushes.
+"""Evaluate switches by a contact or rigid-wall force over a history that shows when a contact force acts.
 
-Momenta show that something pushes, not what: a deck with several contacts and walls is not judged.
+Forces that the solver wrote show when each contact and wall acts.  Momenta show that a force acts on a part, not which
+contact exerts it: with momenta alone a deck with several contacts and walls is not judged.
 """
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 from d2rpick.deck.force_switching import ForceSwitch, follow_pair
 from d2rpick.deck.ls_dyna_parts import read_entities
 from d2rpick.deck.switching import Event, SwitchSet, Window
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from d2rpick.deck.card import Card
     from d2rpick.deck.reader import Deck
-    from d2rpick.deck.switching import Unit
-    from d2rpick.flight.contact_times import ContactTimes
+    from d2rpick.deck.switching import Header, Unit
     from d2rpick.rules.judgement import HistoryJudge
 
     Spans = tuple[tuple[float, float], ...]  # of time
 
+# By CODE, what has the force, and True if the set waits for a force, False if it waits until there is none.
 _CODES: Final = {
-    1: False,
-    2: False,
-    3: True,
-    4: True,
-}  # whether a set waits for a force
-_NEVER: Final = 1e20
-# A window of so much of the longest one is none that anybody wants.
+    1: ("rigid wall", False),
+    2: ("contact", False),
+    3: ("rigid wall", True),
+    4: ("contact", True),
+}
+_KEYWORDS: Final[Mapping[str, Literal["CONTACT", "RIGIDWALL"]]] = {
+    "contact": "CONTACT",
+    "rigid wall": "RIGIDWALL",
+}
+_NEVER: Final = 1e20  # TIME2 from which on there is no latest time
+# Windows below this fraction of the longest one are chatter, not flights.
 _SHORT: Final = 0.1
 
 
 class Forced(NamedTuple):
-    """A switch by force, or a pair of them, with its windows in the history, and when something pushes there [time].
+    """A switch by a force, or a pair of them, with its windows in the history and the spans of the contact force
+    [time].
 
-    ``place`` is the card that makes the parts rigid, ``cards`` are those of the pair; ``wait`` is what to call the time
-    that keeps it from switching.
+    ``place`` is the card that makes the parts rigid, ``cards`` are the cards of the pair.  ``wait`` is the name of the
+    time that delays the next switch (TIME3, or Tdelay of the sensor).  ``source`` names what shows the contacts.
     """
 
     place: Card
@@ -46,59 +52,152 @@ class Forced(NamedTuple):
     windows: tuple[Window, ...]
     contacts: Spans
     wait: str
+    source: str = "momenta"
 
     @property
     def times(self) -> list[tuple[float, float | None]]:
-        """Windows of its parts, each once, ascending."""
+        """Return the windows of its parts without duplicates, ascending."""
         return sorted(
-            {(one.tr, one.td) for one in self.windows}, key=lambda pair: pair[0]
+            {(window.tr, window.td) for window in self.windows},
+            key=lambda pair: pair[0],
         )
 
     @property
     def switches(self) -> int:
-        """How often it switches."""
+        """Return the number of switches in the history."""
         return sum(1 + (td is not None) for _, td in self.times)
 
     @property
     def lasting(self) -> list[tuple[float, float]]:
-        """Windows that are no chatter; the end of one that stays open is infinite."""
+        """Return the windows that are not chatter; a window that stays open ends at infinity."""
         closed = [(tr, math.inf if td is None else td) for tr, td in self.times]
         longest = max((td - tr for tr, td in closed if td < math.inf), default=0.0)
         return [(tr, td) for tr, td in closed if td - tr >= _SHORT * longest]
 
 
+class _Seen(NamedTuple):
+    """The contacts that a switch set sees [time], and what of the history shows them."""
+
+    contacts: Spans
+    source: str
+
+
 def follow_forced_switches(
     deck: Deck, events: Sequence[Event], judge: HistoryJudge, end: float
 ) -> Iterator[Forced]:
-    """Follow the sets of a deck of LS-DYNA that switch by force; none where the history does not show contacts."""
-    if not _has_one_force(deck):
-        return
+    """Yield the switches by a force in an LS-DYNA deck with their windows; nothing if the history shows no contacts."""
     by_card = {
-        event.by: [one for one in events if one.by is event.by] for event in events
+        event.by: [unit_event for unit_event in events if unit_event.by is event.by]
+        for event in events
     }
     waiting = {
-        card: made for card in by_card if (made := _read_waiting(card)) is not None
+        card: conditions
+        for card in by_card
+        if (conditions := _read_waiting(card)) is not None
     }
-    for there, rigid in waiting.items():
+    for rigid_card, rigid in waiting.items():
         if not rigid.to_rigid:
             continue
-        back = _find_pair(there, by_card, waiting)
+        back_card = _find_pair(rigid_card, by_card, waiting)
         windows: list[Window] = []
-        contacts: Spans = ()
-        for event in by_card[there]:
-            pushed = (
-                None if event.unit.part is None else judge.pushed([event.unit.part])
+        last_seen: _Seen | None = None
+        for event in by_card[rigid_card]:
+            seen_contacts = _see_contacts(deck, rigid_card, event.unit, judge)
+            if back_card:
+                seen_back = _see_contacts(deck, back_card, event.unit, judge)
+            else:
+                seen_back = seen_contacts
+            if seen_contacts is None or seen_back is None:
+                continue
+            last_seen = seen_contacts
+            closing = _find_event(event.unit, by_card[back_card]) if back_card else None
+            deformable = waiting[back_card] if back_card and closing else None
+            spans = follow_pair(
+                rigid, deformable, seen_contacts.contacts, end, seen_back.contacts
             )
-            if pushed is not None:
-                contacts = _shift_contacts(pushed, back)
-                windows += _follow_windows(event, back, by_card, waiting, contacts, end)
-        if windows:
-            cards = (there.card, back.card) if back else (there.card,)
-            yield Forced(there.card, cards, tuple(windows), contacts, "TIME3")
+            windows += (
+                Window(event.unit, tr, td, event, closing if td is not None else None)
+                for tr, td in spans
+            )
+        if last_seen:
+            cards = [rigid_card.card]
+            if back_card:
+                cards.append(back_card.card)
+            yield Forced(
+                rigid_card.card,
+                tuple(cards),
+                tuple(windows),
+                last_seen.contacts,
+                "TIME3",
+                last_seen.source,
+            )
+
+
+def _see_contacts(
+    deck: Deck, card: SwitchSet, unit: Unit, judge: HistoryJudge
+) -> _Seen | None:
+    """Return the contacts as a set sees them, from written forces, else from part momenta if the deck has one contact.
+
+    For a set with OFFSET a contact begins earlier, by the time to fly this distance.  None if the history does not show
+    the contacts, and for a contact whose force triggers no switch (D2R008).
+    """
+    header = card.header
+    if header is None or not _can_trigger(deck, header):
+        return None
+    pushed = None if unit.part is None else judge.pushed([unit.part])
+    kind, _ = _CODES[header.code.value]
+    by_force = find_spans_of_force(deck, judge, kind, header.entno.value)
+    if by_force is not None:
+        seen_contacts = _Seen(by_force, "contact forces")
+    elif pushed is not None and _has_one_force(deck):
+        seen_contacts = _Seen(pushed.spans, "momenta")
+    else:
+        return None
+    offset = 0.0 if header.offset.problem else header.offset.value
+    if offset <= 0 or card.switched[0].to_rigid:
+        return seen_contacts
+    if pushed is None or not pushed.speed:
+        return None
+    lead = offset / pushed.speed
+    return seen_contacts._replace(
+        contacts=tuple((start - lead, end) for start, end in seen_contacts.contacts)
+    )
+
+
+def _can_trigger(deck: Deck, header: Header) -> bool:
+    """Return True if the force of contact or rigid wall ENTNO may switch parts, or the deck does not define it."""
+    kind, _ = _CODES[header.code.value]
+    entity = read_entities(deck, _KEYWORDS[kind]).named(header.entno.value)
+    return entity is None or kind != "contact" or entity.triggers
+
+
+def find_spans_of_force(
+    deck: Deck, judge: HistoryJudge, kind: str, number: int, least: float = 0.0
+) -> Spans | None:
+    """Return when the written force of a contact or rigid wall exceeds ``least`` [force] [time].
+
+    Files name a contact by its id, or by its order if it has none.  Some name rigid walls by their order in any case:
+    if there are several and their ids differ from their order, none is used.
+    """
+    entities = read_entities(deck, _KEYWORDS[kind])
+    entity = entities.named(number)
+    if entity is None:
+        # a file of switching cards alone defines no contacts
+        alone = not entities.found and number > 0
+        return judge.find_force_spans(kind, number, least) if alone else None
+    name = entity.id or entity.number
+    is_order = kind == "rigid wall"
+    if is_order and any(entry.id not in (0, entry.number) for entry in entities.found):
+        if len(entities.found) > 1:
+            return None
+        by_order = judge.find_force_spans(kind, entity.number, least)
+        if by_order is not None:
+            return by_order
+    return judge.find_force_spans(kind, name, least)
 
 
 def _has_one_force(deck: Deck) -> bool:
-    """Whether a deck has one contact or rigid wall at most; cards alone have none."""
+    """Return True if a deck has at most one contact or rigid wall; a deck of switching cards alone has none."""
     return (
         len(read_entities(deck, "CONTACT").found)
         + len(read_entities(deck, "RIGIDWALL").found)
@@ -107,8 +206,11 @@ def _has_one_force(deck: Deck) -> bool:
 
 
 def _read_waiting(card: SwitchSet) -> ForceSwitch | None:
-    """Give what a set waits for; None for one that does not wait for a force, or says it in a way that is not read."""
-    header, factor = card.header, card.card.transform.time
+    """Return the conditions of a switch set; None if it does not wait for a force, or one of its fields is
+    unreadable.
+    """
+    header = card.header
+    factor = card.card.transform.time
     if header is None or header.code.value not in _CODES or not card.switched:
         return None
     if any(
@@ -125,7 +227,7 @@ def _read_waiting(card: SwitchSet) -> ForceSwitch | None:
     latest = header.time2.value * factor
     return ForceSwitch(
         card.switched[0].to_rigid,
-        _CODES[header.code.value],
+        _CODES[header.code.value][1],
         header.time1.value * factor,
         latest if 0 < latest < _NEVER else math.inf,
         header.time3.value * factor,
@@ -133,45 +235,19 @@ def _read_waiting(card: SwitchSet) -> ForceSwitch | None:
     )
 
 
-def _shift_contacts(pushed: ContactTimes, back: SwitchSet | None) -> Spans:
-    """Give the contacts as the set sees them that makes parts deformable: earlier by the time to fly its OFFSET."""
-    offset = (
-        back.header.offset.value
-        if back and back.header and not back.header.offset.problem
-        else 0.0
-    )
-    lead = offset / pushed.speed if pushed.speed and offset > 0 else 0.0
-    return tuple((start - lead, end) for start, end in pushed.spans)
-
-
 def _find_pair(
-    there: SwitchSet,
+    rigid_card: SwitchSet,
     by_card: dict[SwitchSet, list[Event]],
     waiting: dict[SwitchSet, ForceSwitch],
 ) -> SwitchSet | None:
-    """Give the set that makes the parts of another deformable again: its pair, or one that names the same parts."""
-    units = {event.unit for event in by_card[there]}
+    """Return the set that makes the same parts deformable as ``rigid_card`` makes rigid, or None."""
+    units = {event.unit for event in by_card[rigid_card]}
     for card, switch in waiting.items():
         if not switch.to_rigid and units & {event.unit for event in by_card[card]}:
             return card
     return None
 
 
-def _follow_windows(
-    event: Event,
-    back: SwitchSet | None,
-    by_card: dict[SwitchSet, list[Event]],
-    waiting: dict[SwitchSet, ForceSwitch],
-    contacts: Spans,
-    end: float,
-) -> Iterator[Window]:
-    """Give the windows of a unit that an event makes rigid."""
-    rigid = waiting[event.by]
-    closing = _find_event(event.unit, by_card[back]) if back else None
-    other = waiting[back] if back and closing else None
-    for tr, td in follow_pair(rigid, other, contacts, end):
-        yield Window(event.unit, tr, td, event, closing if td is not None else None)
-
-
 def _find_event(unit: Unit, events: Sequence[Event]) -> Event | None:
-    return next((one for one in events if one.unit == unit), None)
+    """Return the event of a unit, or None."""
+    return next((event for event in events if event.unit == unit), None)

@@ -40,7 +40,11 @@ LEGS = stored("rollover_r100_T0*.gz")
 def scan(run_name: str) -> dict[str, float]:
     """Row of the table in which the solver's runs were evaluated when they were computed."""
     table = np.genfromtxt(
-        results("rollover_scan.csv"), delimiter=",", names=True, dtype=None
+        results("rollover_scan.csv"),
+        delimiter=",",
+        names=True,
+        dtype=None,
+        encoding="utf-8",  # older versions of numpy take bytes, with a warning
     )
     assert table.dtype.names
     (row,) = table[table["run"].astype(str) == run_name]
@@ -122,7 +126,7 @@ def test_a_leg_in_which_nothing_stands_still_names_those_beside_it(
     first.write_bytes(Path(BOX).read_bytes())
     later.touch()
     told = run("verify", "--part", "box", "--switched", str(first), BOX).stderr
-    assert f"beside it lies {later}, a later leg of the run? Name it too" in told
+    assert f"in the same folder is {later}, a later leg of the run? Name it too" in told
 
 
 @pytest.mark.slow

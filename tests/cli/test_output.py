@@ -144,15 +144,16 @@ def test_markdown_begins_with_the_verdict_and_has_a_table(
 
 def test_the_table_names_what_it_rests_on_and_marks_the_recommended_row() -> None:
     lines = run(*SUGGEST, ENERGY).stdout.splitlines()
-    assert lines[:7] == [
+    assert lines[:4] == [
         "do not use  tr = 0.0128853, td = 0.064",
         "why         the vibration after td is wrong by 96%, since 92% of its energy is kinetic at td, which",
         "            no tr can keep",
         "to improve  use tr = 0.0135867, td = 0.0687534: vibration wrong by 0.0%",
-        "expect      8% of the reference's mean energy after td; vibration wrong by 95.7%",
-        "",
-        "motion     good",
     ]
+    assert lines[4].startswith(
+        "expect      8% of the reference's mean energy after td; vibration wrong by 95.7%"
+    )
+    assert "motion     good" in lines
     assert "rigid for  0.0511147, 34% of the simulated time" in lines
     assert any(line.startswith(f"history    {ENERGY}: csv, internal") for line in lines)
     assert [line.split()[1] for line in lines if line.startswith("*")] == ["0.0128853"]

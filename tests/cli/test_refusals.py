@@ -25,8 +25,9 @@ ONE_COMMAND = f"replay {GIVEN} --t-end 0.01 --dt 1e-3"
 REFUSALS = f"""
 sugest --td 1 x | No such command 'sugest' | Did you mean 'suggest'? | d2rpick --help
 dance | No such command 'dance' | plan, suggest
-suggest --tdd 1 x | --tdd | Did you mean | --td | d2rpick suggest --help
-verify --tolerence 1 x | --tolerence | Did you mean | --tolerance
+# click words this in its own way in each version; the near names stand in all
+suggest --tdd 1 x | --tdd | --td-window | d2rpick suggest --help
+verify --tolerence 1 x | --tolerence | --tolerance
 suggest --td 1 --td-window 1 2 x | --td | --td-window
 verify --td 1 x | --tr
 suggest --td 1 | HISTORY
@@ -177,7 +178,7 @@ suggest --td 0.6 {ENERGY} | --td 0.6 lies outside the record, 0 to 0.15$
 suggest --td 2 {ENERGY} | --td 2 lies outside the record, 0 to 0.15$
 suggest --td 64ms {ENERGY} | '64ms' is not a number | give a number in the unit of the history, 0.064 where it is s
 suggest 64 {ENERGY} | a time is given as --td, a number in the unit of the record
-suggest 64ms {ENERGY} | a time is given as --td, a number in the unit of the record, 0.064 where it is s
+suggest 64ms {ENERGY} | a time is given as --td, a number in the unit of the record, 0.064 if that unit is s
 suggest --td 0.064 {ENERGY.replace("energy", "enrgy")} | (did you mean 'energy.csv'?)
 # a box that cannot be computed
 rollover --tr 0.1 | --tr and --td need each other
