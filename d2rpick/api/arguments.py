@@ -154,6 +154,25 @@ def pairs(name: str, value: object) -> list[tuple[float, float]]:
     return found
 
 
+def with_point(value: object) -> str:
+    """Say how a number with a decimal comma is given, or nothing.
+
+    Examples
+    --------
+    >>> with_point("0,064"), with_point("0.064 s")
+    (': write it with a decimal point, 0.064', '')
+    """
+    text = str(value).strip()
+    if text.count(",") != 1:
+        return ""
+    written = text.replace(",", ".")
+    try:
+        float(written)
+    except ValueError:
+        return ""
+    return f": write it with a decimal point, {written}"
+
+
 def without_unit(value: object) -> str:
     """Say how a time with a unit is given, or nothing."""
     from d2rpick.histories.names import in_seconds

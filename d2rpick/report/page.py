@@ -201,8 +201,9 @@ def grid(
     """
     body = [list(row) for row in rows]
     right = [
-        all(row[i] is None or isinstance(row[i], (int, float)) for row in body)
-        for i in range(len(head))
+        name == "±"
+        or all(row[i] is None or isinstance(row[i], (int, float)) for row in body)
+        for i, name in enumerate(head)
     ]
     classes = [{"class_": "number"} if one else {} for one in right]
     top = (

@@ -256,7 +256,7 @@ def plan_page(
         section(
             "Flights",
             table("Flights", *unstarred(*plan.table(found))),
-            pairs(plan.reasons(found)),
+            pairs([*plan.verdicts(found), *plan.reasons(found)]),
         ),
         section("For the solver's input", tag("pre", card, tabindex="0"))
         if card
