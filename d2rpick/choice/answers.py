@@ -59,7 +59,8 @@ if TYPE_CHECKING:
 class Verdict(OfTd):
     """Answer of ``verify``: the measures of one pair, and what is right or wrong with it.
 
-    ``tr_ok`` and ``td_ok`` are None where the record does not tell.
+    ``tr_ok`` and ``td_ok`` are None where the record does not tell.  ``computed`` is the energy of the
+    finished switched run, if there is one.
     """
 
     situation: Situation
@@ -71,6 +72,7 @@ class Verdict(OfTd):
     cautions: tuple[Caution, ...]
     switched: Comparison | None = None
     health: Health | None = None
+    computed: History | None = None
 
     @property
     def verified(self) -> bool:
@@ -494,6 +496,7 @@ def compare_with(
     return replace(
         verdict,
         switched=found,
+        computed=switched.history,
         admissible=verdict.admissible
         and not found.objections,  # a wrong motion overrules the verdict
         reasons=verdict.reasons + found.objections,

@@ -207,3 +207,23 @@ def test_short_names_tell_runs_apart() -> None:
     assert short_names(["x/one.csv", "x/one.csv"]) == ("one.csv", "one.csv")
     assert short_names(["one.csv", "deep/er/one.csv"]) == ("one.csv", "deep/er/one.csv")
     assert short_names([]) == ()
+
+
+def test_a_finished_switched_run_is_drawn_as_it_was_computed() -> None:
+    reference = d2.read(ENERGY)
+    found = d2.verify(reference, tr=0.0135867, td=0.0687534, switched=reference)
+    (energy,) = found.plot().axes
+    (line,) = (one for one in energy.lines if one.get_label() == SWITCHED_RUN)
+    assert np.array_equal(line.get_ydata(), sure(found.computed).energy)
+
+
+SWITCHED_RUN = "switched run, as computed"
+
+
+def test_a_plan_names_no_negative_energies_and_the_times_of_its_windows() -> None:
+    plan = d2.plan(d2.read(ENERGY))
+    (axes,) = plan.plot().axes
+    assert min(axes.get_yticks()) >= 0
+    (label,) = (one.get_text() for one in axes.texts if one.get_text()[:1] == "1")
+    ((tr, td),) = plan.windows
+    assert label == f"1: tr = {tr:.4g}, td = {td:.4g}"
