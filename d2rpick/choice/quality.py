@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from d2rpick.base.errors import listing
+from d2rpick.base.errors import list_names
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.choice.aftermath import worth_of_error
 from d2rpick.choice.candidates import Candidates, judged_of
 from d2rpick.choice.grades import FAIR, GOOD, GRADES, POOR
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, POOR_RESIDUAL
-from d2rpick.histories.digits import above
+from d2rpick.histories.digits import format_above_limit
 from d2rpick.vibration.identify import MIN_PLASTIC, MIN_SAMPLES_PER_PERIOD
 from d2rpick.vibration.measures import TOLERATED_GROWTH
 
@@ -118,7 +118,7 @@ def over_limits(situation: Situation, candidate: Candidate) -> tuple[str, ...]:
     )
     return tuple(
         f"{name} unknown, at most {limit:g} was asked for" if value is None
-        else f"{name} {above(value, limit)} above the limit {limit:g}"
+        else f"{name} {format_above_limit(value, limit)} above the limit {limit:g}"
         for name, value, limit in limits
         if limit is not None and (value is None or value > limit)
     )  # fmt: skip
@@ -273,7 +273,7 @@ def _way_to_the_modes(situation: Situation) -> str:
         return "name the parts to be switched with `parts`, if the files have parts"
     beside = situation.together.beside.parts
     if beside:
-        names = listing([part.name for part in beside], most=_NAMED)
+        names = list_names([part.name for part in beside], most=_NAMED)
         return f"name all parts that vibrate together with `parts`: {names} as well"
     return "write the energies more often"
 

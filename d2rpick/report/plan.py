@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.base.errors import printable
+from d2rpick.base.errors import make_printable
 from d2rpick.choice.grades import USE
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import in_full, saved
@@ -116,7 +116,7 @@ def as_table(plan: Plan, shown: Shown) -> str:
         else "no flight"
     )
     below = [*verdicts(plan), *outlook(plan), *reasons(plan)]
-    said = [(name, printable(text)) for name, text in below]
+    said = [(name, make_printable(text)) for name, text in below]
     above = tables.in_line([("history", what_was_read(plan.history))], 8)
     steps = tables.in_line(next_steps(plan), 4)
     return "\n".join(

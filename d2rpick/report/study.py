@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from d2rpick.choice.grades import VERDICTS
 from d2rpick.choice.study import OK, Study, StudyRow, cut_runs, runs_of
-from d2rpick.histories.digits import window_as_read
+from d2rpick.histories.digits import format_window
 from d2rpick.report import keys, tables
 from d2rpick.report.fields import (
     Document,
@@ -196,7 +196,7 @@ def outcome(answer: Study) -> list[tuple[str, str]]:
         heading = VERDICTS[answer.grade] if answer.grade else heading
         runs = f"{answer.judged} of {runs_of(len(answer.runs))}"
         shared = f"common tr = {common.tr:g}, for {runs}, error {_span(errors)}"
-        shared += f"; as good: every tr from {window_as_read(*common.window)}"
+        shared += f"; as good: every tr from {format_window(*common.window)}"
     return [
         (heading, shared),
         ("each run", _verdicts(answer)),

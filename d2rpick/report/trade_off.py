@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from d2rpick.base.errors import printable
+from d2rpick.base.errors import make_printable
 from d2rpick.choice.quality import EQUALLY_GOOD
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import headed, in_short
@@ -70,7 +70,12 @@ def as_table(found: TradeOff, shown: Shown) -> str:
     )
     low, high = found.td_window
     window = f"{len(found.offers)} times from {low:.6g} to {high:.6g}"
-    lines = [printable(answer(found)), *tables.in_line(verdict(found)), "", offered]
+    lines = [
+        make_printable(answer(found)),
+        *tables.in_line(verdict(found)),
+        "",
+        offered,
+    ]
     left = len(found.offers) - len(some)
     if left:
         lines.append(f"... and {left} more td (--limit; csv and json have all)")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
-from d2rpick.base.errors import printable
+from d2rpick.base.errors import make_printable
 from d2rpick.report import keys, tables
 from d2rpick.report.decision import accuracy, headed, rigid_for, saved, statements
 from d2rpick.report.fields import Document, Field, kind_of, maybe, row
@@ -68,7 +68,7 @@ def as_table(answer: Verdict, shown: Shown) -> str:
     if answer.switched:
         lines += ["", *_comparison(answer.switched)]
     listed = [*facts(answer), *above, *remarks]
-    said = [(name, printable(text)) for name, text in listed]
+    said = [(name, make_printable(text)) for name, text in listed]
     return "\n".join(
         [*lines, "", *tables.in_line(said), "", *tables.in_line(measured(answer))]
     )
@@ -184,10 +184,10 @@ def deviations(switched: Comparison) -> list[tuple[str, str]]:
 def _comparison(switched: Comparison) -> list[str]:
     """Lines that hold the switched run against the reference."""
     return [
-        f"switched run  {printable(', '.join(switched.source))}; compared from td to {switched.end:.6g}",
+        f"switched run  {make_printable(', '.join(switched.source))}; compared from td to {switched.end:.6g}",
         tables.as_text(COMPARED, comparison(switched)),
         *(f"{name.ljust(38)}  {text}" for name, text in deviations(switched)),
-        *(f"note: {printable(note)}" for note in switched.notes),
+        *(f"note: {make_printable(note)}" for note in switched.notes),
     ]
 
 
