@@ -175,13 +175,13 @@ def with_point(value: object) -> str:
 
 def without_unit(value: object) -> str:
     """Say how a time with a unit is given, or nothing."""
-    from d2rpick.histories.names import parse_seconds
+    from d2rpick.histories.digits import parse_seconds
 
     seconds = parse_seconds(str(value))
     return (
         ""
         if seconds is None
-        else f": give a number in the unit of the history, {seconds:g} where it is s"
+        else f": give a number in the unit of the run, {seconds:g} if it is s"
     )
 
 

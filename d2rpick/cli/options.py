@@ -25,6 +25,7 @@ from d2rpick.base.errors import ArgumentError
 from d2rpick.base.settings import find_nearest_settings
 from d2rpick.cli import Documented, documented
 from d2rpick.cli.output import Output, tell, text_bytes, with_options
+from d2rpick.cli.times import TimeType, convert_typed_times
 from d2rpick.cli.values import CARDS, click_type, settings_of, spelled, words_of
 
 if TYPE_CHECKING:
@@ -88,6 +89,8 @@ GROUPS: Final[dict[str, tuple[str, ...]]] = {
     ),
     "Advanced": (*OSCILLATOR, "fit_window", "no_verify", "cost_share", "step_ratio"),
 }
+# Placeholders of options that are times of the run.
+_TIMES: Final = ("T", "LO HI")
 # Options that write files, which the same command would find the next time.
 _WRITTEN: Final = ("output_file", "plot", "report", "write_deck")
 _SOURCES: Final = {
@@ -145,6 +148,7 @@ class Command(Documented):
             import shlex  # not above: start-up
 
             tell(f"note: {shlex.join(words)} by {ctx.meta['d2rpick.settings']}")
+        convert_typed_times(ctx)
         # Numpy before the modules of a run: its import makes many calls, and as deep as theirs each may meet the end of
         # a piece of the stack of Python 3.11, which maps memory for it and unmaps it again.
         if ctx.params.get("history"):
@@ -287,6 +291,8 @@ def option(name: str, one: Option, **other: Any) -> Callable[[Decorated], Decora
         about["is_flag"] = True
     else:
         kind = click_type(one.kind)
+        if one.metavar in _TIMES:
+            kind = TimeType(kind.limits)
         about |= {"type": kind, "nargs": 2 if one.pair else 1, "multiple": one.many}
     about |= {"instead_of": one.instead_of} | other
     if about["instead_of"]:
