@@ -168,9 +168,9 @@ def reproduce(
 ) -> None:
     """Reproduce the published results as figures (svg, png) and tables (csv), section by section.
 
-    Each figure stands with what the paper shows there, what is found here, and whether the two agree; the table puts
-    published numbers and reference values beside those found here.  The figures of the box (sections 1 and 4) take
-    about half a minute.  It runs from a clone of the repository, whose folder validation holds the study.
+    For each figure, in the order of the paper, it prints what the paper shows, what is found here, and whether the two
+    agree: yes, in part or no.  Published numbers and reference values follow next to those found here.  The figures of
+    the box (sections 1 and 4) take about a minute.  It runs from a clone of the repository, with its folder validation.
 
     Examples
     --------

@@ -17,7 +17,7 @@ from validation.published.drawing import draw_exhibit
 from validation.published.values import table
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from d2rpick.cli.output import Output
     from d2rpick.histories.history import Samples
@@ -43,7 +43,8 @@ def reproduce(
     place = _made(output_dir)  # the page may go there
     output = output.beside(*solver)
     curves = _solver(solver, tables)  # before the half minute that the box takes
-    answer = reproduction.Reproduction(table(), list(_exhibits(section, curves)))
+    rows = [row for row in table() if not section or str(row.section) in section]
+    answer = reproduction.Reproduction(rows, _exhibits(section, curves))
     files = _write(output, place, answer)
     if output.report:
         output.write(
@@ -59,17 +60,17 @@ def reproduce(
 
 def _exhibits(
     sections: Sequence[str], solver: Mapping[str, Mapping[str, Samples]]
-) -> Iterator[Exhibit]:
+) -> list[Exhibit]:
     """Give the figures of these sections, of all without any, in the order of the paper."""
     makers = [
         *box.exhibits_of(Parameters()),
         *exhibits.exhibits_of(solver),
         (5, saving.exhibit),
     ]
-    makers.sort(key=lambda one: one[0])
-    return (
+    made = [
         make() for section, make in makers if not sections or str(section) in sections
-    )
+    ]
+    return sorted(made, key=lambda exhibit: (exhibit.section, exhibit.figure))
 
 
 def _solver(names: Sequence[str], tables: Tables) -> dict[str, dict[str, Samples]]:

@@ -29,6 +29,10 @@ if TYPE_CHECKING:
     from d2rpick.models.box_model import Plane
 
 
+VERDICTS: Final = ("yes", "in part", "no", "nothing to compare")
+YES, IN_PART, NO, NOTHING = VERDICTS
+
+
 class Curve(NamedTuple):
     """A column as it is drawn: "line", "thin" or "dots"; over the column ``x``, over the first one without it."""
 
@@ -70,7 +74,8 @@ class Exhibit:
     """A figure and the columns it shows, the first of them the default x; panels row by row, none for a scheme.
 
     ``section`` and ``figure`` are those of the paper; ``paper`` is what it shows or claims there, ``found`` what is
-    found here, ``agrees`` whether that is the same (None: there is nothing to compare).
+    found here, ``agrees`` whether that is the same (None: there is nothing to compare), ``partly`` whether it is so
+    only roughly, or only a part of it.
     """
 
     name: str
@@ -82,6 +87,14 @@ class Exhibit:
     agrees: bool | None = None
     columns: Mapping[str, Samples] = field(default_factory=dict)
     panels: tuple[tuple[Panel, ...], ...] = ()
+    partly: bool = False
+
+    @property
+    def verdict(self) -> str:
+        """The verdict in words: yes, in part, no, or nothing to compare."""
+        if self.partly:
+            return IN_PART
+        return {True: YES, False: NO, None: NOTHING}[self.agrees]
 
 
 if TYPE_CHECKING:

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from d2rpick.base import __version__
 from d2rpick.report import keys, page, tables
-from d2rpick.report.fields import Document, Field, Kind, kind_of, many, row
+from d2rpick.report.fields import Document, Field, Kind, kind_of, many, one_of, row
 from d2rpick.report.figures import svg_element
 from d2rpick.report.page import Markup, document, section, table, tag
 from validation.published.drawing import draw_exhibit
+from validation.published.exhibits import IN_PART, NO, NOTHING, VERDICTS, YES
 from validation.published.values import (
     MISPRINTS,
     MOST_DIFFERENCE,
@@ -39,12 +40,42 @@ HEAD = (
 )
 
 
+# Columns of the values of one figure, without their source: it stands once below them.
+_VALUES: Final = HEAD[:-1]
+# Section of the paper with the equations that have misprints, and the one that chooses the pair.
+_EQUATIONS: Final = 2
+_CHOICE: Final = 4
+_OVERVIEW: Final = ("figure", "the paper shows", "the same here")
+
+
 class Reproduction(NamedTuple):
-    """Values and figures of the paper beside those found here; ``files`` were written."""
+    """Values and figures of the paper next to those found here, in its order; ``files`` were written."""
 
     rows: Sequence[PublishedValue]
     exhibits: Sequence[Exhibit]
     files: Sequence[str] = ()
+
+    @property
+    def misprints(self) -> Sequence[str]:
+        """Misprints in the equations, if their section is asked for."""
+        return MISPRINTS if self._has_section(_EQUATIONS) else ()
+
+    @property
+    def pairs(self) -> Sequence[str]:
+        """How good the published and the better pair are, if the section that chooses them is asked for."""
+        return pairs_of() if self._has_section(_CHOICE) else ()
+
+    def _has_section(self, section: int) -> bool:
+        """Return True if figures of a section of the paper are in the answer."""
+        return any(exhibit.section == section for exhibit in self.exhibits)
+
+    def values_of(self, exhibit: Exhibit) -> Sequence[PublishedValue]:
+        """Return the values that belong to a figure; with several pictures of it, those of the first."""
+        place = (exhibit.section, exhibit.figure)
+        first = next(
+            other for other in self.exhibits if (other.section, other.figure) == place
+        )
+        return [row for row in self.rows if first is exhibit and row.place == place]
 
 
 _PAIR: Final = Kind(
@@ -61,6 +92,8 @@ _ROW: Final = row(
     Field("tolerance", kind_of("number", minimum=0)),
     Field("source", "text", "where the published number or the reference value is from"),
     Field("agrees", "flag", "the difference is within the tolerance"),
+    Field("section", kind_of("integer", minimum=1, maximum=5), "section of the paper", later=True),
+    Field("figure", "text", "number of the figure in the paper", later=True),
 )  # fmt: skip
 _FIGURE: Final = row(
     Field("name", "text"), Field("title", "text"), Field("section", kind_of("integer", minimum=1, maximum=5)),
@@ -68,70 +101,75 @@ _FIGURE: Final = row(
     Field("paper", "text", "what the paper shows"),
     Field("found", "text", "what is found here"),
     Field("agrees", "flag?", "null where there is nothing to compare"),
+    Field("verdict", one_of(*VERDICTS), "in words; in part: the same only roughly, or only a part of it", later=True),
 )  # fmt: skip
 DOCUMENT: Final = Document(
     "d2rpick/reproduce/2",
     "Published results of the floating oscillator beside those found here; times of pairs in seconds.",
     row(
         keys.WARNINGS._replace(get=lambda _: ()),
-        Field("rows", kind_of(many(_ROW), minItems=1)),
+        Field("rows", many(_ROW)),
         Field("published", _PAIR, get=lambda _: PUBLISHED),
         Field("better", _PAIR, get=lambda _: pair_at_peak()),
         Field("figures", many(_FIGURE), get=lambda answer: answer.exhibits),
-        Field("misprints", "texts", get=lambda _: MISPRINTS),
+        Field("misprints", "texts"),
         Field("files", "texts"),
     ),
 )
 
 
 def as_table(answer: Reproduction, shown: Shown) -> str:
-    """Published numbers and reference values beside those here, the pairs, the figures, the misprints."""
-    rows, exhibits = answer[:2]
-    lines = [
-        tables.as_text(HEAD, [cells(row) for row in rows], shown.width),
-        "",
-        *pairs_of(),
-        "",
+    """Each figure with its verdict; then, in the order of the paper, what it shows, what is found here, the values."""
+    overview = [
+        [place_of(exhibit), exhibit.paper, exhibit.verdict]
+        for exhibit in answer.exhibits
     ]
-    for one in exhibits:
-        lines += [
-            f"{heading(one)}: {verdict(one)}",
-            f"  paper  {one.paper}",
-            f"  here   {one.found}",
+    blocks = [tables.as_text(_OVERVIEW, overview, shown.width)]
+    for exhibit in answer.exhibits:
+        lines = [
+            f"{heading(exhibit)}: {exhibit.verdict}",
+            f"  paper  {exhibit.paper}",
+            f"  here   {exhibit.found}",
         ]
-    lines += [
-        "",
-        "misprints in the paper",
-        *(f"  {misprint}" for misprint in MISPRINTS),
-    ]
-    return tables.wrapped("\n".join(lines), shown.width)
+        if rows := answer.values_of(exhibit):
+            body = [cells(row)[:-1] for row in rows]
+            lines += ["", tables.as_text(_VALUES, body, shown.width)]
+            lines += [f"sources  {'; '.join(sources(rows))}"]
+        blocks.append("\n".join(lines))
+    if answer.pairs:
+        blocks.append("\n".join(answer.pairs))
+    if answer.misprints:
+        listed = (f"  {misprint}" for misprint in answer.misprints)
+        blocks.append("\n".join(["misprints in the paper", *listed]))
+    return tables.wrapped("\n\n".join(blocks), shown.width)
 
 
 def as_markdown(answer: Reproduction, _: Shown, *, pictures: bool = False) -> str:
-    """Give the same as Markdown, with the figures where ``pictures`` lie beside it."""
-    rows, exhibits = answer[:2]
+    """Give the same as Markdown, with the figures if ``pictures`` are in the same folder."""
+    overview = [
+        [place_of(exhibit), exhibit.paper, exhibit.verdict]
+        for exhibit in answer.exhibits
+    ]
     blocks = [
         "# Analysis of switched-rigid floating oscillator, reproduced",
         f"{MODEL}; d2rpick {__version__}.",
+        tables.as_markdown(_OVERVIEW, overview),
     ]
-    for one in exhibits:
-        shown = [f"![{one.title}]({one.name}.svg)"] if pictures else []
+    for exhibit in answer.exhibits:
+        picture = f"![{exhibit.title}]({exhibit.name}.svg)"
         blocks += [
-            f"## {heading(one)}",
-            *shown,
-            f"Paper: {one.paper}",
-            f"Here: {one.found}",
-            f"Agrees: {verdict(one)}.",
+            f"## {heading(exhibit)}",
+            *((picture,) if pictures else ()),
+            f"Paper: {exhibit.paper}",
+            f"Here: {exhibit.found}",
+            f"Agrees: {exhibit.verdict}.",
         ]
-    blocks += [
-        "## Published and computed values",
-        tables.as_markdown(HEAD, [cells(row) for row in rows]),
-        *pairs_of(),
-    ]
-    blocks += [
-        "## Misprints in the paper",
-        "\n".join(f"* {misprint}" for misprint in MISPRINTS),
-    ]
+        if rows := answer.values_of(exhibit):
+            blocks.append(tables.as_markdown(HEAD, [cells(row) for row in rows]))
+    blocks += answer.pairs
+    if answer.misprints:
+        listed = "\n".join(f"* {misprint}" for misprint in answer.misprints)
+        blocks += ["## Misprints in the paper", listed]
     return "\n\n".join(blocks)
 
 
@@ -170,19 +208,21 @@ def cells(row: PublishedValue) -> list[tables.Cell]:
     return [row.what, row.unit, *known, here, difference, row.agrees, row.source]
 
 
+def place_of(exhibit: Exhibit) -> str:
+    """Return the figure or the section of the paper."""
+    is_section = exhibit.figure.startswith("section")
+    return exhibit.figure if is_section else f"fig. {exhibit.figure}"
+
+
 def heading(exhibit: Exhibit) -> str:
     """Give the figure of the paper and what it shows."""
-    place = (
-        exhibit.figure
-        if exhibit.figure.startswith("section")
-        else f"fig. {exhibit.figure}"
-    )
+    place = place_of(exhibit)
     return f"{place[0].upper()}{place[1:]}: {exhibit.title}"
 
 
-def verdict(exhibit: Exhibit) -> str:
-    """Say whether what is found is what the paper shows."""
-    return {True: "yes", False: "no", None: "nothing to compare"}[exhibit.agrees]
+def sources(rows: Sequence[PublishedValue]) -> list[str]:
+    """Return the sources of some values, each once."""
+    return [*dict.fromkeys(row.source for row in rows)]
 
 
 def pairs_of() -> list[str]:
@@ -194,33 +234,41 @@ def pairs_of() -> list[str]:
 
 
 def as_page(answer: Reproduction, command: Sequence[str]) -> str:
-    """Write the page: every figure with what the paper shows and what is found, then the table."""
-    published = table("Published and here", HEAD, [cells(row) for row in answer.rows])
+    """Write the page: every figure with what the paper shows, what is found here, and its values."""
+    overview = [
+        [place_of(exhibit), exhibit.paper, exhibit.verdict]
+        for exhibit in answer.exhibits
+    ]
+    pairs = tag("ul", *(tag("li", text) for text in answer.pairs))
+    misprints = tag("ul", *(tag("li", text) for text in answer.misprints))
     return document(
         "Analysis of switched-rigid floating oscillator, reproduced",
         tag(
             "p",
             f"{MODEL}. The box is a model of our own; the paper states none of its figures.",
         ),
-        *(_exhibited(one) for one in answer.exhibits),
-        section("Published and here", published),
-        tag("ul", *(tag("li", text) for text in pairs_of())),
-        section(
-            "Misprints in the paper",
-            tag("ul", *(tag("li", misprint) for misprint in MISPRINTS)),
-        ),
+        section("Overview", table("Figures of the paper", _OVERVIEW, overview)),
+        *(_exhibited(exhibit, answer) for exhibit in answer.exhibits),
+        section("Published and better pair", pairs) if answer.pairs else "",
+        section("Misprints in the paper", misprints) if answer.misprints else "",
         page.repeated(command),
         signed=page.CHECKED,
     )
 
 
-def _exhibited(one: Exhibit) -> Markup:
-    drawing = Markup(svg_element(draw_exhibit(one), f"{one.name}-"))
-    class_ = {True: "good", False: "bad", None: "soft"}[one.agrees]
+_CLASSES: Final = {YES: "good", IN_PART: "care", NO: "bad", NOTHING: "soft"}
+
+
+def _exhibited(exhibit: Exhibit, answer: Reproduction) -> Markup:
+    """Show a figure with the verdict on it and the values that belong to it."""
+    drawing = Markup(svg_element(draw_exhibit(exhibit), f"{exhibit.name}-"))
+    rows = [cells(row) for row in answer.values_of(exhibit)]
+    verdict = tag("span", exhibit.verdict, class_=_CLASSES[exhibit.verdict])
     return section(
-        heading(one),
-        tag("figure", tag("div", drawing, role="img", aria_label=one.title)),
-        tag("p", tag("b", "Paper: "), one.paper),
-        tag("p", tag("b", "Here: "), one.found),
-        tag("p", "Agrees: ", tag("span", verdict(one), class_=class_)),
+        heading(exhibit),
+        tag("figure", tag("div", drawing, role="img", aria_label=exhibit.title)),
+        tag("p", tag("b", "Paper: "), exhibit.paper),
+        tag("p", tag("b", "Here: "), exhibit.found),
+        tag("p", "Agrees: ", verdict),
+        table(f"Values of {place_of(exhibit)}", HEAD, rows) if rows else "",
     )
