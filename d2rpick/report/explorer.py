@@ -127,7 +127,7 @@ def _flight(found: TradeOff) -> dict[str, Any]:
     cut = f"; cut at the top: {' and '.join(above)}" if above else ""
     return {
         "caption": f"Internal energy in the flight{cut}",
-        "time": f"time [{unit}]" if unit else "time",
+        "time": f"time [{unit}]" if unit else "time (unit of the run)",
         "error": _error_name(found.offers),
         "saved": _saved_name(found.offers),
         "view": [seen.start, seen.end],

@@ -224,8 +224,8 @@ def legend_below(
 
 
 def with_unit(name: str, unit: str) -> str:
-    """Label an axis, with the unit where a file names one."""
-    return f"{name} [{plain(unit)}]" if unit else name
+    """Label an axis of time with the unit that a file names, else with that of the run."""
+    return f"{name} [{plain(unit)}]" if unit else f"{name} (unit of the run)"
 
 
 def plain(name: str) -> str:

@@ -487,7 +487,7 @@ def _draw_times(axes: Axes, drawn: Sequence[StudyRow]) -> None:
 def _show_runs(
     axes: Axes, answer: Study, drawn: Sequence[StudyRow], curves: Sequence[Samples]
 ) -> None:
-    """Show the time from a little before the first tr to a little after td; what is higher there is cut."""
+    """Show the time from a little before the first tr to a little after td, and the energies there in full."""
     if not curves:
         return
     first, last = (
@@ -516,10 +516,10 @@ def _show_runs(
     )
     # the lowest level stays in sight beside the middle one
     level = min(float(np.median(levels)), _LOWEST * float(levels.min()))
-    scale = scale_of(float(inner.min()), float(inner.max()), level)
+    scale = scale_of(float(inner.min()), float(seen.max()), level)
     if drawn and all("at-rest" in row.warnings for row in drawn):
         scale = scale_of(0.0, max(float(one[1].max()) for one in curves), 0.0)
-    figures.show_span(axes, span, scale, [("highest run", float(seen.max()))])
+    figures.show_span(axes, span, scale, [])
 
 
 def _energies(curves: Sequence[Samples], start: float, end: float) -> Iterator[Samples]:

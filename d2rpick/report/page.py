@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from d2rpick.histories.opening import Run
     from d2rpick.report.keys import Read
 
+# Sections from which on a page has a list of its contents.
+_LONG: Final = 4
 # More columns than this do not fit on a narrow screen.
 _FIT = 3
 _HINT = "Where the table goes on to the right, scroll it sideways."
@@ -53,6 +55,13 @@ class Markup(str):
     """Text that is HTML already."""
 
     __slots__ = ()
+
+
+class Section(Markup):
+    """A section of a page, with its title and the id to which a link in the contents leads."""
+
+    name: str
+    anchor: str
 
 
 def tag(name: str, /, *children: str, **attributes: str) -> Markup:
@@ -98,6 +107,8 @@ def document(
     ``styles`` and ``scripts`` are what it needs beside the style of every page; nothing else takes effect on it.
     """
     sheets = (resource("style.css"), *styles)
+    if any("<pre" in part for part in content):
+        scripts = (resource("copy.js"), *scripts)
     head = tag(
         "head",
         tag("meta", charset="utf-8"),
@@ -121,6 +132,7 @@ def document(
     body = tag(
         "body",
         header,
+        contents(content),
         tag("main", *content),
         *(tag("script", script) for script in scripts),
     )
@@ -147,9 +159,30 @@ def _digest(text: str) -> str:
     return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
 
 
-def section(title: str, *content: str) -> Markup:
+def section(title: str, *content: str) -> Section:
     """Give a section under its title."""
-    return tag("section", tag("h2", title), *content)
+    return _anchored(title, tag("h2", title), *content)
+
+
+def _anchored(title: str, *content: str) -> Section:
+    """Give a section with an id made from its title."""
+    letters = (letter if letter.isalnum() else "-" for letter in title.casefold())
+    anchor = f"section-{''.join(letters)}"
+    made = Section(tag("section", *content, id=anchor))
+    made.name = title
+    made.anchor = anchor
+    return made
+
+
+def contents(parts_of_page: Iterable[str]) -> Markup:
+    """Give links to the sections of a page; nothing if it is short."""
+    sections = [part for part in parts_of_page if isinstance(part, Section)]
+    if len(sections) < _LONG:
+        return Markup()
+    links = (
+        tag("li", tag("a", part.name, href=f"#{part.anchor}")) for part in sections
+    )
+    return tag("nav", tag("ul", *links), class_="contents", aria_label="Contents")
 
 
 def drawing(caption: str, svg: str) -> Markup:
@@ -394,11 +427,11 @@ def method(command: Sequence[str], stdin: bool = False) -> Iterator[Markup]:
         tag("summary", tag("h2", "Method and limits")),
         resource("method.html"),
     )
-    yield tag("section", folded)
+    yield _anchored("Method and limits", folded)
     yield repeated(command, stdin)
 
 
-def repeated(command: Sequence[str], stdin: bool = False) -> Markup:
+def repeated(command: Sequence[str], stdin: bool = False) -> Section:
     """Give the arguments that repeat an answer as a line to paste."""
     said = [tag("p", "with the same history on standard input:")] if stdin else []
     return section(

@@ -289,7 +289,7 @@ def study_page(answer: Study, command: Sequence[str]) -> str:
         page.front(
             [_common(answer)],
             remarks(answer.cautions),
-            pairs([*study.outcome(answer), *study.reasons(answer)]),
+            pairs([*_below_card(answer), *study.reasons(answer)]),
         ),
         _figures("runs-", caption, "study", answer, page=True),
         section(
@@ -300,6 +300,12 @@ def study_page(answer: Study, command: Sequence[str]) -> str:
         *page.method(command),
         signed=page.CHECKED,
     )
+
+
+def _below_card(answer: Study) -> Iterable[tuple[str, str]]:
+    """Return the outcome without what the card of the common tr has already."""
+    outcome = study.outcome(answer)
+    return outcome if answer.common.tr is None else list(outcome)[1:]
 
 
 def _common(answer: Study) -> Markup:
