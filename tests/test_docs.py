@@ -31,6 +31,7 @@ from tests.examples import (
 
 README = text_of("README.md")
 ALL = "\n".join(text_of(page) for page in PAGES)
+MAP = "docs/README.md"
 LONGEST_README = 12_000  # [bytes] read in five minutes
 # Each has a test below, or shows nothing to be run.
 KINDS = {"console", "pycon", "sh", "yaml", "toml", "mermaid", "text"}
@@ -132,10 +133,10 @@ def test_the_readme_is_read_in_five_minutes() -> None:
     assert len(README.encode()) <= LONGEST_README
 
 
-def test_the_readme_leads_to_every_page() -> None:
-    assert {*PAGES.values()} - {ROOT / "README.md"} <= {
-        path for path, _ in links("README.md")
-    }
+def test_the_map_leads_to_every_page_and_the_readme_to_the_map() -> None:
+    linked = {path.resolve() for path, _ in links(MAP)}
+    assert {*PAGES.values()} - {ROOT / "README.md", PAGES[MAP]} <= linked
+    assert PAGES[MAP] in {path.resolve() for path, _ in links("README.md")}
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -146,7 +147,9 @@ def test_links_of_a_page_lead_somewhere(page: str) -> None:
 
 
 def test_the_files_that_the_recipes_name_exist() -> None:
-    named = re.findall(r"`((?:d2rpick|tests)/[\w/.-]+)`", text_of("docs/developing.md"))
+    named = re.findall(
+        r"`((?:d2rpick|tests)/[\w/.-]+)`", text_of("docs/developing/README.md")
+    )
     assert len(named) > 20
     assert not {
         name for name in named if "NAME" not in name and not (ROOT / name).exists()
@@ -179,7 +182,7 @@ def test_every_command_has_help_and_is_documented_with_its_options(
 
 @pytest.mark.parametrize("name", READERS)
 def test_every_format_is_documented(name: str) -> None:
-    assert f"| `{name}` |" in text_of("docs/histories.md")
+    assert f"| `{name}` |" in text_of("docs/reference/histories.md")
 
 
 def test_the_readme_lists_the_exit_codes() -> None:
@@ -223,11 +226,11 @@ def test_the_jobs_in_the_documentation_run() -> None:
 
 
 def test_the_configuration_in_the_documentation_is_one() -> None:
-    (rules,) = blocks(text_of("docs/decks.md"), "toml")
+    (rules,) = blocks(text_of("docs/how-to/decks.md"), "toml")
     read_configuration(tomllib.loads(rules)).verify(RULES)
 
 
-@pytest.mark.parametrize("page", ["docs/recipes.md", "docs/scripts.md"])
+@pytest.mark.parametrize("page", ["docs/how-to/recipes.md", "docs/how-to/scripts.md"])
 def test_the_settings_in_the_documentation_are_taken(page: str, here: Path) -> None:
     (settings,) = blocks(text_of(page), "toml")
     (here / "d2rpick.toml").write_text(settings)
@@ -244,7 +247,9 @@ def test_the_settings_in_the_documentation_are_taken(page: str, here: Path) -> N
 def test_the_parquet_of_the_recipes_is_read() -> None:
     """Where pandas can: pyarrow is no dependency."""
     pytest.importorskip("pyarrow")
-    (line,) = re.findall(r"`(pd\.read_parquet\(.*?\))`", text_of("docs/recipes.md"))
+    (line,) = re.findall(
+        r"`(pd\.read_parquet\(.*?\))`", text_of("docs/how-to/recipes.md")
+    )
     pd.read_csv(ENERGY, index_col="time").to_parquet("energies.parquet")
     assert d2rpick.from_frame(eval(line)).parts == ()
 

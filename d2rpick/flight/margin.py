@@ -174,7 +174,8 @@ def landing_spread(history: History, flight: Flight) -> float | None:
     lowest value [energy].  ``omega``: a vibration with that frequency lets E cross its mean four times per period
     [1/time]; the crossings in the flight tell it.  ``K``: kinetic energy before the contact [energy]; it holds that of
     the rotation, which brings the surface to the ground as well.  ``n``: direction in which gravity has changed the
-    momentum ``p`` of what flies; without gravity that of ``p``.  Source: docs/plan.md, "The margin before a contact";
+    momentum ``p`` of what flies; without gravity that of ``p``.
+    Source: docs/how-to/plan.md, "The margin before a contact";
     computed landings moved by at most this, or 3 % of the flight, see tests/choice/test_windows.py.  An impact on an
     edge that lets 1 um of height move the landing after it by 70 ms is beyond any such margin.
     """
