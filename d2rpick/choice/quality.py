@@ -127,7 +127,7 @@ _MOST_HIDDEN: Final = 0.3
 # Of the standard deviation: an energy passes its mean when it gets so far beyond it; noise near it does not count.
 _BAND: Final = 0.25
 # Of the energy that the next contact puts into the parts: an error of the vibration with less of it does not make a
-# pair worse than good, or than fair (docs/explanation/validation.md).
+# pair worse than good, or than fair (docs/explanation/validation-vibration.md).
 _HARDLY_GOOD, _HARDLY_FAIR = 0.01, 0.05
 _NOT_CERTAIN: Final = "the flight is not certain"
 _UNKNOWN_LOAD: Final = (

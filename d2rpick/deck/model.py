@@ -122,8 +122,9 @@ Acting = TypeVar("Acting", Hold, Gravity, Joint)
 
 def placed(acting: Iterable[Acting], table: NodeTable) -> tuple[Acting, ...]:
     """Put places of nodes for their ids; nodes that are not in the table are left out."""
+    # The nodes of a joint are never None, which mypy reports for that kind alone.
     return tuple(
-        one if one.nodes is None else one._replace(nodes=table.known(one.nodes))
+        one if one.nodes is None else one._replace(nodes=table.known(one.nodes))  # type: ignore[redundant-expr]
         for one in acting
     )
 

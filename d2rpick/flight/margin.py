@@ -175,7 +175,7 @@ def landing_spread(history: History, flight: Flight) -> float | None:
     [1/time]; the crossings in the flight tell it.  ``K``: kinetic energy before the contact [energy]; it holds that of
     the rotation, which brings the surface to the ground as well.  ``n``: direction in which gravity has changed the
     momentum ``p`` of what flies; without gravity that of ``p``.
-    Source: docs/how-to/plan.md, "The margin before a contact";
+    Source: docs/explanation/planning.md, "The margin before a contact";
     computed landings moved by at most this, or 3 % of the flight, see tests/choice/test_windows.py.  An impact on an
     edge that lets 1 um of height move the landing after it by 70 ms is beyond any such margin.
     """

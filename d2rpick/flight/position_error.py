@@ -2,7 +2,7 @@
 
 A part that moves against the rest, an engine on its mounts, is frozen where it is at tr.  The centre of mass flies as
 if nothing had been switched, so the rest of the body is off by the part's share of the mass times its displacement
-against the rest from tr to td, in the frame that turns with the body (docs/explanation/choosing.md, "Out of place").
+against the rest from tr to td, in the frame that turns with the body (docs/explanation/flights.md, "Out of place").
 Displacements come from the velocities of the parts, which are their momenta over their masses.
 
 Of several rigid bodies each is off by itself, and the largest error counts.  One of a single part moves as the part

@@ -245,7 +245,7 @@ def taken_by_damping(
     Damping within the body takes energy of the vibration alone, whose energy V(t) ``vibration`` gives:
     :math:`K + E - V` is constant.  Damping proportional to mass takes the motion of the body as well, at the rate
     ``alpha`` of its vibration [1/time]: :math:`K + E + 2 \alpha \int K dt` is constant.  Nothing is fitted, so that
-    no load is taken for either (docs/explanation/choosing.md, "Energies that look like
+    no load is taken for either (docs/explanation/flights.md, "Energies that look like
     flight").  None where an energy is missing.
     """
     inside = window(balance.time, start, end)

@@ -204,9 +204,7 @@ def _ambiguous(case: Case) -> Iterator[Objection]:
         for name in card.scope.closure(value.parameters):
             first, *others = card.scope.definitions(name) or (None,)
             differing = [
-                other
-                for other in others
-                if other and first and other.value != first.value
+                other for other in others if first and other.value != first.value
             ]
             if first and differing and (card, name) not in seen:
                 seen.add((card, name))

@@ -233,7 +233,7 @@ class Solver:
                 os.killpg(int(text), sign)
             begun = time.monotonic()
             with suppress(KeyboardInterrupt):  # of somebody who cannot wait
-                while self.alive and time.monotonic() - begun < _ENDS:
+                while time.monotonic() - begun < _ENDS and self.alive:
                     time.sleep(_PAUSE)
 
     def silent_for(self) -> float:

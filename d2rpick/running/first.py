@@ -1,6 +1,6 @@
 """Cards of a first run that switches itself: no reference tells when it flies, so the solver sees it by contact forces.
 
-Radioss: legs that sensors end, each by /STOP/LSENSOR (docs/how-to/first-run.md).  LS-DYNA: a pair of
+Radioss: legs that sensors end, each by /STOP/LSENSOR (docs/reference/first-run.md).  LS-DYNA: a pair of
 switch sets with CODE 2 (no contact force) and 4 (contact force), from published text.
 """
 

@@ -2,7 +2,7 @@
 
 From the time that is the answer on, the momentum less gravity and damping is constant within 1e-4 of its largest value
 so far; where none is written, the energy of the contacts is.  It is a flight when that has lasted for a wait: a force
-that ends may come back, in a car that hit a block twice after 14 ms (docs/how-to/first-run.md, "The wait").
+that ends may come back, in a car that hit a block twice after 14 ms (docs/reference/first-run.md).
 
 What is left of a push that dies away makes the answer a little later as the flight goes on.  A contact makes it later
 than the middle of what the flight was.

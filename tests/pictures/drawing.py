@@ -108,12 +108,16 @@ def show_names(axes: Axes, place: Any = "best") -> None:
     axes.legend(loc=place, frameon=False, fontsize=8)
 
 
+def drawn(figure: Figure, name: str) -> bytes:
+    """Draw a figure as the svg file with this name."""
+    with mpl.rc_context(STYLE):
+        return without_trailing_blanks(render(figure, f"{name}.svg"))
+
+
 def write_figure(figure: Figure, name: str) -> None:
     """Write a figure as ``docs/pictures/NAME.svg``."""
     PLACE.mkdir(exist_ok=True)
-    with mpl.rc_context(STYLE):
-        content = render(figure, f"{name}.svg")
-    PLACE.joinpath(f"{name}.svg").write_bytes(without_trailing_blanks(content))
+    PLACE.joinpath(f"{name}.svg").write_bytes(drawn(figure, name))
 
 
 def without_trailing_blanks(content: bytes) -> bytes:
