@@ -20,7 +20,7 @@ _NAMES = {
     "api.running": "FirstRun first follow",
     "api.runs": "Run from_frame read",
     "api.studies": "Study study",
-    "running.watch": "Event",
+    "running.events": "Event",
     "vibration.oscillator": "Oscillator",
     "choice.cost": "Weights",
 }

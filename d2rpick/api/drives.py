@@ -159,7 +159,11 @@ class Driving:
         legs = driver.legs
         last = legs[-1].order.number if legs else 0
         names = [str(self.solver.history(number)) for number in range(1, last + 1)]
-        reasons = [leg.seen.why for leg in legs if leg.seen.why and not leg.seen.idle]
+        reasons = [
+            leg.findings.why
+            for leg in legs
+            if leg.findings.why and not leg.findings.idle
+        ]
         return Drive(
             run=open_run(names),
             deck=self.deck,

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from d2rpick.api.arguments import Parts
-    from d2rpick.running.watch import Event
+    from d2rpick.running.events import Event
 
 
 class FirstRun(NamedTuple):

@@ -36,9 +36,9 @@ class CardRequest(NamedTuple):
         )
         solver = self.solver or solver_of(history.format)
         printing = self.printing._replace(part=ids, end=end)
-        return solver, _pushed(printing, history) if "contact" in SOLVERS[
-            solver
-        ].takes else printing
+        if "contact" in SOLVERS[solver].takes:
+            printing = _with_pushes(printing, history, SOLVERS[solver].title)
+        return solver, printing
 
     def whom(self, history: History) -> tuple[int, ...]:
         """Give the parts or main nodes that the card switches; none where nobody says it."""
@@ -57,17 +57,30 @@ class CardRequest(NamedTuple):
         return self._replace(printing=self.printing._replace(bodies=bodies, off=off))
 
 
-def _pushed(printing: Printing, history: History) -> Printing:
-    """Say when something pushes the parts, and how fast they come to it, as far as momenta of parts show it."""
+def _with_pushes(printing: Printing, history: History, solver: str) -> Printing:
+    """Say when the named contact or rigid wall pushes, and how fast the parts come to it.
+
+    The force that the solver wrote of it shows the times, else the momenta of the parts do; only these show the speed.
+    """
     from d2rpick.flight.contact_times import (
         find_contact_times,
+        find_force_times,
     )  # not above: other cards do without
+    from d2rpick.histories.contact_forces import find_force
 
     momenta = next((one for one in history.momenta if one.parts), None)
-    found = find_contact_times(momenta) if momenta else None
-    return (
-        printing._replace(pushed=found.spans, speed=found.speed) if found else printing
+    by_momenta = find_contact_times(momenta) if momenta else None
+    contact = "interface" if solver == "Radioss" else "contact"
+    named = (
+        ("rigid wall", printing.wall)
+        if printing.contact is None
+        else (contact, printing.contact)
     )
+    kind, number = named
+    force = find_force(history.evidence.forces, kind, number or 0)
+    found = (find_force_times(force) if force else None) or by_momenta
+    speed = by_momenta.speed if by_momenta else None
+    return printing._replace(pushed=found.spans, speed=speed) if found else printing
 
 
 class SolverInput(NamedTuple):
@@ -119,13 +132,24 @@ def judged_card(
     solver, printing = request.of(history)
     every = sorted((*done, *windows))
     plain = cards(every, printing, solver)
+    printed = plain.windows
+    if "contact" in SOLVERS[solver].takes:
+        printed = _narrowed(printed, history)
     verdicts = tuple(
         judge(*times)
-        for asked, times in zip(every, plain.windows, strict=True)
+        for asked, times in zip(every, printed, strict=True)
         if asked not in done
     )
     remarks = tuple(_remarks(done, history, verdicts))
     return cards(every, printing, solver, remarks), verdicts
+
+
+def _narrowed(windows: Sequence[Times], history: History) -> tuple[Times, ...]:
+    """Give windows of switches by force as they are judged: between states."""
+    from d2rpick.flight.contact_times import narrow_to_states  # as above
+
+    narrowed = (narrow_to_states(history.time, *window) for window in windows)
+    return tuple((tr, td) for tr, td in narrowed if td is not None)
 
 
 def _remarks(

@@ -31,6 +31,9 @@ EQUALLY_GOOD = 0.02
 LIKE_LEVELS = TOLERATED_GROWTH
 # Level error that rounding leaves of a crossing at most, of a level above this share of the highest energy.
 ROUNDING: Final = 1e-3
+# Errors are compared to so many decimals.  Pairs of equal error, as on all swings of one mode, differ in the last
+# digits by how the numbers were written: those would decide which pair comes first.
+_DECIMALS: Final = 4
 # Rigid times within this share of the longest are alike: there a body that stays in place is worth more.
 _LIKE_TIMES = 0.1
 
@@ -85,6 +88,7 @@ def order(
     Of these come the longest rigid times first, but behind those within a tenth of the longest those that are ``off``.
     The others follow by error.
     """
+    error = np.round(error, _DECIMALS)
     good = error <= (_extreme(np.minimum, group, error, room.size) + room)[group]
     longest = _extreme(np.maximum, group, np.where(good, rigid, -np.inf), room.size)
     near = good & (rigid >= (1 - _LIKE_TIMES) * longest[group])

@@ -148,6 +148,8 @@ def _of_grazing(situation: Situation) -> Iterator[Caution]:
     ):
         return
     grazed = f"the force of the contact at {flight.end:.6g} stays below 1 % of the largest one at first"
+    if margin.grazing == "momentum":
+        grazed = f"the contact at {flight.end:.6g} takes less than 10 % of the momentum towards it"
     early = min(margin.time, flight.end - flight.start)
     moved = f"the body grazes it, and if it is out of place at td, that contact comes up to {early:.2g} earlier"
     kept = (

@@ -8,6 +8,7 @@ and none acts again before TIME3 of the last switch is over.  Not tried with the
 from __future__ import annotations
 
 import math
+from itertools import cycle
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
@@ -31,7 +32,11 @@ class ForceSwitch(NamedTuple):
 
 
 def follow_pair(
-    first: ForceSwitch, other: ForceSwitch | None, contacts: Spans, end: float
+    first: ForceSwitch,
+    other: ForceSwitch | None,
+    contacts: Spans,
+    end: float,
+    other_contacts: Spans | None = None,
 ) -> list[tuple[float, float | None]]:
     """Give the windows in which a set and its pair make their parts rigid.
 
@@ -43,6 +48,9 @@ def follow_pair(
         When something pushes, ascending [time].
     end : float
         Of the run [time].
+    other_contacts : sequence of (float, float), optional
+        When something pushes as the other set sees it: it may wait for the force of another contact, or be early by
+        its OFFSET.  As ``contacts`` by default.
 
     Returns
     -------
@@ -56,7 +64,8 @@ def follow_pair(
     [(0.03, 0.05), (0.07, None)]
     """
     windows: list[tuple[float, float | None]] = []
-    for time, to_rigid in _switches(first, other, contacts, end):
+    others = contacts if other_contacts is None else other_contacts
+    for time, to_rigid in _switches((first, contacts), (other, others), end):
         if to_rigid and not (windows and windows[-1][1] is None):
             windows.append((time, None))
         elif not to_rigid and windows and windows[-1][1] is None:
@@ -65,19 +74,21 @@ def follow_pair(
 
 
 def _switches(
-    first: ForceSwitch, other: ForceSwitch | None, contacts: Spans, end: float
+    first: tuple[ForceSwitch, Spans],
+    second: tuple[ForceSwitch | None, Spans],
+    end: float,
 ) -> Iterator[tuple[float, bool]]:
-    """Give when the sets act, in turn, and whether they make their parts rigid."""
-    ready, acting, waiting = 0.0, first, other
-    while True:
+    """Give when the sets act, in turn, and whether they make their parts rigid; each by the contacts that it sees."""
+    ready = 0.0
+    turns = cycle((first, second)) if first[0].paired else iter((first, second))
+    for acting, contacts in turns:
+        if acting is None:
+            return
         time = _next(acting.with_force, max(acting.earliest, ready), contacts)
         if time >= end or time > acting.latest:
             return
         yield time, acting.to_rigid
-        if waiting is None or (waiting is first and not waiting.paired):
-            return
         ready = max(time + acting.delay, math.nextafter(time, math.inf))
-        acting, waiting = waiting, acting
 
 
 def _next(with_force: bool, since: float, contacts: Spans) -> float:

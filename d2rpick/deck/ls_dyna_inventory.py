@@ -218,6 +218,23 @@ def first_parts(cards: Sequence[Card], parts: Collection[int]) -> dict[int, int]
     return found
 
 
+def find_parts_of_nodes(
+    cards: Sequence[Card], nodes: Collection[int]
+) -> dict[int, set[int]]:
+    """Find the parts whose elements have some nodes, by node; a node of no element has none."""
+    found: dict[int, set[int]] = {}
+    wanted = {*nodes}
+    for card in cards:
+        for _, owners, members in _elements(card, _TEN):
+            rows = np.isin(members, [*wanted]).any(axis=1)
+            for part, own in zip(
+                owners[rows].tolist(), members[rows].tolist(), strict=True
+            ):
+                for node in wanted.intersection(own):
+                    found.setdefault(node, set()).add(part)
+    return found
+
+
 def _nodes_of(
     cards: Sequence[Card], parts: Collection[int]
 ) -> Iterator[tuple[int, int]]:

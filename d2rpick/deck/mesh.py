@@ -378,23 +378,20 @@ def parts_with_elements(starter: Starter) -> set[int]:
 
 
 def parts_within(
-    starter: Starter, groups: Mapping[int, Collection[int]]
+    starter: Starter, groups: Mapping[int, tuple[Collection[int], Collection[int]]]
 ) -> dict[int, set[int]]:
-    """Parts all of whose nodes are some of these, by the keys of ``groups``."""
-    known = {key: np.array([0, *group]) for key, group in groups.items()}
-    inside: dict[tuple[int, int], bool] = {}
-    for part, nodes in _elements(starter):
-        real = bool((nodes > 0).any(axis=1).all())
-        for key, own in known.items():
-            inside[key, part] = (
-                inside.get((key, part), True)
-                and real
-                and bool(np.isin(nodes, own).all())
-            )
-    return {
-        key: {part for (one, part), whole in inside.items() if whole and one == key}
-        for key in groups
-    }
+    """Parts all of whose nodes are some of these, or nodes of some parts, by the keys of ``groups``."""
+    elements = [*_elements(starter)]
+    inside: dict[int, set[int]] = {}
+    for key, (nodes, parts) in groups.items():
+        of_parts = [members.ravel() for part, members in elements if part in parts]
+        known = np.unique(np.concatenate([np.array([0, *nodes]), *of_parts]))
+        inside[key] = {part for part, _ in elements}
+        for part, members in elements:
+            real = bool((members > 0).any(axis=1).all())
+            if part in inside[key] and not (real and np.isin(members, known).all()):
+                inside[key].discard(part)
+    return inside
 
 
 def _elements(starter: Starter) -> Iterator[tuple[int, Integers]]:

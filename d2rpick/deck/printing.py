@@ -111,14 +111,7 @@ def _window(
         [*to_deformable(ids, part_sets)],
     )  # with a comment each
     cap = printing.step_cap or choose_step_cap(*map(float, texts))
-    deleted = [
-        flag * _DELETE
-        for flag in (printing.delete_nodal_bodies, printing.delete_node_sets)
-    ]
-    activated = [
-        flag * _ACTIVATE
-        for flag in (printing.delete_nodal_bodies, printing.delete_node_sets)
-    ]
+    deleted, activated = _constraint_flags(printing)
     yield from (
         *header(
             sets[0], texts[0], shortest(cap), (len(rigid) - 1, 0), constraints=deleted
@@ -129,6 +122,12 @@ def _window(
         *header(sets[1], texts[1], "0.0", (0, len(free) - 1), constraints=activated),
         *free,
     )
+
+
+def _constraint_flags(printing: Printing) -> tuple[list[int], list[int]]:
+    """Give NRBF and NCSF of the set that makes parts rigid, and of the one that makes them deformable."""
+    asked = (printing.delete_nodal_bodies, printing.delete_node_sets)
+    return [flag * _DELETE for flag in asked], [flag * _ACTIVATE for flag in asked]
 
 
 def _ls_dyna_contact(
@@ -170,13 +169,14 @@ def _ls_dyna_contact(
     lines = [f"$ {line}" for line in told]
     for members, name in part_sets.items():
         lines += write_part_set(members, name)
+    deleted, activated = _constraint_flags(printing)
+    earliest, counts = shortest(timing.earliest), (len(rigid) - 1, 0)
     lines += (
-        *header(
-            first, shortest(timing.earliest), shortest(cap), (len(rigid) - 1, 0), waits
-        ),
+        *header(first, earliest, shortest(cap), counts, waits, deleted),
         *rigid,
+        *header(second, "0.0", "0.0", (0, len(back) - 1), returns, activated),
+        *back,
     )
-    lines += (*header(second, "0.0", "0.0", (0, len(back) - 1), returns), *back)
     text = "\n".join(lines) + "\n"
     return PrintedCard(text, timing.windows, {_FILE: text})
 
@@ -338,7 +338,8 @@ def _force_of(printing: Printing) -> tuple[str, int, Pushes]:
         )
     if not printing.pushed:
         raise DeckError(
-            "a card for switches by force needs a history with momenta that show when something pushes"
+            "a card for switches by force needs a history with the force of that contact or wall, or with momenta of"
+            " the parts"
         )
     kind, number = (
         ("INTER", printing.contact)

@@ -24,7 +24,7 @@ from d2rpick.deck.radioss_rigid import (
 from d2rpick.deck.source import Block, SourceFile
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
 
 _INCLUDE = b"#include"
@@ -333,8 +333,12 @@ class Starter:
 
     def _last_node(self) -> int:
         """Highest id of a node."""
-        lines = (line for card in self.named("NODE") for _, line in card.block.lines())
-        return max((whole(line[:_WIDTH]) for line in lines), default=0)
+        return max(self._node_ids(), default=0)
+
+    def _node_ids(self) -> Iterator[int]:
+        for card in self.named("NODE"):
+            for _, line in card.block.lines():
+                yield whole(line[:_WIDTH])
 
     @cached_property
     def parts(self) -> Mapping[int, PartLine]:
@@ -425,10 +429,14 @@ class Starter:
         """Nodes and whole parts of a group of nodes; None where they cannot be known."""
         nodes, parts = set[int](), set[int]()
         for kind, ids in map(self._group, reached([group], self._groups_in)):
-            if kind == "NODE":
+            if kind in ("NODE", "NODENS"):
                 nodes.update(ids)
+            elif kind == "GENE" and -1 not in ids:
+                nodes.update(self._nodes_in_ranges(ids))
             elif kind == "PART":
                 parts.update(ids)
+            elif kind in ("MAT", "PROP"):
+                parts.update(self._parts_of(kind, ids))
             elif kind == "SUBSET":
                 below = {*reached(ids, lambda one: self.subsets.get(one, ()))}
                 parts.update(
@@ -437,6 +445,22 @@ class Starter:
             elif kind != "GRNOD" or any(one <= 0 for one in ids):
                 return None
         return nodes, parts
+
+    def _nodes_in_ranges(self, ends: Sequence[int]) -> Iterator[int]:
+        """Give the nodes of the deck from a first to a last one, of each pair of ends."""
+        ranges = [
+            range(first, last + 1)
+            for first, last in zip(ends[::2], ends[1::2], strict=False)
+        ]
+        for node in self._node_ids():
+            if any(node in among for among in ranges):
+                yield node
+
+    def _parts_of(self, kind: str, ids: Collection[int]) -> Iterator[int]:
+        """Give the parts that have one of some materials, or properties."""
+        for part, line in self.parts.items():
+            if (line.material if kind == "MAT" else line.prop) in ids:
+                yield part
 
     def _group(self, group: int) -> tuple[str, tuple[int, ...]]:
         return self.groups.get(group, ("", ()))

@@ -1,7 +1,8 @@
 """Rigid bodies as the starter of Radioss makes them: with a main node each, and merged as /MERGE/RBODY asks for.
 
 Source: the published source of OpenRadioss at bd4557ba7 (hm_read_merge.F, hm_rbodies_add_main_node.F90), and runs
-computed with it.
+computed with it.  Bodies of parts were not computed, as the function that makes them is in no program at hand: their
+columns are those of the format file (radioss2612, part.cfg), their order is that of a public version of the function.
 """
 
 from __future__ import annotations
@@ -131,10 +132,13 @@ def make_rigid_bodies(
 def _add_main_nodes(
     in_deck: Sequence[Body], last_node: Callable[[], int]
 ) -> Iterator[Body]:
-    """Number the main nodes that the starter makes: above all nodes, by the ids of the bodies, those of parts last."""
+    """Number the main nodes that the starter makes: above all nodes, by the ids of the bodies.
+
+    The bodies of parts come last, in the order of the parts in the deck: their ids are above all others.
+    """
     lacking = sorted(
         (body for body in in_deck if not body.node.value),
-        key=lambda body: (body.part, body.id),
+        key=lambda body: (bool(body.part), body.id),
     )
     first = last_node() + 1 if lacking else 0
     numbers = {body: number for number, body in enumerate(lacking, start=first)}

@@ -42,10 +42,11 @@ from d2rpick.deck.switching import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 
-    Contacts = Callable[[Collection[int]], tuple[tuple[float, float], ...] | None]
-
     from d2rpick.deck.card import Card
     from d2rpick.deck.radioss_rigid import Body
+    from d2rpick.deck.radioss_sensors import Forces, Spans
+
+    Contacts = Callable[[Collection[int]], Spans | None]
 
 
 @dataclass(eq=False, repr=False)
@@ -195,11 +196,14 @@ def in_order(legs: list[Leg]) -> bool:
     )
 
 
-def find_run_windows(run: Run, contacts: Contacts | None = None) -> RunWindows:
+def find_run_windows(
+    run: Run, contacts: Contacts | None = None, forces: Forces | None = None
+) -> RunWindows:
     """Follow every body that a leg or a sensor switches through the run.
 
     A body whose parts are not known is one unit, named by its main node.  Legs that are not in order have no windows.
-    ``contacts`` gives when something pushes some parts, for sensors of forces; None where no history shows it.
+    For sensors of forces ``contacts`` gives when something pushes some parts, and ``forces`` when an interface or wall
+    pushes anything; None where no history shows it.
     """
     sets = tuple(_switches(run.legs)) if in_order(run.legs) else ()
     starter = None if run.starter and run.starter.moved else run.starter
@@ -220,7 +224,10 @@ def find_run_windows(run: Run, contacts: Contacts | None = None) -> RunWindows:
                 windows += _follow(unit, node, sets, run.legs[0])
     for node in sorted(sensors):
         windows += _by_sensor(
-            run, bodies[node], parts, find_course(run, parts.get(node, ()), contacts)
+            run,
+            bodies[node],
+            parts,
+            find_course(run, parts.get(node, ()), contacts, forces),
         )
     for body in bodies.values():
         if body.part and not body.sensor and body.node.value not in switched:
@@ -274,7 +281,12 @@ def _follow(
     ]
 
 
-def find_course(run: Run, parts: Collection[int], contacts: Contacts | None) -> Course:
+def find_course(
+    run: Run,
+    parts: Collection[int],
+    contacts: Contacts | None,
+    forces: Forces | None = None,
+) -> Course:
     """Give what is known of the course of a run for sensors that switch some parts."""
     known = (
         contacts is not None
@@ -282,7 +294,7 @@ def find_course(run: Run, parts: Collection[int], contacts: Contacts | None) -> 
         and run.starter is not None
         and only_force(run.starter)
     )
-    return Course(run.resets, contacts(parts) if known and contacts else None)
+    return Course(run.resets, contacts(parts) if known and contacts else None, forces)
 
 
 def _by_sensor(
@@ -327,7 +339,7 @@ def _always(body: Body) -> Window:
 
 
 def rigid_parts(starter: Starter, bodies: Mapping[int, int]) -> dict[int, set[int]]:
-    """Parts that lie whole in the group of each body.
+    """Parts that lie whole in the group of each body: those that it names, and those all of whose nodes it has.
 
     Parameters
     ----------
@@ -342,12 +354,15 @@ def rigid_parts(starter: Starter, bodies: Mapping[int, int]) -> dict[int, set[in
         Parts by main node; empty where the members of the group are not known.
     """
     members = {node: starter.group_members(group) for node, group in bodies.items()}
-    named = {node: set(known[1]) if known else set() for node, known in members.items()}
-    of_nodes = {node: known[0] for node, known in members.items() if known and known[0]}
-    if of_nodes:
+    known = {node: found for node, found in members.items() if found}
+    named = {node: {*known[node][1]} if node in known else set() for node in bodies}
+    every = starter.parts.keys()
+    # another part may lie in the nodes of those that are named, as a skin does
+    asked = {node: found for node, found in known.items() if every - found[1]}
+    if asked:
         from d2rpick.deck.mesh import parts_within  # loads numpy
 
-        for node, parts in parts_within(starter, of_nodes).items():
+        for node, parts in parts_within(starter, asked).items():
             named[node] |= parts
     return named
 

@@ -17,28 +17,39 @@ from d2rpick.deck.card import Row
 from d2rpick.deck.radioss_deck import Starter, below_title, reals
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     Spans = tuple[tuple[float, float], ...]  # of time
+    # When the force of an interface or rigid wall acts, by its kind and number; None where that is not known.
+    Forces = Callable[[str, int], Spans | None]
 
 STOPS_SINCE: Final = (
     2023  # version of the format in whose description a sensor of time has an end
 )
 NEVER: Final = 1e20
-_OF_FORCES: Final = ("INTER", "RWALL")
+# Sensors of forces, and what histories call that of which they are.
+_OF_FORCES: Final = {"INTER": "interface", "RWALL": "rigid wall"}
 # Ties, fluids, and parts of other contacts: they push nothing that flies.
 WITHOUT_FORCE: Final = {"TYPE1", "TYPE2", "TYPE9", "TYPE12", "TYPE18", "SUB"}
 _WIDTH: Final = 10
+_SINGLE: Final = 1e-6  # times of a T01 have seven digits
 
 
 class Course(NamedTuple):
     """What is known of a run: when sensors are reset for the first time, by number, and when something pushes [time].
 
-    ``contacts`` are spans of the only contact or rigid wall of the deck; None where no history shows them.
+    ``contacts`` are spans of the only contact or rigid wall of the deck; None where no history shows them.  ``forces``
+    gives those of each by what the solver wrote of its force; these come first.
     """
 
     resets: Mapping[int, float] = MappingProxyType({})
     contacts: Spans | None = None
+    forces: Forces | None = None
+
+    def find_contacts(self, kind: str, number: int) -> Spans | None:
+        """Find when an interface or rigid wall pushes [time]; None where no history shows it."""
+        written = self.forces(kind, number) if self.forces else None
+        return self.contacts if written is None else written
 
 
 _UNKNOWN: Final = Course()
@@ -91,8 +102,13 @@ def _while_pushed(
     starter: Starter, number: int, rows: Sequence[Row], course: Course
 ) -> Spans | str:
     """Follow a sensor of any force: active from the force on, or Tmin later, to Tdelay after it."""
-    name = f"sensor {number} (/SENSOR/{starter.sensors[number].words[1]}), which waits for a force"
-    if course.contacts is None or len(rows) < 2:
+    keyword = starter.sensors[number].words[1]
+    name = f"sensor {number} (/SENSOR/{keyword}), which waits for a force"
+    if len(rows) < 2:
+        return name
+    entity = starter.sensors[number].integer(rows[1], 0).value
+    contacts = course.find_contacts(_OF_FORCES[keyword], entity)
+    if contacts is None:
         return name
     lowest, highest, needed = reals(
         Row(rows[1].block, rows[1].distance, rows[1].text[2 * _WIDTH :], _WIDTH), 3
@@ -105,21 +121,30 @@ def _while_pushed(
     return either(
         [
             tuple(
-                (start + needed, end + wait)
-                for start, end in course.contacts
+                (start + needed, (end + wait) * (1 + _SINGLE))
+                for start, end in contacts
                 if end - start >= needed
             )
         ]
     )
 
 
-def waits_for_force(starter: Starter, number: int) -> bool:
-    """Whether a sensor, or one that it asks for, waits for a force."""
-    asked = reached([number], lambda one: _asked(starter, one))
-    return any(
-        one in starter.sensors and starter.sensors[one].words[1] in _OF_FORCES
-        for one in asked
-    )
+def find_contacts_of_sensor(
+    starter: Starter, number: int, course: Course
+) -> Spans | None:
+    """Find when those forces act for which a sensor, or one that it asks for, waits [time].
+
+    None where it waits for none, or where no history shows it.
+    """
+    known = []
+    for other in reached([number], lambda asking: _asked(starter, asking)):
+        card = starter.sensors.get(other)
+        rows = below_title(card) if card and card.words[1] in _OF_FORCES else ()
+        if card and len(rows) > 1:
+            kind, entity = _OF_FORCES[card.words[1]], card.integer(rows[1], 0).value
+            known.append(course.find_contacts(kind, entity))
+    spans = [contacts for contacts in known if contacts is not None]
+    return either(spans) if spans else None
 
 
 def _asked(starter: Starter, number: int) -> Sequence[int]:

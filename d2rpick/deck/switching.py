@@ -419,8 +419,14 @@ class Windows(NamedTuple):
     other_deformable: frozenset[Unit]
 
 
-def find_windows(sets: Iterable[SwitchSet], parts: Parts) -> Windows:
+def find_windows(
+    sets: Iterable[SwitchSet],
+    parts: Parts,
+    by_sensor: Iterable[tuple[float, Event]] = (),
+) -> Windows:
     """Follow every part through the cards in the order of their times.
+
+    ``by_sensor`` are switches whose times are known from elsewhere.
 
     Part sets are resolved to their parts.  A part that is made rigid while it is rigid (a new lead) stays in
     its window.  When a part is switched back first and made rigid later and nothing else matches, the two
@@ -431,6 +437,8 @@ def find_windows(sets: Iterable[SwitchSet], parts: Parts) -> Windows:
     for event in events:
         if event.by.time is not None:
             timed[event.unit].append((event.by.time, event))
+    for time, event in by_sensor:
+        timed[event.unit].append((time, event))
     windows: list[Window] = []
     orphans: list[Event] = []
     for unit in sorted(timed):

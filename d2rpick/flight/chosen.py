@@ -1,4 +1,4 @@
-"""The flight that counts at a td: by the evidence, by an oscillator or the energy, and by what the user gives."""
+"""Choose the flight that counts at a td: from the evidence, an oscillator, the energy, or what the user gives."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ if TYPE_CHECKING:
     from d2rpick.flight.flight import Seen
     from d2rpick.histories.history import History, Samples
 
-# So often an energy that keeps its level turns at least, or it does not change.
+# An energy that keeps its level has at least this many turning points; with fewer it must not change.
 _LEAST_TURNS: Final = 4
 
 
 class Described(NamedTuple):
-    """Window that a vibration describes, from its first sample to its last [time].
+    """A window in which a model describes the vibration, from its first to its last state [time].
 
-    ``energy`` gives kinetic and elastic energy of the vibration at times (n,); ``alpha`` is its damping, None of
-    several modes with dampings of their own [1/time].
+    ``energy`` returns the kinetic plus elastic energy of the vibration at times (n,).  ``alpha`` is its damping
+    [1/time], None if several modes have different dampings.
     """
 
     start: float
@@ -37,9 +37,9 @@ class Described(NamedTuple):
 def find_flight(
     history: History, td: float, seen: Seen, described: Described | None
 ) -> Flight:
-    """Choose the best answer to when the load is over: by the evidence, by the oscillator, by the energy.
+    """Choose the flight at ``td``: from the evidence, else from an oscillator, else from the energy alone.
 
-    ``seen`` is what the evidence shows, ``described`` what an oscillator does.
+    ``seen`` is the result of the evidence, ``described`` the window that an oscillator or modes describe.
     """
     if seen.held:
         return Flight(refusal=seen.refusal)
@@ -94,17 +94,17 @@ def begun_at(
     after: float,
     described: Described | None,
 ) -> Flight:
-    """Let the flight around td begin where the user says that the load ends, ``after`` [time].
+    """Start the flight around ``td`` at the time ``after`` [time] at which the user says that the load ends.
 
-    What the evidence has against that becomes a doubt.  A contact that it shows between ``after`` and td still ends
-    the flight, as the user has not spoken of that.
+    Evidence against this becomes a doubt.  A contact that the evidence shows between ``after`` and td still ends the
+    flight, since the user has said nothing about it.
     """
     if (
         flight.start is None
         or flight.source == "energy"
         or _lies_elsewhere(flight, td, after)
     ):
-        if described is None:  # many td have the same one
+        if described is None:  # many td share this landing
             end = history.known.once(
                 ("landing", after), lambda: landing_after(history, after)
             )
@@ -123,7 +123,7 @@ def begun_at(
     doubts, shows_start = (
         flight.doubts,
         flight.source != "oscillator",
-    )  # which is sought from `after` on
+    )  # an oscillator is searched from `after` on, so its start shows nothing
     if shows_start and after < flight.start - same_within(
         history, *flight.within(history.time)
     ):
@@ -133,9 +133,9 @@ def begun_at(
 
 
 def landed_at(history: History, flight: Flight, td: float, landing: float) -> Flight:
-    """Let the flight around td end where the user says that the next contact is, ``landing`` [time].
+    """End the flight around ``td`` at the time ``landing`` [time] of the next contact that the user gives.
 
-    What the evidence has against that becomes a doubt.
+    Evidence against this becomes a doubt.
     """
     if flight.start is None or landing <= flight.start:
         return flight
@@ -157,14 +157,14 @@ def landed_at(history: History, flight: Flight, td: float, landing: float) -> Fl
 
 
 def _lies_elsewhere(flight: Flight, td: float, after: float) -> bool:
-    """Whether nothing flies at td, and the nearest flight is over before ``after``, or begins behind td."""
+    """Return True if nothing flies at td and the nearest flight ends before ``after`` or begins after td."""
     if not flight.refusal or flight.start is None:
         return False
     return flight.start > td or (flight.end is not None and flight.end <= after)
 
 
 def _with_refusal(flight: Flight) -> tuple[str, ...]:
-    """Doubts of a flight that is given, with what the evidence has against it."""
+    """Return the doubts about a flight that the user gives, including the reason why the evidence refuses it."""
     if not flight.refusal:
         return flight.doubts
     return (
@@ -174,11 +174,12 @@ def _with_refusal(flight: Flight) -> tuple[str, ...]:
 
 
 def _end_of(history: History, described: Described) -> float | None:
+    """Return the end of a described window, None if it is the end of the record."""
     return described.end if described.end < history.time[-1] else None
 
 
 def _load_beside(history: History, described: Described) -> float:
-    """Give NaN if energies change in a window by more than the damping of its vibration takes, else 0."""
+    """Return NaN if the energies in a window change by more than the damping of the vibration explains, else 0."""
     from d2rpick.flight.work import taken_by_damping
 
     taken = (
@@ -190,7 +191,10 @@ def _load_beside(history: History, described: Described) -> float:
 
 
 def _fed(history: History, start: float, end: float) -> str | None:
-    """Say so when kinetic and internal energy together change, or nothing moves but the vibration, as in no flight."""
+    """Return the reason why energies show that a window is no flight, None if they do not.
+
+    Either kinetic plus internal energy changes, or nothing but the vibration moves.
+    """
     balance, energy = history.balance, history.mean_energy(start, end)
     if balance is None or energy is None or balance.kinetic_and_internal is None:
         return None

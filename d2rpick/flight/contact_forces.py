@@ -1,7 +1,7 @@
-"""Flight seen in the forces of contacts and rigid walls: a window in which none of them acts.
+"""Find flights from the forces of contacts and rigid walls: windows in which none of them acts.
 
-Forces are exact where energies and momenta are not: what touches nothing has none.  But a contact does not say which
-parts it is of, and one whose force is not written may act all the same, as may any other load.
+Forces are exact where energies and momenta are not: a part that touches nothing has none.  But a contact does not name
+its parts, and a contact whose force is not written, or any other load, may act all the same.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ if TYPE_CHECKING:
     from d2rpick.histories.contact_forces import ContactForce
     from d2rpick.histories.history import History, Momenta, Samples
 
-# Of the impulse of a contact that acts from outside, which is in the momentum as it is: samples of a force that is hit
-# and miss leave a third of it open.
+# Least share of its impulse that a contact from outside leaves in the model's momentum. The forces of sampled,
+# intermittent contacts leave 1/3 of it open.
 _INNER: Final = 0.2
-# Means of the energy over so many pieces of computed flights rise by up to 0.06 of the highest energy, where many modes
-# beat; a crash lifts them to it.
+# Number of pieces of a flight whose mean energies are compared, and the rise between them that shows a crash, as a
+# share of the highest energy. Computed flights with many beating modes rise by up to 0.06; a crash by nearly 1.
 _PIECES: Final = 4
 _RISE: Final = 0.1
 
 
 class Touches(NamedTuple):
-    """Between which states anything touches: ``acts`` (n,) tells it of the time since the state before, at ``time``."""
+    """The intervals in which a contact acts: ``acts`` (n,) for the one that ends at the state ``time`` (n,)."""
 
     time: Samples
     acts: NDArray[np.bool_]
@@ -41,11 +41,11 @@ class Touches(NamedTuple):
     def of(
         cls, forces: Sequence[ContactForce], whole: Momenta | None = None
     ) -> Touches | None:
-        """Put the forces of all contacts together that act at some times and not at others; None without.
+        """Join the forces of all contacts that act at some times and not at others; return None if there is none.
 
-        A contact that always acts holds parts together, as a tied one; one that never acts may not be of these parts.
-        One that does not change the momentum of the ``whole`` model, where that is known, is between its own parts.
-        Of forces that were written at different times the time counts that all have.
+        A contact that always acts holds parts together, like a tied one; one that never acts may belong to other parts.
+        One that does not change the momentum of the ``whole`` model, if this is known, acts between the model's own
+        parts.  If the forces were written at different times, the period that all of them cover is used.
         """
         telling = [force for force in forces if force.tells]
         telling = telling if whole is None else _from_outside(telling, whole)
@@ -66,9 +66,9 @@ class Touches(NamedTuple):
         return cls(time, acts)
 
     def flight_around(self, td: float) -> FreeFlight | None:
-        """Give the window around ``td`` [time] in which nothing touches; None where something does, or it is too short.
+        """Return the window around ``td`` [time] in which nothing touches, None if something does or it is too short.
 
-        No force tells whether gravity acts, so it is not known (NaN).
+        Forces do not show whether gravity acts, so gravity is NaN.
         """
         time = self.time
         if not time[0] <= td <= time[-1]:
@@ -89,10 +89,11 @@ class Touches(NamedTuple):
 
 
 def _from_outside(forces: Sequence[ContactForce], whole: Momenta) -> list[ContactForce]:
-    """Give the forces whose impulses are found in the momentum of the model, beside that of a constant gravity.
+    """Return the forces whose impulses appear in the model's momentum, in addition to a constant gravity.
 
-    An impulse from outside changes the momentum by itself, with either sign, since a file may tell of either side; of
-    velocities, whose mass is not known, the largest share stands for that.  What is not known stays.
+    An impulse from outside changes the momentum by its full size, with either sign, since a file may contain either
+    side of the contact.  For velocities, whose mass is unknown, the largest share counts as the full size.  Forces
+    whose impulses are unknown are kept.
     """
     known = [force for force in forces if np.isfinite(force.impulses).all()]
     if not known or whole.time.size <= len(known) + 1:
@@ -118,7 +119,7 @@ def _from_outside(forces: Sequence[ContactForce], whole: Momenta) -> list[Contac
 
 
 def _between(force: ContactForce, time: Samples) -> Samples:
-    """Impulses between other times (m,), of shape (m - 1, 3)."""
+    """Return the impulses of a force between other times (m,), shape (m - 1, 3)."""
     sums = np.cumsum(force.impulses, axis=0)
     return np.diff(
         np.stack([np.interp(time, force.time, axis) for axis in sums.T], axis=1), axis=0
@@ -126,9 +127,9 @@ def _between(force: ContactForce, time: Samples) -> Samples:
 
 
 def is_deformed(history: History, flight: FreeFlight) -> bool:
-    """Whether the internal energy rises in a flight by forces as where a load acts whose force is not written.
+    """Return True if the internal energy rises in a flight shown by forces: a load without a force acts.
 
-    In flight it vibrates about its level, or falls by damping.
+    In a flight the energy vibrates about its level or falls by damping.
     """
     energy = history.between(flight.start, flight.end)[1]
     means = np.array(

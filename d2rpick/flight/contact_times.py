@@ -1,8 +1,12 @@
-"""When a force acts on parts that gravity alone moves otherwise, interval by interval of the record, by their momenta.
+"""Find when a force other than gravity acts on the parts, for each output interval, from their momenta.
 
-Between two states the momentum of what flies changes by gravity alone.  The longest flight shows by how much; where it
-changes by more than that, and by more than the numbers leave open, something pushes.  A force that comes and goes
-within one interval is one force.
+In flight the momentum changes between two states by gravity alone.  The longest flight shows this change.  If the
+momentum changes by more than that, and by more than numerical errors, a force acts.  A force that starts and ends
+within one interval counts as one force.
+If the force of a contact is written, it is used without momenta.
+
+A force begins and ends somewhere within an interval of the record.  The middle of that interval is the best estimate,
+with an error of at most half an interval.
 """
 
 from __future__ import annotations
@@ -15,21 +19,24 @@ from d2rpick.flight.momentum import all_flights
 from d2rpick.histories.samples import stretches, window
 
 if TYPE_CHECKING:
-    from d2rpick.histories.history import Momenta
+    from d2rpick.histories.contact_forces import ContactForce
+    from d2rpick.histories.history import Momenta, Samples
 
-# A force changes the momentum by so many times what digits and the solver's own errors do in the longest flight.
+# A force is seen if it changes the momentum by this many times the largest deviation in the longest flight.
 _SEEN: Final = 4.0
-# A force below this share of the weight is not seen: momenta of the first state are those of half a step before.
+# A force below this share of the weight is ignored: momenta of the first state are those of half a step before.
 _OF_WEIGHT: Final = 0.1
-# States at each end of the longest flight, in which the force before or after it may begin.
+# States at each end of the longest flight that are left out: the force before or after it may act in them.
 _EDGE: Final = 1
-_FEWEST: Final = 2  # intervals between these ends
+_FEWEST: Final = 2  # smallest number of intervals between these ends
+# A force that starts and ends within one interval is assumed to act in the middle third of it.
+_OF_ONE_INTERVAL: Final = 1 / 3
 
 
 class ContactTimes(NamedTuple):
-    """When something pushes: ``spans`` (from, to) [time], each known within ``interval``, that of the record there.
+    """Periods in which a force acts: ``spans`` (from, to) [time], each end known within half an ``interval``.
 
-    ``speed``: how fast the parts move at the end of the longest flight [length/time]; None without masses.
+    ``speed`` is the speed of the parts at the end of the longest flight [length/time], None without masses.
     """
 
     spans: tuple[tuple[float, float], ...]
@@ -38,12 +45,12 @@ class ContactTimes(NamedTuple):
 
 
 def find_contact_times(momenta: Momenta) -> ContactTimes | None:
-    """Find when a force other than gravity acts on the chosen parts and what flies with them.
+    """Find when a force other than gravity acts on the chosen parts and on the parts that fly with them.
 
     Returns
     -------
     ContactTimes or None
-        None where no flight shows what gravity does, or states are too few to tell.
+        None if no flight shows the effect of gravity, or there are too few states.
     """
     flights = all_flights(momenta)
     if not flights:
@@ -63,7 +70,7 @@ def find_contact_times(momenta: Momenta) -> ContactTimes | None:
         least, _OF_WEIGHT * float(np.linalg.norm(gravity)) * np.diff(time)
     )
     spans = tuple(
-        (float(time[part.start]), float(time[part.stop]))
+        _place_in_intervals(time, part.start, part.stop)
         for part in stretches(sizes > room)
     )
     mass = momenta.mass(members)
@@ -71,8 +78,70 @@ def find_contact_times(momenta: Momenta) -> ContactTimes | None:
     return ContactTimes(spans, float(np.diff(time).max()), speed)
 
 
+def narrow_to_states(
+    time: Samples, tr: float, td: float | None
+) -> tuple[float, float | None]:
+    """Give the first state from ``tr`` on and the last one up to ``td`` [time], between which a window is judged.
+
+    A switch by a contact comes with its first or last force, which is somewhere between two states.  The flight is
+    known to the last state without a force.  Where there is no state between them, both times stay.
+
+    Examples
+    --------
+    >>> narrow_to_states(np.array([0.0, 1.0, 2.0, 3.0]), 0.5, 2.5)
+    (1.0, 2.0)
+    """
+    states = time[(time >= tr) & (time <= (np.inf if td is None else td))]
+    if states.size < _FEWEST:
+        return tr, td
+    return float(states[0]), None if td is None else float(states[-1])
+
+
+def find_force_times(force: ContactForce, least: float = 0.0) -> ContactTimes | None:
+    """Find when the force of a contact or rigid wall acts, by what the solver wrote of it.
+
+    Parameters
+    ----------
+    force : ContactForce
+        As read from a file.
+    least : float
+        Only a mean force of an interval above this counts [force]; 0 for any.
+
+    Returns
+    -------
+    ContactTimes or None
+        None where there are too few states, or where forces are asked for of which only the changes are known.
+    """
+    time, acts = force.time, force.acts
+    if time.size < _FEWEST:
+        return None
+    steps = np.diff(time)
+    if least > 0:
+        if not np.isfinite(force.impulses).all():
+            return None
+        acts = acts.copy()
+        acts[1:] &= np.linalg.norm(force.impulses[1:], axis=1) > least * steps
+    spans = tuple(
+        _place_in_intervals(time, part.start, part.stop) for part in stretches(acts[1:])
+    )
+    return ContactTimes(spans, float(steps.max()))
+
+
+def _place_in_intervals(time: Samples, first: int, stop: int) -> tuple[float, float]:
+    """Place the ends of a force that acts in the intervals from ``first`` to before ``stop`` of the record.
+
+    A force that acts in the first interval, or in the last one, is taken to act from its start, or to its end.
+    """
+    start, end = float(time[first]), float(time[stop])
+    most = _OF_ONE_INTERVAL * (end - start)
+    later, earlier = float(time[first + 1] - start) / 2, float(end - time[stop - 1]) / 2
+    begins = start if first == 0 else start + min(later, most)
+    ends = end if stop == time.size - 1 else end - min(earlier, most)
+    return begins, ends
+
+
 def _find_members(momenta: Momenta, parts: object) -> tuple[int, ...]:
-    """Give the places of the parts that fly; those of the chosen ones where the momentum is that of the model."""
+    """Return the columns of the flying parts, or of the chosen parts if the momentum is that of the whole model."""
     flying = {part.id for part in parts} if isinstance(parts, tuple) else set()
     places = tuple(
         place for place, part in enumerate(momenta.parts or ()) if part.id in flying

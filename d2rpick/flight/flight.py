@@ -1,4 +1,4 @@
-"""When the parts fly: which evidence counts for the window around td in which nothing but gravity acts on them."""
+"""Decide when the parts fly: which source of evidence counts for the window around td in which only gravity acts."""
 
 from __future__ import annotations
 
@@ -10,7 +10,11 @@ import numpy as np
 
 from d2rpick.base.tuples import NamedTuple
 from d2rpick.flight.contact_forces import Touches, is_deformed
-from d2rpick.flight.internal_energy import moves_as_a_whole, settled_from
+from d2rpick.flight.internal_energy import (
+    moves_as_a_whole,
+    rises_as_it_yields,
+    settled_from,
+)
 from d2rpick.flight.window import SHORTEST, all_windows, marks, unheld
 
 if TYPE_CHECKING:
@@ -20,7 +24,7 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, History, Momenta, Samples
     from d2rpick.histories.names import Part
 
-# Where a flight may be known from, best first.
+# Sources of a flight, best first.
 SOURCES: Final = (
     "given",
     "momentum",
@@ -33,26 +37,26 @@ SOURCES: Final = (
 )
 _SURE: Final = ("given", "momentum", "oscillator")
 BY_ENERGIES: Final = ("contact-energy", "energy-balance")
-# In free flight no load works.  An energy that is off by 4 % is a deformation that is off by 0.02, within which two
-# candidates count as equally good.
+# Work of a load, as a share of the energy, that a flight may show. An energy off by 4 % is a deformation off by 0.02,
+# within which two candidates count as equally good.
 MOST_WORK: Final = 0.04
-# What must show every flight that a better source shows: a contact of any part is a contact.
+# Sources that must show every flight of a better source, since they see the contacts of any part.
 _AGREEING: Final = ("contact-force", "contact-energy")
-# Forces that are not written, and loads, do not show in the forces of contacts, nor do walls in energies.
+# Sources that miss some loads: forces that are not written, or fixed walls, which do no work.
 _PARTIAL: Final = (*BY_ENERGIES, "contact-force")
-# Ends of a flight by two sources are the same within this share of it, or so many output intervals.
+# Two sources show the same end of a flight within this share of it, or this many output intervals.
 _SAME, _SAME_STATES = 0.01, 3
 
 
 class Flight(NamedTuple):
-    """Window of free flight [time]; ``start`` None when unknown, ``end`` None when no next contact was seen.
+    """A window of free flight [time]; ``start`` is None if unknown, ``end`` None if no next contact was seen.
 
-    Where nothing flies at td, it is the last flight before td, or else the first after it, and ``refusal`` says what
-    shows that.  ``source`` tells how the start was found, one of `SOURCES`.  ``parts`` are those that were seen to
-    fly together, None where the momentum did not tell, or told it of the whole model.  ``damping`` is alpha of their
-    momentum [1/time], ``gravity`` what was taken for gravity [length/time^2], both as of `FreeFlight`.  ``doubts`` say
-    which sources contradict each other.  Of the energy alone: ``settled`` is when it had settled, from there to
-    ``start`` is given up for safety.  ``described``: one oscillator describes the energy in it.
+    If nothing flies at td, it is the last flight before td, or else the first one after it, and ``refusal`` gives the
+    reason.  ``source`` is the evidence for the start, one of `SOURCES`.  ``parts`` are the parts seen to fly together,
+    None for the whole model.  ``damping`` is the alpha of their momentum [1/time], ``gravity`` the acceleration assumed
+    to be gravity [length/time^2], see `FreeFlight`.  ``doubts`` list contradictions between sources.  For a flight from
+    the energy alone, ``settled`` is the time when the energy had settled; the time from there to ``start`` is left
+    unused for safety.  ``described`` is True if one oscillator describes the energy in the flight.
     """
 
     start: float | None = None
@@ -67,7 +71,7 @@ class Flight(NamedTuple):
     described: bool = False
 
     def within(self, time: Samples) -> tuple[float, float]:
-        """Give it as a window within a record of these times (n,) [time]."""
+        """Return the flight's window, with the ends of a record at times (n,) in place of unknown ones [time]."""
         first, last = float(time[0]), float(time[-1])
         return (
             first if self.start is None else self.start,
@@ -76,20 +80,20 @@ class Flight(NamedTuple):
 
     @property
     def by_parts(self) -> bool:
-        """Whether the momentum of its parts shows it: contacts and loads that the model has elsewhere do not count."""
+        """Return True if the parts' momentum shows the flight, so that contacts elsewhere do not matter."""
         return self.source == "momentum" and self.parts is not None
 
     @property
     def unknown_load(self) -> bool:
-        """Whether a load acts in it that may be gravity, or a pull, or friction, and nothing tells which."""
+        """Return True if a load acts in the flight that may be gravity, a pull or friction, and nothing tells which."""
         return self.source != "given" and not isfinite(self.gravity)
 
     @property
     def certain(self) -> bool:
-        """Whether nothing but free flight looks like that.
+        """Return True if nothing but a free flight looks like this evidence.
 
-        A fixed rigid wall does no work and has no contact energy: without the momentum, only an oscillator that swings
-        on tells a flight from a crash into it.
+        A fixed rigid wall does no work and has no contact energy.  Without the momentum, only an oscillator that goes
+        on swinging distinguishes a flight from a crash into such a wall.
         """
         if self.unknown_load or (self.source == "given" and self.doubts):
             return False
@@ -97,9 +101,9 @@ class Flight(NamedTuple):
 
 
 class Witness(NamedTuple):
-    """One source of evidence: the flight that it shows around a time, and all its ``flights``, ascending in time.
+    """A source of evidence: the flight that it shows ``around`` a time, and all its ``flights`` in ascending order.
 
-    ``decisive``: where it shows none, there is none, even if it shows none anywhere.
+    If ``decisive`` is True, a time at which it shows no flight has none, even if it shows no flight anywhere.
     """
 
     source: str
@@ -117,7 +121,7 @@ class Witness(NamedTuple):
         *,
         decisive: bool,
     ) -> Witness:
-        """Give the source that shows flights over ``time`` (n,), which looks around no time, and for all, only once."""
+        """Make a source of evidence over ``time`` (n,) that looks around each time, and for all flights, only once."""
         once = cache(around)
         return cls(
             source,
@@ -128,17 +132,18 @@ class Witness(NamedTuple):
         )
 
     def holding(self, td: float) -> FreeFlight | None:
-        """Give the flight that it shows around td: that of the first mark whose flight holds td, else td's own."""
+        """Return the flight around td: found from the first mark whose flight contains td, else from td."""
         return _holding(self.time, self.around, td)
 
     def counts(self) -> bool:
-        """Whether there is no flight where it shows none."""
+        """Return True if a time at which this source shows no flight has none."""
         return self.decisive or bool(self.flights())
 
 
 def _holding(
     time: Samples, around: Callable[[float], FreeFlight | None], td: float
 ) -> FreeFlight | None:
+    """Return the flight around ``td`` that a function finds from shared marks, or from td itself."""
     shared = filter(None, map(around, marks(time, td)))
     return next(
         (flight for flight in shared if flight.start <= td <= flight.end), None
@@ -148,7 +153,7 @@ def _holding(
 def _of_middle(
     time: Samples, around: Callable[[float], FreeFlight | None], moment: float
 ) -> FreeFlight | None:
-    """Give the flight around a time as it is told of a td in its middle: so that a flight is listed as it is used."""
+    """Return the flight around a time as a td in its middle would get it, so that listed flights equal those in use."""
     flight = around(moment)
     of_middle = (
         _holding(time, around, (flight.start + flight.end) / 2) if flight else None
@@ -161,9 +166,9 @@ def _of_middle(
 
 
 class Seen(NamedTuple):
-    """What the evidence says of a td: the flight around it, or the one nearest to it and what denies one at td.
+    """Result of the evidence at a td: the flight around it, or the nearest flight and why there is none at td.
 
-    ``held``: supports do, which hold also where the end of the load is given.
+    ``held`` is True if supports hold the parts, which also overrules a given end of the load.
     """
 
     flight: FreeFlight | None = None
@@ -174,11 +179,11 @@ class Seen(NamedTuple):
 
 
 def seen_flight(history: History, td: float) -> Seen:
-    """Find the free flight around ``td`` [time] in everything but the energy of the parts.
+    """Find the free flight around ``td`` [time] from all evidence except the energy of the parts.
 
-    The best source that shows a flight counts.  A better one that shows none at td is never overruled, nor is the
-    contact energy; where two sources show different ends, the later start and the earlier end count.  What is held at
-    td does not fly, whatever the evidence; of a whole model those parts may that nothing holds.
+    The best source that shows a flight counts.  A better one that shows none at td is never overruled, and neither is
+    the contact energy.  If two sources show different ends, the later start and the earlier end count.  Parts that are
+    held at td do not fly, whatever the evidence; in a whole model only the parts that nothing holds may fly.
     """
     held = history.surroundings.held(history.parts, td)
     if held is None:
@@ -192,6 +197,7 @@ def seen_flight(history: History, td: float) -> Seen:
 
 
 def _seen(history: History, td: float) -> Seen:
+    """Find the flight around ``td`` from the sources of evidence, without regard to supports."""
     found: list[tuple[str, FreeFlight]] = []
     for witness in witnesses(history):
         flight = witness.holding(td)
@@ -208,11 +214,11 @@ def _seen(history: History, td: float) -> Seen:
         return Seen()
     return history.known.once(
         ("confirmed", *found), lambda: _confirmed(history, found)
-    )  # many td lie in the same
+    )  # many td share this result
 
 
 def _refusal(history: History, witness: Witness, td: float) -> str:
-    """Say what shows that nothing flies at td [time]: a momentum may be that of free flight, and the energy not."""
+    """Return the reason why nothing flies at td [time]; the momentum may show a flight and the energy none."""
     if witness.source == "momentum":
         from d2rpick.flight.momentum import flight_around, to_be_asked
 
@@ -226,7 +232,7 @@ def _refusal(history: History, witness: Witness, td: float) -> str:
 
 
 def all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
-    """Find all flights that the best source shows and no other denies, each with its source, ascending in time."""
+    """Find all flights that the best source shows and no other denies, with their sources, in ascending order."""
     asked = witnesses(history)
     for place, witness in enumerate(asked):
         kept, flights = [], witness.flights()
@@ -253,19 +259,20 @@ def all_seen(history: History) -> tuple[tuple[str, FreeFlight], ...]:
 
 
 def _may_deny(witness: Witness, flight: FreeFlight) -> bool:
-    """Whether a source may deny a flight that a better one shows.
+    """Return True if a source may deny a flight that a better source shows.
 
-    What parts touch while their own momentum is that of free flight is each other, or others touch something.
+    If the parts' own momentum shows a flight, contacts are between these parts or between other parts.
     """
     return witness.source in _AGREEING and flight.parts is None
 
 
 def witnesses(history: History) -> tuple[Witness, ...]:
-    """Give the sources of evidence that a history has, best first; it is asked about many td."""
+    """Return the history's sources of evidence, best first, made once for all td."""
     return history.known.once("witnesses", lambda: tuple(_witnesses(history)))
 
 
 def _witnesses(history: History) -> Iterator[Witness]:
+    """Make the history's sources of evidence, best first."""
     if history.momenta:
         from d2rpick.flight import momentum
 
@@ -307,7 +314,7 @@ def _witnesses(history: History) -> Iterator[Witness]:
 def _first(
     history: History, momenta: Sequence[Momenta], td: float
 ) -> FreeFlight | None:
-    """Give the flight by the momentum of the parts, or else of the whole model."""
+    """Return the flight around ``td`` from the momentum of the parts, or else of the whole model."""
     from d2rpick.flight.momentum import flight_around
 
     for one in momenta:
@@ -328,7 +335,10 @@ def _by_energies(
     *,
     level: bool,
 ) -> FreeFlight | None:
-    """Give the flight around td by energies; of those that do not see a wall that does no work it keeps a ``level``."""
+    """Return the flight around td from energies; with ``level`` the internal energy must keep its level in it.
+
+    Energies alone do not see a fixed wall, which does no work.
+    """
     assert history.balance
     found = look(history.balance, td)
     if level:
@@ -338,7 +348,7 @@ def _by_energies(
             and isinf(found.gravity)
             and history.surroundings.gravity_on(None) == (0.0,)
         ):
-            return None  # no gravity feeds the energies
+            return None  # without gravity nothing feeds the energies
         found = (
             found
             if found and moves_as_a_whole(history.balance, found.start, found.end)
@@ -348,9 +358,9 @@ def _by_energies(
 
 
 def _by_forces(history: History, touches: Touches, td: float) -> FreeFlight | None:
-    """Give the flight around td by forces; where the energy rises as if another load acted, what keeps its level.
+    """Return the flight around td from contact forces; if the energy rises in it, only what keeps its level.
 
-    Before any contact has ended a load of another kind may act, which only the external work shows.
+    Before the first contact has ended, another kind of load may act, which only the external work shows.
     """
     found, balance = touches.flight_around(td), history.balance
     if (
@@ -372,7 +382,7 @@ def _keeping_level(
     td: float,
     momenta: Momenta | None = None,
 ) -> FreeFlight | None:
-    """Give what of a flight of the whole model the internal energy keeps its level in, or None where td is before.
+    """Return the part of the model's flight in which the internal energy keeps its level, None if td is before it.
 
     ``momenta`` are those that show the flight.
     """
@@ -401,6 +411,11 @@ def _keeping_level(
         if history.parts is not None:
             energy = np.interp(time, balance.time, balance.internal)
     start = settled_from(time, energy, damped, flight.start, flight.end, unseen)
+    if start is not None and start > flight.start and momenta is not None:
+        # without gravity the sum itself; with it the last one, less the work of gravity
+        whole = None if damped is None else damped[-1 if flight.gravity else 0]
+        if rises_as_it_yields(time, energy, whole, flight.start, start, flight.end):
+            start = flight.start
     if (
         start is None
         or start > td
@@ -410,14 +425,14 @@ def _keeping_level(
     if damped is not None and not flight.gravity:
         first, last = np.interp((flight.start, start), time, damped[0])
         if last - first > MOST_WORK * float(np.abs(energy).max()):
-            return None  # forces that cancel worked on it, as where it is held and moved, and they may still act
+            return None  # opposing forces worked on the model, as on one that is held and moved, and may still act
     return flight._replace(start=start)
 
 
 def _nearest(
     witness: Witness, td: float, refusal: str, doubts: tuple[str, ...]
 ) -> Seen:
-    """Give the last flight before ``td``, or else the first one after it, where nothing flies at td."""
+    """Return the last flight before ``td``, or else the first one after it, for a td at which nothing flies."""
     flights = witness.flights()
     before = [one for one in flights if one.end < td]
     nearest = before[-1] if before else flights[0] if flights else None
@@ -425,12 +440,12 @@ def _nearest(
 
 
 def spoken(source: str | None) -> str:
-    """Words for a source."""
+    """Return the name of a source in words."""
     return str(source).replace("-", " ")
 
 
 def _confirmed(history: History, found: Sequence[tuple[str, FreeFlight]]) -> Seen:
-    """Give what is flight by the best source and those that should agree with it, and say where they do not."""
+    """Join the flights of the best source and of those that should agree with it, and note disagreements."""
     source, best = found[0]
     refusal = _driven(history, source, best)
     if refusal:
@@ -460,12 +475,12 @@ def _confirmed(history: History, found: Sequence[tuple[str, FreeFlight]]) -> See
 
 
 def same_within(history: History, start: float, end: float) -> float:
-    """By how much two sources may differ that show the same flight [time]."""
+    """Return by how much two sources may differ about the ends of the same flight [time]."""
     return max(_SAME * (end - start), _SAME_STATES * history.step)
 
 
 def _driven(history: History, source: str, flight: FreeFlight) -> str | None:
-    """Say so when a load works on the model in a flight, unless it may work on other parts than those that fly."""
+    """Return the reason why a flight is driven by a load, None if no load works or it may work on other parts."""
     from d2rpick.flight.work import work_beyond_gravity
 
     balance = history.balance
@@ -482,7 +497,7 @@ def _driven(history: History, source: str, flight: FreeFlight) -> str | None:
 
 
 def _is_subset(history: History, flight: FreeFlight) -> bool:
-    """Whether other parts than those that fly move, too."""
+    """Return True if other parts than the flying ones move as well."""
     momenta = next((one for one in history.momenta if one.parts is not None), None)
     if momenta is None or momenta.parts is None or flight.parts is None:
         return False

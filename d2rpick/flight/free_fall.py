@@ -1,7 +1,7 @@
-"""Free fall of one momentum: gravity and damping proportional to mass are all that acts.
+"""Fit free fall to a momentum: gravity and damping proportional to mass are all that acts.
 
-What flies together obeys p' = g - alpha p in each component, with constant g and one alpha >= 0, so that
-p(t) = p0 + g t - alpha int p dt: linear in p0, g and alpha.
+Parts that fly together obey p' = g - alpha p in each component, with constant g and one alpha >= 0, so that p(t) = p0 +
+g t - alpha int p dt, which is linear in p0, g and alpha.
 """
 
 from __future__ import annotations
@@ -28,50 +28,52 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Balance, Momenta, Samples
 
-# Gravity on earth in m, inches and feet per second squared; in other units of length and time a power of ten of these.
-# Decks have what stands below it; a load that is so close to one of them by chance is one in two hundred.
+# Gravity on earth in m, inches and feet per second squared; in other units it is a power of ten times one of these.
+# Relative deviation within which an acceleration is gravity: a load comes so close by chance in 1 of 200 cases.
 _GRAVITY, _ALIKE = (9.80665, 386.089, 32.1740), 0.002
 _OF_DECKS = (9.80665, 9.81, 9.8, 9.807, 3.86089, 3.864, 3.86, 3.2174, 3.22)
-# Digits that hide so much of the momentum leave so many times that open in its change: damping is fitted, too.
+# Rounding that hides this much of the momentum leaves 10 times that open in its change, since damping is fitted too.
 _REACH_OF_DIGITS = 10.0
-# While the last of a load still bends the momentum, gravity is recognised so roughly; along an axis it has this cosine.
+# Tolerances for recognising gravity while a load fades: 5 % in size, and a direction cosine of 0.999 along an axis.
 _ROUGHLY, _ALONG_AXIS = 0.05, 0.999
-# Damping that takes so much of the momentum in a window is believed where there is so much of the largest momentum.
+# Damping that takes 20 % of the momentum in a window is accepted if 5 % of the largest momentum is left.
 _DAMPED, _LEFT = 0.2, 0.05
-# It takes less than this from one state to the next.
+# Damping takes less than this share of the momentum from one state to the next.
 _SHOWN = 0.1
-# So little of the largest momentum, and of its range, may deviate in a window where nothing but gravity is admitted,
-# although a load fades on: from end to end twice as much changes.  Of some of the parts that move only the tolerance
-# may: what acts on them is the rest of their body.
+# Deviation, as a share of the largest momentum and of its range, allowed in a window without a load other than gravity.
+# A fading load may leave it: from end to end twice as much changes. If only some of the moving parts are tried,
+# TOLERANCE applies: the rest of their body acts on them.
 _ENOUGH = 3e-3
-# Across a load of one direction, what bends the momentum is within so many times what digits hide; of an axis so much
-# must lie across it; along the load it bends it so many times as much.
+# Limits for gravity across a load of one direction: bending across the load is within 2 times the rounding, at least 10
+# % of an axis lies across it, and along the load the momentum bends 30 times as much.
 _REACH_OF_NOISE, _SEEN, _CLEARLY = 2.0, 0.1, 30.0
-# There, what acts beside gravity falls to this share from the first third to the last, and to that of the weight.
+# What acts beside gravity falls to this share from the first to the last third of a window, and to this share of the
+# weight.
 _FADED, _LITTLE = 0.6, 0.02
-# What moves straight has so little momentum across its way.
+# A straight motion has less than this share of its momentum across its direction.
 _STRAIGHT = 0.01
-# A change of momentum that no gravity explains is none up to so many times what a window leaves open.
+# A change of momentum counts as none up to this many times what a window leaves open.
 _UNSEEN = 2.0
-# What the work of gravity leaves open of the energies: samples are far apart, and a solver adds up by steps.
+# Relative error of the work of gravity in the energies: states are far apart, and solvers add up by steps.
 _OF_WORK = 2e-3
-# A mass that is this much above all that momenta and kinetic energies show is written.
+# A mass that exceeds what momenta and kinetic energies show by this share must have been written.
 _CLEARLY_HEAVIER = 1e-6
-# States that tell a work from none: twice the unknowns.
+# Fewest states that show work: twice the number of unknowns.
 _LEAST_STATES = 6
 
 
 class Laws:
-    """Free flight of one set of parts: under gravity and damping, or where nothing at all acts.
+    """Laws of free flight for one set of parts: gravity and damping act, or nothing at all.
 
-    A constant net force is no proof of gravity, and a push that fades exponentially looks like damping under such a
-    force.  So it is believed only if it is the mass times the gravity of the deck, one of the accelerations
-    ``gravities`` (0: none acts for a time); where these are None, times that of the earth, in whatever units.
+    A constant net force does not prove gravity, and a push that fades exponentially looks like damping under such a
+    force.  The force is accepted only if it is the mass times one of the deck's accelerations ``gravities`` (0: none
+    acts for a time), or, if these are None, times the gravity of the earth in any consistent units.
     """
 
     def __init__(
         self, momenta: Momenta, members: tuple[int, ...], balance: Balance | None
     ) -> None:
+        """Prepare the laws for the parts in the columns ``members``; ``balance`` helps where their mass is unknown."""
         time, momentum = momenta.time, momenta.of(members)
         self.fit, self.noise = FreeFall(time, momentum), momenta.noise(members)
         self.balance, self.velocity = balance, momenta.velocity
@@ -88,7 +90,7 @@ class Laws:
         self._given: dict[tuple[float, ...], Constant] = {}
 
     def window(self, td: float) -> tuple[tuple[int, int] | None, float | None]:
-        """Give the states around ``td`` in free flight, and its gravity [length/time^2]; None where nothing acts."""
+        """Return the first and last state in free flight around ``td``, and gravity [length/time^2] or None."""
         window = self._lasting(self.fit, td)
         gravity = self.gravity(*window) if window else None
         if gravity is not None:
@@ -99,30 +101,32 @@ class Laws:
         window = self._lasting(self._steady, td, self._enough)
         if (
             window and not self._falls_across
-        ):  # a push that balances the weight for a moment leaves it as steady
+        ):  # a push that balances the weight for a moment is as steady
             return (None if self._carried else window), None
         return self._under_gravity(td)
 
     def gravity(self, first: int, last: int) -> float | None:
-        """Acceleration between two states that obey the law of free flight: 0 where none is seen, NaN where unknown.
+        """Return the acceleration between two states in free flight [length/time^2]: 0 if none is seen, NaN if unknown.
 
-        None where what acts there is not gravity, or a brake [length/time^2].
+        None if what acts there is a brake, or not gravity.
         """
         return None if self._braked(first, last) else self._gravity((first, last))
 
     def _lasting(
         self, law: Law, td: float, enough: float = 0.0
     ) -> tuple[int, int] | None:
+        """Return the states around ``td`` that obey a law and go on doing so as its limit is lowered."""
         return lasting_window(
             law, td, self.extent, self.noise, fades=True, enough=enough
         )
 
     @property
     def _carried(self) -> bool:
-        """Whether something must carry the parts where no force is seen."""
+        """Return True if something must carry the parts where no force is seen."""
         return self.fall if self.gravities is None else 0.0 not in self.gravities
 
     def _is_gravity(self, acceleration: float, error: float = _ALIKE) -> bool:
+        """Return True if an acceleration is gravity within a relative error."""
         if self.gravities is None:
             return is_gravity(acceleration, error)
         return any(
@@ -130,7 +134,7 @@ class Laws:
         )
 
     def _braked(self, first: int, last: int) -> bool:
-        """Whether what looks like damping is a brake: faster than the states show, or it has taken nearly all."""
+        """Return True if apparent damping is a brake: faster than the states show, or almost nothing is left."""
         largest, left = (
             float(np.abs(self.fit.momentum[slice(at, last + 1)]).max())
             for at in (0, first)
@@ -142,7 +146,7 @@ class Laws:
         )
 
     def _under_gravity(self, td: float) -> tuple[tuple[int, int] | None, float | None]:
-        """Give the window around ``td`` under one of the accelerations that decks have for gravity: a load may fade."""
+        """Return the window around ``td`` under a usual acceleration of gravity, in which a load may fade."""
         time, momentum = self.fit.time, self.fit.momentum
         first, last = self._around(td)
         if last - first < FEWEST or not self.mass > 0:
@@ -175,12 +179,12 @@ class Laws:
         )
 
     def _around(self, td: float) -> tuple[int, int]:
-        """States around ``td`` in which a load that fades, or a constant one, bends the momentum by little."""
+        """Return the states around ``td`` in which a fading or constant load bends the momentum only a little."""
         at = min(int(np.searchsorted(self.fit.time, td)), self.fit.time.size - 1)
         return longest_window(self.fit, at, TOLERANCE * self.extent + self.noise)
 
     def _weights_across(self, first: int, last: int) -> Iterator[Samples]:
-        """Weights (3,) along an axis that show across a load of one direction: only along it is the momentum bent."""
+        """Yield weights (3,) along an axis that show across a load of one direction, which bends only along it."""
         if last - first < FEWEST or not self.mass > 0:
             return
         time, momentum = (
@@ -206,7 +210,7 @@ class Laws:
                     yield size * axis
 
     def _weights_near(self, first: int, last: int) -> Iterator[Samples]:
-        """Weights (3,) of decks that are roughly as large as the mean force between two states."""
+        """Yield weights (3,) usual in decks that are about as large as the mean force between two states."""
         time = self.fit.time[first : last + 1]
         slope = (
             np.polyfit(time - time[0], self.fit.momentum[first : last + 1], 1)[0]
@@ -225,7 +229,7 @@ class Laws:
             )
 
     def _fades_out(self, window: tuple[int, int], weight: Samples) -> bool:
-        """Whether what acts in a window beside the ``weight`` (3,) fades, and is little of it at the end."""
+        """Return True if the force in a window beside the ``weight`` (3,) fades, and is small at the end."""
         third = (window[1] - window[0]) // 3
         at = [window[0], window[0] + third, window[1] - third, window[1]]
         time = self.fit.time[at]
@@ -237,9 +241,9 @@ class Laws:
         return bool(last <= _FADED * first and last <= _LITTLE * np.linalg.norm(weight))
 
     def _gravity(self, window: tuple[int, int]) -> float | None:
-        """Acceleration in a window: 0 where none is seen, None where it is not that of gravity [length/time^2].
+        """Return the acceleration in a window [length/time^2]: 0 if none is seen, None if it is not that of gravity.
 
-        NaN where neither the mass nor the work tells.
+        NaN if neither the mass nor the work tells.
         """
         start, end = self.fit.time[[*window]].tolist()
         vector = self.fit.gravity(*window)
@@ -254,7 +258,7 @@ class Laws:
             _ALIKE + _REACH_OF_DIGITS * self.noise / (force * (end - start)),
         ):
             return None if self._slowed(window, vector) else force / mass
-        if self.velocity:  # what changes it is an acceleration already
+        if self.velocity:  # velocities change by an acceleration
             return None
         found = None
         if self.balance is not None:
@@ -272,10 +276,10 @@ class Laws:
         return float("nan") if self._may_be_heavier(force, start, end) else None
 
     def _may_be_heavier(self, force: float, start: float, end: float) -> bool:
-        """Whether a force may be that of gravity on more than the mass, of which the kinetic energy shows the least.
+        """Return True if a force may be gravity on more mass than the kinetic energy shows, which is a lower bound.
 
-        At the state that shows most mass, as much of the kinetic energy may belong to the vibration as the internal
-        energy swings by.
+        At the state that shows the largest mass, as much kinetic energy may belong to the vibration as the internal
+        energy swings.
         """
         balance, squares = self.balance, np.sum(self.fit.momentum**2, axis=1)
         if (
@@ -283,6 +287,7 @@ class Laws:
             or balance.kinetic is None
             or balance.internal is None
             or self.velocity
+            or not self.mass > 0
         ):
             return False
         kinetic = np.interp(self.fit.time, balance.time, balance.kinetic)
@@ -291,7 +296,7 @@ class Laws:
         )
         best = int(np.argmax(ratios))
         if self.mass > (1 + _CLEARLY_HEAVIER) * ratios[best]:
-            return False  # it is written
+            return False  # the mass is written
         swing = float(np.ptp(balance.internal[window(balance.time, start, end)]))
         largest = force / self.mass
         least = largest * (1 - swing / float(kinetic[best]))
@@ -300,10 +305,10 @@ class Laws:
         )
 
     def _slowed(self, window: tuple[int, int], force: Samples) -> bool:
-        """Whether a constant force (3,) is rather friction than gravity: all it does is to slow down.
+        """Return True if a constant force (3,) is friction rather than gravity: it only slows the parts down.
 
-        Its size may be that of gravity by chance, or since the coefficient of friction is a tenth.  So it is along an
-        axis, and of a straight motion its acceleration is that of gravity in m, mm, s or ms.
+        Its size may be that of gravity by chance, or because the coefficient of friction is 0.1.  Therefore gravity
+        must act along an axis, and in a straight motion with its value in m, mm, s or ms.
         """
         size = float(np.linalg.norm(force))
         along, momentum = force / size, self.fit.momentum[[*window]]
@@ -319,12 +324,13 @@ class Laws:
 
     @property
     def _may_fall(self) -> bool:
+        """Return True if gravity may act on the parts."""
         return self.gravities is None or any(self.gravities)
 
     @cached_property
     def fall(self) -> bool:
-        """Whether gravity moves the parts at some time: where it does not show, something carries them."""
-        self.fall = False  # asked while it is looked for
+        """Return True if gravity moves the parts at some time; where it does not show then, something carries them."""
+        self.fall = False  # `fall` is read while it is computed
         if not self.noise < TOLERANCE * self.extent or self.fit.time.size < FEWEST:
             return False
         windows = (self._lasting(self.fit, td) for td in moments(self.fit.time))
@@ -336,7 +342,7 @@ class Laws:
 
     @cached_property
     def _falls_across(self) -> bool:
-        """Whether gravity shows across a load at some time."""
+        """Return True if gravity shows across the direction of a load at some time."""
         return any(
             next(self._weights_across(*self._around(td)), None) is not None
             and self._under_gravity(td)[0]
@@ -347,7 +353,7 @@ class Laws:
 def _gravities_near(
     acceleration: float, known: tuple[float, ...] | None
 ) -> Iterator[float]:
-    """What decks have for gravity, roughly as large as an acceleration: the ``known`` ones, if they are."""
+    """Yield values of gravity about as large as an acceleration: ``known`` ones, or those usual in decks."""
     if known is not None:
         yield from (one for one in known if abs(acceleration - one) < _ROUGHLY * one)
         return
@@ -358,13 +364,13 @@ def _gravities_near(
 
 
 def is_gravity(acceleration: float, error: float = _ALIKE, decades: int = 1) -> bool:
-    """Whether an acceleration [length/time^2], known with a relative error, is gravity on earth in consistent units.
+    """Return True if an acceleration [length/time^2] is gravity on earth in consistent units, within a relative error.
 
-    Units of length and time make it larger or smaller by so many ``decades`` at a time.
+    Units of length and time change it by powers of ten, ``decades`` at a time.
 
     Examples
     --------
-    >>> [is_gravity(one) for one in (9.81, 9810, 9.80665e-3, 386.4, 5.0, float("nan"))]
+    >>> [is_gravity(size) for size in (9.81, 9810, 9.80665e-3, 386.4, 5.0, float("nan"))]
     [True, True, True, True, False, False]
     """
     if not acceleration > 0:
@@ -379,9 +385,11 @@ def is_gravity(acceleration: float, error: float = _ALIKE, decades: int = 1) -> 
 def acceleration_by_work(
     balance: Balance, time: Samples, momentum: Samples, start: float, end: float
 ) -> float | None:
-    """Acceleration by which the external work grows on a momentum, or else kinetic and internal energy [length/time^2].
+    """Return the acceleration at which the work on a momentum grows [length/time^2].
 
-    Gravity g works by the integral of g p, whatever part of the model it moves; what is fixed has no momentum.
+    The work is the external work, else kinetic plus internal energy.
+
+    Gravity g does the work int g p dt, whatever part of the model it moves; fixed parts have no momentum.
 
     Parameters
     ----------
@@ -394,7 +402,7 @@ def acceleration_by_work(
     Returns
     -------
     float or None
-        None where none of them is written, 0 where they do not follow.
+        None if no such energy is written, 0 if they do not follow the momentum.
     """
     work = balance.kinetic_and_internal if balance.worked is None else balance.worked
     inside = window(balance.time, start, end)
@@ -421,20 +429,20 @@ class FreeFall(Law):
         self.integral = integral(time, momentum)
         self._both = np.asfortranarray(
             np.hstack([momentum, self.integral])
-        )  # columns lie whole: windows are long
+        )  # contiguous columns, since windows are long
 
     def _misfit(self, first: int, last: int) -> float:
-        if last - first < 3:  # three numbers per component fit any three states
+        if last - first < 3:  # three parameters per component fit any three states
             return 0.0
         p, impulse, alpha = self._fitted(first, last)
         return float(np.abs(p + alpha * impulse).max())
 
     def damping(self, first: int, last: int) -> float:
-        """Least-squares alpha between two states [1/time]."""
+        """Return the least-squares alpha between two states [1/time]."""
         return self._fitted(first, last)[2]
 
     def gravity(self, first: int = 0, last: int = -1) -> Samples:
-        """Least-squares g between two states, by default of all, shape (components,) [momentum/time]."""
+        """Return the least-squares g between two states, by default all, shape (components,) [momentum/time]."""
         last %= self.time.size
         states = slice(first, last + 1)
         undamped = (
@@ -445,7 +453,7 @@ class FreeFall(Law):
         )
 
     def _fitted(self, first: int, last: int) -> tuple[Samples, Samples, float]:
-        """What is not straight of momentum and impulse, and the alpha >= 0 that explains the one by the other."""
+        """Return the deviations of momentum and impulse from straight lines, and the alpha >= 0 that relates them."""
         states = slice(first, last + 1)
         rest, half = bent(self.time[states], self._both[states]), self.momentum.shape[1]
         p, impulse = rest[:, :half], rest[:, half:]

@@ -1,12 +1,12 @@
-"""What the internal energy tells of a flight: alone, for want of better evidence, and beside the energy of the whole.
+"""Find flights from the internal energy, alone for want of better evidence, and beside the energies of the whole model.
 
-Alone it is modest, and never certain: a mild contact may leave no trace in it.  So the window begins late, and ends
-early where a contact is seen.
+Alone it is poor evidence and never certain: a mild contact may leave no trace in it.  So the window begins late, and
+ends early if a contact is seen.
 
-Beside better evidence it must keep its level, and there must be more motion than vibration.  A fixed rigid wall does no
-work, so that a crash into it keeps kinetic and internal energy together constant, and two bodies that collide keep
-their momentum.  But what is pushed is deformed, and what springs back gains speed: the internal energy drifts, and the
-energy of the whole does not follow as it does where damping takes both.
+Beside better evidence the energy must keep its level, and more must move than the vibration.  A fixed rigid wall does
+no work, so that a crash into it keeps kinetic plus internal energy constant, and two bodies that collide keep their
+momentum.  But pushed parts deform, and parts that spring back gain speed: the internal energy drifts, and the total
+energy does not follow it as it does where damping takes both.
 """
 
 from __future__ import annotations
@@ -23,28 +23,28 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, History, Samples
 
 
-# Widening of the band of energies before td, against wiggles of a vibration that the band has not seen.
+# Widening of the band of energies before td, since the band has not seen all of a vibration.
 _BAND_RESERVE: Final = 0.25
-# The energy falls into its band while the last pushes of the load still come: in 45 computed runs by up to three tenths
-# of the time from there to td too early.  A third of that time is waited for; what it costs is known.
+# Share of the time to td that is left unused: in 45 computed runs the energy fell into its band up to 0.3 of that time
+# too early, while the last pushes of the load still came.
 _WAIT: Final = 1 / 3
-# A contact leaves this share of the lowest and highest energies for a moment, and comes faster than what is left of the
-# vibration in the last quarter before td moves; a decaying vibration was less than twice as fast before.
+# A contact leaves 10 % of the lowest and highest energies for a moment, and moves the energy at least twice as fast as
+# the vibration in the last quarter before td; a decaying vibration was less than twice as fast before.
 _OUTER, _LATEST, _FASTER = 0.1, 1 / 4, 2.0
-# The level is the mean over this share of the quiet time; it changes where it leaves its band, widened by its width.
+# The level is the mean over this share of the quiet time; it changes if it leaves its band, widened by its width.
 _LEVEL: Final = 1 / 8
-# A landing is seen against this share of the time before it, in which the energy has turned so often.
+# A landing is seen against this share of the time before it, if the energy has turned at least 4 times in it.
 _KNOWN, _TURNED = 3 / 4, 4
 
 
-# Below this share of the largest energy, energy is round-off: tables and single precision have seven digits.
+# Below this share of the largest energy, an energy is round-off: tables and single precision have seven digits.
 _ROUND_OFF: Final = 1e-6
 
 
 class QuietTime(NamedTuple):
-    """Window in which the energy shows no load; ``end`` None where no next contact is seen [time].
+    """A window in which the energy shows no load; ``end`` is None if no next contact is seen [time].
 
-    ``settled`` is when the energy had settled: the time from there to ``start`` is given up for safety.
+    ``settled`` is the time when the energy had settled; the time from there to ``start`` is left unused for safety.
     """
 
     start: float
@@ -83,10 +83,10 @@ def quiet_time(history: History, td: float) -> QuietTime | None:
 
 
 def landing_after(history: History, start: float) -> float | None:
-    """Give the first time after ``start`` [time] at which the energy bursts out of what it was before, or None.
+    """Return the first time after ``start`` [time] at which the energy bursts out of its former range, or None.
 
-    It is held against the first three quarters of the time since ``start``, and must exceed their band by its width: no
-    vibration goes so far beyond what it has done for so long.
+    It is compared with the first 3/4 of the time since ``start``, and must exceed their band by the band's width: no
+    vibration goes so far beyond its range of so long a time.
     """
     time, energy = history.between(start, np.inf)
     if time.size < FEWEST:
@@ -113,11 +113,11 @@ def landing_after(history: History, start: float) -> float | None:
 
 
 def end_of_load(history: History, td: float) -> float | None:
-    """Take the load to be over when the energy falls into its band before td for the last time [time].
+    """Return the last time before td at which the energy falls into its band: the end of the load [time].
 
-    The band is that of the last quarter of the record before td, widened by a quarter of its width.  Where the
-    energy never was above the band, nothing shows that a load has ended, and where its last part leaves the band of
-    the rest, something feeds the part again: None.
+    The band is that of the last quarter of the record before td, widened by a quarter of its width.  None if the energy
+    was never above the band, so that nothing shows the end of a load, or if its last part leaves the band of the rest,
+    so that something still feeds the parts.
     """
     length = td - float(history.time[0])
     earlier, latest = (
@@ -138,7 +138,7 @@ def end_of_load(history: History, td: float) -> float | None:
 
 
 def _last_excursion(history: History, start: float, td: float) -> float:
-    """Give the last time from ``start`` to td at which the energy is far from where it stays most of the time."""
+    """Return the last time from ``start`` to td at which the energy is far from where it stays most of the time."""
     time, energy = history.between(start, td)
     if time.size < FEWEST:
         return start
@@ -148,7 +148,7 @@ def _last_excursion(history: History, start: float, td: float) -> float:
 
 
 def _last_push(history: History, start: float, td: float) -> float:
-    """Give the last time from ``start`` to td at which the energy changes much faster than just before td."""
+    """Return the last time from ``start`` to td at which the energy changes much faster than just before td."""
     inside = window(history.time, start, td)
     time = history.time[inside]
     if time.size < FEWEST:
@@ -163,7 +163,7 @@ def _last_push(history: History, start: float, td: float) -> float:
 
 
 def _burst(history: History, start: float, td: float) -> float | None:
-    """Give the first time after ``td`` at which the energy leaves its band from ``start`` to td upwards, or None."""
+    """Return the first time after ``td`` at which the energy rises above its band from ``start`` to td, or None."""
     top = _widened(history.between(start, td)[1], _BAND_RESERVE)[1]
     time, energy = history.between(np.nextafter(td, np.inf), np.inf)
     above = np.flatnonzero(energy > top)
@@ -171,7 +171,7 @@ def _burst(history: History, start: float, td: float) -> float | None:
 
 
 def _change_of_level(history: History, start: float, td: float) -> float | None:
-    """Give the first time after ``td`` at which the mean energy leaves its band from ``start`` to td, or None."""
+    """Return the first time after ``td`` at which the mean energy leaves its band from ``start`` to td, or None."""
     inside = window(history.time, start, td)
     width = round(_LEVEL * (inside.stop - inside.start))
     if width < 1:
@@ -180,7 +180,7 @@ def _change_of_level(history: History, start: float, td: float) -> float | None:
         "sums", lambda: np.append(0.0, np.cumsum(history.energy))
     )[inside.start :]
     means = (sums[width:] - sums[:-width]) / width
-    after = inside.stop - inside.start  # the first whose states all lie after td
+    after = inside.stop - inside.start  # the first mean whose states all lie after td
     low, high = _widened(means[: after - width + 1], 1.0)
     off = np.flatnonzero((means[after:] < low) | (means[after:] > high))
     return (
@@ -191,13 +191,13 @@ def _change_of_level(history: History, start: float, td: float) -> float | None:
 
 
 def _widened(values: Samples, share: float) -> tuple[float, float]:
-    """Band of some values, widened on both sides by a share of its width."""
+    """Return the band of some values, widened on both sides by a share of its width."""
     room = share * float(np.ptp(values))
     return float(values.min()) - room, float(values.max()) + room
 
 
 def round_off(history: History) -> float:
-    """Energy below which an internal energy is round-off beside the energies of the run [energy]."""
+    """Return the energy below which an internal energy is round-off beside the energies of the run [energy]."""
     balance = history.balance
     terms = (
         (balance.internal, balance.kinetic, balance.external_work, balance.total)
@@ -210,24 +210,24 @@ def round_off(history: History) -> float:
 
 
 def largest(*terms: Samples | None) -> float:
-    """Largest size of some energies, of which some may be missing or empty; 0 without any [energy]."""
+    """Return the largest absolute value of some energies, which may be missing or empty; 0 without any [energy]."""
     return max(
         (float(np.abs(term).max(initial=0.0)) for term in terms if term is not None),
         default=0.0,
     )
 
 
-# The band of the last quarter of a flight, widened on both sides by this share of its width, holds all before it.
+# Widening of the band of a flight's last quarter, by this share of its width, that contains all energies before it.
 _RESERVE: Final = 0.5
-# The means of its last two quarters differ by at most this share of that width: of a steady drift by all of it, of a
-# vibration that shows three quarters of a period in each by 0.3.
+# The means of the last two quarters differ by less than this share of the band. A steady drift differs by 1, a
+# vibration that shows 3/4 of a period in each quarter by 0.3.
 _DRIFT: Final = 0.35
-# A slow vibration is told from a crash, which ends where the energy has swung once to and fro: so many swings by half
-# of the range, and ranges and means of both halves that are this much alike.
+# A slow vibration has at least this many swings by half of the range, and ranges and means of both halves that agree to
+# this share; a crash ends after one swing.
 _SWINGS: Final = 4
 _ALIKE: Final = 0.75
-# An energy that falls so low beside its peaks is that of one vibration, which is at rest where it peaks.  Of what has
-# been deformed for good, a thousandth is next to nothing.
+# An energy that falls below 5 % of its peaks is that of one vibration, which is at rest at the peaks. Beside a
+# permanent deformation a swing of 0.1 % counts as none.
 _TO_ZERO, _HARDLY = 0.05, 1e-3
 
 
@@ -239,18 +239,17 @@ def settled_from(
     end: float,
     unseen: float = 0.0,
 ) -> float | None:
-    """Give the time in a window from which an internal energy keeps its level; None where it drifts to the end.
+    """Return the time in a window from which an internal energy keeps its level, None if it drifts to the end.
 
     Parameters
     ----------
     time, energy : array of shape (n,)
     damped : array of shape (k, n), or None
-        Energies that damping lowers, each a measure of what it has taken: the level may fall by as much as one of them
-        does.  None where there is none: then it may fall by any amount.
+        Energies that damping lowers.  The level may fall by as much as one of them falls; without any, by any amount.
     start, end : float
         [time]
     unseen : float
-        What the digits of these energies leave open: the level may fall by it as well [energy].
+        Rounding of these energies: the level may fall by it as well [energy].
     """
     inside = window(time, start, end)
     least = _ROUND_OFF * float(np.abs(energy).max(initial=0.0))
@@ -269,17 +268,70 @@ def settled_from(
     return None
 
 
+# A body yields in its first swing if its energy rises by 90 % of the way to its later level, and is within 10 % of its
+# minimum for no longer than it takes to rise from there (a harmonic swing: 0.7 of that).  Bodies of the model that hit
+# each other later in the flight leave the energy at its minimum for longer.
+_FLAT, _MOST_FLAT = 0.1, 1.0
+# The motion gives that energy: the sum of both rises by no more than this share of it.  It may fall, by damping.
+_NOT_FROM_MOTION: Final = 0.1
+
+
+def rises_as_it_yields(
+    time: Samples,
+    energy: Samples,
+    whole: Samples | None,
+    start: float,
+    settled: float,
+    end: float,
+) -> bool:
+    """Whether an internal energy rises at the start of a flight as a vibrating body yields.
+
+    What is deformed for good stays in the internal energy, so that it rises at once to the level that it keeps later.
+
+    Parameters
+    ----------
+    time, energy : array of shape (n,)
+    whole : array of shape (n,), or None
+        Kinetic and internal energy without the work of gravity; None if they are not written.
+    start, settled, end : float
+        Start and end of the flight, and the time in it from which the energy keeps its level [time].
+    """
+    rising, level = window(time, start, settled), window(time, settled, end)
+    before, kept = energy[rising], energy[level]
+    if before.size < 2 or not kept.size:
+        return False
+    lowest = float(before.min())
+    rise = float(kept.min()) - lowest
+    if rise <= 0 or float(before.max()) > float(kept.max()) + _FLAT * rise:
+        return False
+    if whole is not None:
+        grown = whole[rising] - np.minimum.accumulate(whole[rising])
+        if grown.max() > _NOT_FROM_MOTION * rise:
+            return False
+    high = int(np.argmax(before >= lowest + (1 - _FLAT) * rise))
+    first_swing = before[: high + 1]
+    if first_swing[-1] < lowest + (1 - _FLAT) * rise:
+        return False
+    times = time[rising][: high + 1]
+    flat = first_swing <= lowest + _FLAT * rise
+    if not flat.any():
+        return False
+    last_flat, first_flat = int(np.flatnonzero(flat)[-1]), int(np.argmax(flat))
+    rise_time = times[-1] - times[last_flat]
+    return bool(times[last_flat] - times[first_flat] <= _MOST_FLAT * rise_time)
+
+
 def _still_lost(damped: Samples) -> Samples:
-    """What damping takes from each state up to the mean of the last quarter, by the energy that falls most, (n,)."""
+    """Return what damping takes from each state to the mean of the last quarter, in the most damped energy, (n,)."""
     last = 3 * damped.shape[1] // 4
     fallen = damped - damped[:, last:].mean(axis=1, keepdims=True)
     return np.asarray(fallen.max(axis=0, initial=0.0))
 
 
 def _kept_from(energy: Samples, lost: Samples, least: float) -> int | None:
-    """First state from which an energy keeps the level of its last quarter; None where that drifts.
+    """Return the first state from which an energy keeps the level of its last quarter, None if that drifts.
 
-    What is still ``lost`` after each state (n,), infinite where it is unknown, may lie above that level.
+    What damping still takes after each state, ``lost`` (n,), infinite if unknown, may lie above that level.
     """
     half, last = energy.size // 2, 3 * energy.size // 4
     low, high = float(energy[last:].min()), float(energy[last:].max())
@@ -298,7 +350,7 @@ def _kept_from(energy: Samples, lost: Samples, least: float) -> int | None:
 
 
 def _swings(energy: Samples, lost: Samples, least: float) -> bool:
-    """Whether an energy swings slowly about one level: to and fro by half of its range, alike in both halves."""
+    """Return True if an energy swings slowly about one level: by half of its range, alike in both halves."""
     width = float(np.ptp(energy))
     if width <= least:
         return True
@@ -313,7 +365,7 @@ def _swings(energy: Samples, lost: Samples, least: float) -> bool:
 
 
 def _large_swings(energy: Samples, least: float) -> int:
-    """How often an energy turns after it has changed by ``least``."""
+    """Count how often an energy turns after a change of at least ``least``."""
     extrema = np.flatnonzero(np.diff(np.sign(np.diff(energy)))) + 1
     turns, low, high, rising = 0, energy[0], energy[0], None
     for value in [*energy[extrema].tolist(), float(energy[-1])]:
@@ -326,7 +378,7 @@ def _large_swings(energy: Samples, least: float) -> int:
 
 
 def moves_as_a_whole(balance: Balance, start: float, end: float) -> bool:
-    """Whether more moves in a window than the vibration that the internal energy shows."""
+    """Return True if more moves in a window than the vibration that the internal energy shows."""
     inside = window(balance.time, start, end)
     if (
         balance.kinetic is None

@@ -1,4 +1,4 @@
-"""The margin that is kept before the contact that ends a flight."""
+"""Compute the margin that td keeps before the contact that ends a flight."""
 
 from __future__ import annotations
 
@@ -15,29 +15,32 @@ if TYPE_CHECKING:
     from d2rpick.flight.flight import Flight
     from d2rpick.histories.history import History, Momenta, Samples
 
-# Share of the flight that is always kept clear [-].  Landings of 36 computed runs (a car-like structure, a box with a
-# block inside, OpenRadioss) moved by up to 1.1 % and 2.5 % of the flight before them.
+# Least margin as a share of the flight. Landings of 36 computed runs (a car-like structure, a box with a block inside,
+# OpenRadioss) moved by up to 1.1 % and 2.5 % of the flight before them.
 SHARE: Final = 0.03
-# Fewest states that a force is looked for in.
+# Fewest states in which a force is looked for.
 _FEWEST: Final = 3
-
-
-# A contact whose force stays below this share of the largest on the body is a grazing one: the surfaces move along each
-# other, so that the body reaches it much earlier if it is a little out of place.
-_GRAZING: Final = 0.01
+# A contact grazes the body if its force stays below this share of the largest force on the body, or if it has changed
+# the momentum by less than this share of the momentum towards it when it is over.  The surfaces then move along each
+# other, so that a body that is a little out of place touches much earlier.  At a landing that stops the surface, even a
+# slender body takes a fourth of that momentum at its tip; in computed cars and boxes landings took 0.27 and more of it
+# within the margin, the grazing contact of a car 0.02.
+_GRAZING_FORCE, _GRAZING_MOMENTUM = 0.01, 0.1
 
 
 class Margin(NamedTuple):
-    """Time kept clear before a contact [time], and what it comes from.
+    """Time kept free before a contact [time], and its source.
 
-    ``source``: "given", "flight" (3 % of it), "landing" (how far a switch may move it), "grazing" (the same if the body
-    only grazes it) or "no-contact".  ``spread`` is how far a switch may move the landing [time], None where the files
-    do not tell.
+    ``source`` is "given", "flight" (3 % of the flight), "landing" (how far a switch may move the landing), "grazing"
+    (the same for a grazing contact) or "no-contact".  ``spread`` is how far a switch may move the landing [time], None
+    if the files do not show it.  ``grazing`` is the quantity that shows a grazing contact, "force" or "momentum", None
+    for any other contact.
     """
 
     time: float
     source: str
     spread: float | None = None
+    grazing: str | None = None
 
 
 def margin_before_contact(
@@ -46,9 +49,9 @@ def margin_before_contact(
     given: float | None = None,
     place: float | None = None,
 ) -> Margin:
-    """Give the margin before the contact that ends a flight: the one given, else the time by which it may come earlier.
+    """Return the margin before the contact that ends a flight: the given one, else by how much it may come earlier.
 
-    At least 3 % of the flight is kept; where no contact is seen nothing has to be kept clear.
+    The margin is at least 3 % of the flight, and 0 if no contact is seen.
 
     Parameters
     ----------
@@ -57,7 +60,7 @@ def margin_before_contact(
     given : float, optional
         [time]
     place : float, optional
-        How far the body may be out of place at the contact [length], see `landing_moves`.
+        Place error of the body at the contact [length], see `landing_moves`.
     """
     if given is not None:
         return Margin(given, "given")
@@ -72,23 +75,25 @@ def margin_before_contact(
         if spread is None or spread <= share
         else Margin(spread, "landing", spread)
     )
-    if not grazes(history, flight, kept.time):
+    if grazes(history, flight, kept.time):
+        grazing = "force"
+    elif changes_momentum_little(history, flight):
+        grazing = "momentum"
+    else:
         return kept
     earlier = grazing_moves(history, flight, place)
-    return (
-        kept
-        if earlier is None or earlier <= kept.time
-        else Margin(earlier, "grazing", earlier)
-    )
+    if earlier is None or earlier <= kept.time:
+        return kept
+    return Margin(earlier, "grazing", earlier, grazing)
 
 
 def landing_moves(
     history: History, flight: Flight, place: float | None
 ) -> float | None:
-    """Tell how far a switch may move the next landing: by its velocity error and by the place error of the body.
+    """Return how far a switch may move the next landing, from its velocity error and the body's place error [time].
 
-    A body that is out of place by ``place`` [length] reaches the contact earlier by that over the speed at which it
-    moves towards the ground then.  None where neither is known [time].
+    A body that is out of place by ``place`` [length] reaches the contact earlier by that distance over its speed
+    towards the ground.  None if neither error is known.
     """
     spread, speed = landing_spread(history, flight), _closing_speed(history, flight)
     if place is None or speed is None:
@@ -100,10 +105,10 @@ def landing_moves(
 def grazing_moves(
     history: History, flight: Flight, place: float | None
 ) -> float | None:
-    r"""Tell how much earlier a grazing contact may come [time]; infinite without gravity, None if no error is known.
+    r"""Return how much earlier a grazing contact may come [time]: infinite without gravity, None if no error is known.
 
-    Where surfaces move along each other their closing speed is next to nothing, and gravity g alone opens a gap of
-    ``place`` and of the amplitude of the vibration: in :math:`\sqrt{2 e / g}`.
+    If surfaces move along each other their closing speed is almost 0, and gravity g alone opens a gap of size e,
+    ``place`` plus the amplitude of the vibration, in the time :math:`\sqrt{2 e / g}`.
     """
     spread, speed = landing_spread(history, flight), _closing_speed(history, flight)
     amplitude = (
@@ -118,42 +123,96 @@ def grazing_moves(
     return float(np.sqrt(2 * error / gravity))
 
 
-def grazes(history: History, flight: Flight, within: float) -> bool:
-    """Whether the contact that ends a flight stays below a hundredth of the largest force for a time ``within`` it.
+class _Contact(NamedTuple):
+    """Momentum of a body and force on it less gravity, at the ``time`` of all states (n,), with gravity itself.
 
-    False where the record ends before that, or momenta do not show the force [time].
+    ``begin`` is the last state before the contact that ends the flight.
     """
-    seen = _of_flight(history, flight)
-    if seen is None or flight.end is None:
-        return False
+
+    time: Samples
+    momentum: Samples
+    force: Samples
+    gravity: Samples
+    begin: int
+
+
+def _find_contact(history: History, flight: Flight) -> _Contact | None:
+    """Return the forces around the contact that ends a flight; None if the momenta do not show them."""
+    evidence = _of_flight(history, flight)
+    if evidence is None or flight.end is None:
+        return None
     from d2rpick.flight.free_fall import FreeFall
 
-    momenta, members = seen
+    momenta, members = evidence
     time, momentum = momenta.time, momenta.of(members)
     inside = window(time, *flight.within(time))
-    after = window(time, flight.end, flight.end + within)
-    if (
-        time[inside].size < _FEWEST
-        or time[after].size < _FEWEST
-        or time[-1] <= flight.end + within
-    ):
-        return False
+    begin = int(np.searchsorted(time, flight.end, side="right")) - 1
+    if time[inside].size < _FEWEST or begin + _FEWEST >= time.size:
+        return None
     gravity = FreeFall(time[inside], momentum[inside]).gravity()
-    force = np.linalg.norm(np.gradient(momentum, time, axis=0) - gravity, axis=1)
-    return bool(force[after].max() < _GRAZING * force.max())
+    rates = np.gradient(momentum, time, axis=0)
+    force = np.linalg.norm(rates - gravity, axis=1)
+    return _Contact(time, momentum, force, gravity, begin)
+
+
+def grazes(history: History, flight: Flight, within: float) -> bool:
+    """Whether the contact that ends a flight stays below 1 % of the largest force for a time ``within`` [time].
+
+    False if the record ends before that, or momenta do not show the force.
+    """
+    contact = _find_contact(history, flight)
+    if contact is None or flight.end is None:
+        return False
+    after = window(contact.time, flight.end, flight.end + within)
+    if contact.time[after].size < _FEWEST or contact.time[-1] <= flight.end + within:
+        return False
+    limit = _GRAZING_FORCE * contact.force.max()
+    return bool(contact.force[after].max() < limit)
+
+
+def changes_momentum_little(history: History, flight: Flight) -> bool:
+    """Whether the contact that ends a flight is over with less than 10 % of the momentum towards it.
+
+    It is over when its force stays below 1 % of the largest one for three states.  The impulse is the change of
+    momentum less gravity.  False if the record ends before that, or momenta do not show the force.
+    """
+    contact = _find_contact(history, flight)
+    evidence = _of_flight(history, flight)
+    speed = _closing_speed(history, flight)
+    if contact is None or evidence is None or speed is None:
+        return False
+    acts = contact.force[contact.begin :] > _GRAZING_FORCE * contact.force.max()
+    if not acts.any():
+        return False
+    first = int(np.argmax(acts))
+    rests = ~acts[first:]
+    over = [
+        state
+        for state in range(rests.size - _FEWEST + 1)
+        if rests[state : state + _FEWEST].all()
+    ]
+    if not over:
+        return False
+    begin, end = contact.begin, contact.begin + first + over[0]
+    duration = contact.time[end] - contact.time[begin]
+    impulse = contact.momentum[end] - contact.momentum[begin]
+    impulse = impulse - contact.gravity * duration
+    momenta, members = evidence
+    mass = 1.0 if momenta.velocity else momenta.mass(members)
+    return bool(np.linalg.norm(impulse) < _GRAZING_MOMENTUM * mass * speed)
 
 
 def landing_spread(history: History, flight: Flight) -> float | None:
-    r"""Tell how far the velocity error of a switch may move the next landing.
+    r"""Return how far the velocity error of a switch may move the next landing.
 
-    A switch takes the velocity of the vibration from all parts, and freezes them away from where they rest: by the
-    amplitude :math:`a = \sqrt{2 T / m} / \omega` in root mean square.  The centre of mass goes on as before, so a
-    surface that is off by that amplitude touches the ground earlier or later by
+    A switch takes the velocity of the vibration from all parts, and freezes them away from their rest positions, by the
+    amplitude :math:`a = \sqrt{2 T / m} / \omega` in root mean square.  The centre of mass moves on as before, so that a
+    surface displaced by that amplitude touches the ground earlier or later by
 
     .. math:: \delta t = \frac{a}{v_n} = \frac{1}{\omega} \sqrt{\frac{T}{K_n}}, \quad
         K_n = \frac{m v_n^2}{2} = K\, \frac{(p \cdot n)^2}{p^2}
 
-    The mass cancels, so that energies and momenta, as they are written, are enough.
+    The mass cancels, so that the written energies and momenta are sufficient.
 
     Parameters
     ----------
@@ -165,19 +224,17 @@ def landing_spread(history: History, flight: Flight) -> float | None:
     Returns
     -------
     float or None
-        :math:`\delta t` [time]; None where kinetic energy or momentum are not written, or other parts move beside
-        those that fly.
+        :math:`\delta t` [time]; None if kinetic energy or momentum are not written, or other parts move as well.
 
     Notes
     -----
-    ``T``: mean kinetic energy of the vibration, by equipartition the mean internal energy in the flight above its
-    lowest value [energy].  ``omega``: a vibration with that frequency lets E cross its mean four times per period
-    [1/time]; the crossings in the flight tell it.  ``K``: kinetic energy before the contact [energy]; it holds that of
-    the rotation, which brings the surface to the ground as well.  ``n``: direction in which gravity has changed the
-    momentum ``p`` of what flies; without gravity that of ``p``.
-    Source: docs/explanation/planning.md, "The margin before a contact";
-    computed landings moved by at most this, or 3 % of the flight, see tests/choice/test_windows.py.  An impact on an
-    edge that lets 1 um of height move the landing after it by 70 ms is beyond any such margin.
+    ``T`` is the mean kinetic energy of the vibration, by equipartition the mean internal energy in the flight above its
+    lowest value [energy]. ``omega`` follows from the crossings of the energy with its mean, four per period [1/time].
+    ``K`` is the kinetic energy before the contact [energy], including that of the rotation, which moves the surface to
+    the ground as well. ``n`` is the direction in which gravity has changed the momentum ``p`` of the flying parts,
+    without gravity that of ``p``. Source: the margin before a contact in docs (plan); computed landings moved by at
+    most this, or by 3 % of the flight, see tests/choice/test_windows.py. No margin covers an impact on an edge: 1 um of
+    height moves the landing after it by 70 ms.
     """
     balance, momentum = history.balance, _momentum(history, flight)
     if (
@@ -204,9 +261,9 @@ def landing_spread(history: History, flight: Flight) -> float | None:
 
 
 def energy_of_approach(history: History, flight: Flight) -> float | None:
-    """Give the kinetic energy of the motion along gravity at the end of a flight [energy].
+    """Return the kinetic energy of the motion along gravity at the end of a flight [energy].
 
-    None if kinetic energy or momentum are not written, or other parts move beside those that fly.
+    None if kinetic energy or momentum are not written, or other parts move as well.
     """
     balance, momentum = history.balance, _momentum(history, flight)
     if balance is None or balance.kinetic is None or momentum is None:
@@ -216,7 +273,7 @@ def energy_of_approach(history: History, flight: Flight) -> float | None:
 
 
 def _momentum(history: History, flight: Flight) -> Samples | None:
-    """Momentum of what flies during the flight, shape (k, 3 or 1); None where others move too, or none is written."""
+    """Return the momentum of the flying parts in the flight, shape (k, 3 or 1); None if unknown or others move."""
     seen = _of_flight(history, flight)
     if seen is None:
         return None
@@ -231,7 +288,7 @@ def _momentum(history: History, flight: Flight) -> Samples | None:
 def _of_flight(
     history: History, flight: Flight
 ) -> tuple[Momenta, Sequence[int]] | None:
-    """Momenta that show what flies, and the places of it in them; None where none is written."""
+    """Return the momenta that show the flying parts, and their columns; None if none is written."""
     for momenta in history.momenta:
         if (momenta.parts is None) != (flight.parts is None):
             continue
@@ -243,7 +300,7 @@ def _of_flight(
 
 
 def _closing_speed(history: History, flight: Flight) -> float | None:
-    """Speed along gravity, without it of the whole motion, at the end of a flight [length/time]; None if unknown."""
+    """Return the speed along gravity at the end of a flight, without gravity the speed [length/time], or None."""
     seen = _of_flight(history, flight)
     if seen is None:
         return None
@@ -257,7 +314,7 @@ def _closing_speed(history: History, flight: Flight) -> float | None:
 
 
 def _towards_ground(momentum: Samples) -> float:
-    """Share of the kinetic energy at the end that belongs to the motion along gravity [-]."""
+    """Return the share of the kinetic energy at the end of a flight that belongs to the motion along gravity [-]."""
     last, change = momentum[-1], momentum[-1] - momentum[0]
     if not change.any():
         return 1.0

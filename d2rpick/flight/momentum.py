@@ -1,7 +1,7 @@
-"""Which parts fly together, seen in their momentum, and when.
+"""Find which parts fly together, from their momenta, and when.
 
-A part alone does not fly freely while another one is attached to it and vibrates against it, so the set of parts that
-flies is looked for as well.
+A part alone does not fly freely while another part is attached to it and vibrates against it, so the set of parts that
+flies is searched as well.
 """
 
 from __future__ import annotations
@@ -34,28 +34,29 @@ if TYPE_CHECKING:
     from d2rpick.histories.run import Run
 
 
-# A momentum that changes by less than this share of itself is constant: single precision keeps seven digits.
+# A momentum that changes by less than this share of itself is constant: single precision has seven digits.
 _CONSTANT = 1e-6
-# Where it is constant as far as the printed digits tell, the chosen parts must move this many times what these hide.
+# If a momentum is constant within its printed digits, the chosen parts must move by this many times their rounding.
 _VISIBLE = 100
-# A set with more parts is preferred when its window is longer by this factor.  Some samples more prove nothing: parts
-# with a large momentum of their own, a sled, loosen the tolerance for the others.
+# A set with more parts is preferred only if its window is longer by this factor: a part with a large momentum of its
+# own, such as a sled, loosens the tolerance for the others.
 _LONGER = 1.1
-# Parts that may be attached are looked for in this share of the record before td, on so many states at most.  What
-# bends the momenta of a body cancels but for this share: digits and the solver's own errors.
+# Attached parts are searched in this share of the record before td, on at most this many states; the bending of a
+# body's momenta cancels up to this share, given by rounding and the solver's own errors.
 _LOOK_BACK, _LOOK_STATES, _CANCELS = 0.1, 200, 1e-3
-# What makes a sum less by this share is rounding: a part of next to no mass would go in and out for ever.
+# A sum that becomes smaller by less than this share does so by rounding; without this limit, a part of almost no mass
+# would be added and removed for ever.
 _ROUNDED: Final = 1e-9
-# What moves no faster than at this share of its largest momentum stands, or is held, unless it goes on as it does.
+# A set that ends no faster than this share of its largest momentum stands still, or is held.
 _HELD = 0.01
-# Momenta of parts are those of the model within this share of it, or a rigid body has taken some of them.
+# The momenta of parts add up to that of the model within this share, or a rigid body has taken some of them.
 _ALL_OF_IT: Final = 1e-2
-# A body of its own flies by itself for this share of the record, at a velocity that differs by this from that of all.
+# A body flies by itself for at least this share of the record, at a velocity that differs from the set's by this share.
 _BY_ITSELF, _OF_ITS_OWN = 0.25, 0.05
 
 
 def to_be_asked(momenta: Sequence[Momenta]) -> Sequence[Momenta]:
-    """Give the momenta that may tell of flight, best first: all, or where a set was named to fly only that one's."""
+    """Return the momenta that may show a flight, best first: all, or only the set that was named to fly."""
     return [one for one in momenta if one.flying] or momenta
 
 
@@ -64,7 +65,8 @@ def flight_around(
 ) -> FreeFlight | None:
     """Find the set of parts that flies freely around ``td`` for clearly the longest time, and when.
 
-    Unless the set is known, tried are the chosen parts, these with the parts that move most against them, and all.
+    Unless the set is given, the chosen parts are tried, these with the parts that move most against them, and all
+    parts.
 
     Parameters
     ----------
@@ -72,12 +74,12 @@ def flight_around(
     td : float
         [time]
     balance : Balance, optional
-        Of the model: tells of its momentum whether gravity works on it, where its mass does not.
+        Energies of the model, which show whether gravity works on it if its mass is unknown.
 
     Returns
     -------
     FreeFlight or None
-        None when no set flies around td.
+        None if no set flies around td.
     """
     best: FreeFlight | None = None
     if momenta.at_rest:
@@ -94,7 +96,7 @@ def flight_around(
 def _of_its_bodies(
     momenta: Momenta, members: Sequence[int], td: float, flight: FreeFlight
 ) -> FreeFlight | None:
-    """Give what of the flight of a set is one of each body in it: bodies that hit each other keep their momentum."""
+    """Return the part of a set's flight in which each body flies: colliding bodies keep their common momentum."""
     for part in bodies_apart(momenta, members):
         alone = flight_of(momenta, (part,), td)
         if alone is None:
@@ -110,13 +112,14 @@ def _of_its_bodies(
 
 
 def bodies_apart(momenta: Momenta, members: Sequence[int]) -> tuple[int, ...]:
-    """Give the parts among ``members`` that fly by themselves at some time, at a velocity that is not that of all."""
+    """Return the parts among ``members`` that fly by themselves at some time, not at the set's velocity."""
     return momenta.known.once(
         ("apart", *members), lambda: tuple(_apart(momenta, members))
     )
 
 
 def _apart(momenta: Momenta, members: Sequence[int]) -> Iterator[int]:
+    """Find the parts among ``members`` that fly by themselves, see `bodies_apart`."""
     mass, masses = momenta.mass(members), momenta.masses
     if (
         not momenta.parts
@@ -139,7 +142,7 @@ def _apart(momenta: Momenta, members: Sequence[int]) -> Iterator[int]:
             momenta.values[:, part] / masses[part] - velocity, axis=1
         )
         if float(spans[relative > room].sum()) <= least:
-            continue  # whatever flights it has
+            continue  # no flight of this part could count
         apart = (
             flight.end - flight.start
             for flight in _alone(momenta, part)
@@ -151,7 +154,7 @@ def _apart(momenta: Momenta, members: Sequence[int]) -> Iterator[int]:
 
 
 def _alone(momenta: Momenta, part: int) -> tuple[FreeFlight, ...]:
-    """Give the flights of one part by itself, looked for once."""
+    """Return the flights of one part by itself, searched once."""
     return momenta.known.once(
         ("alone", part),
         lambda: all_windows(momenta.time, partial(flight_of, momenta, (part,))),
@@ -181,7 +184,7 @@ def flight_of(
     laws = laws_of(momenta, tuple(members), balance)
     states, gravity = laws.window(td)
     if states is None or (not gravity and gravities is None and _falls(momenta)):
-        return None  # what does not fall with the others is carried
+        return None  # a part that does not fall with the others is carried
     first, last = states
     inside = momentum[first : last + 1]
     if (
@@ -199,7 +202,7 @@ def flight_of(
 def laws_of(
     momenta: Momenta, members: tuple[int, ...], balance: Balance | None = None
 ) -> Laws:
-    """Give the laws of free flight for a set of parts, made once for all td."""
+    """Return the laws of free flight for a set of parts, made once for all td."""
     whole = (
         balance if momenta.parts is None or np.isnan(momenta.mass(members)) else None
     )
@@ -209,7 +212,7 @@ def laws_of(
 
 
 def _falls(momenta: Momenta) -> bool:
-    """Whether some part by itself is seen to fall under gravity."""
+    """Return True if a single part is seen to fall under gravity."""
     return momenta.parts is not None and momenta.known.once(
         "falls", lambda: any(laws_of(momenta, (i,)).fall for i in momenta.moving)
     )
@@ -218,12 +221,12 @@ def _falls(momenta: Momenta) -> bool:
 def all_flights(
     momenta: Momenta, balance: Balance | None = None
 ) -> tuple[FreeFlight, ...]:
-    """Find all windows of free flight of the chosen parts and what flies with them, ascending in time."""
+    """Find all windows of free flight of the chosen parts and the parts that fly with them, in ascending order."""
     return all_windows(momenta.time, partial(flight_around, momenta, balance=balance))
 
 
 def tells(momenta: Momenta) -> bool:
-    """Whether the chosen parts, or the model, move enough for their momentum to say that they do not fly."""
+    """Return True if the chosen parts, or the model, move enough for their momentum to show that they do not fly."""
     change = momenta.change(momenta.chosen)
     return momenta.time.size >= FEWEST and change > _VISIBLE * momenta.noise(
         momenta.chosen
@@ -231,9 +234,9 @@ def tells(momenta: Momenta) -> bool:
 
 
 def _moves(momenta: Momenta, members: Sequence[int], noise: float) -> bool:
-    """Whether a constant momentum that is known up to ``noise`` tells that the chosen parts fly: not of parts at rest.
+    """Return True if a constant momentum, known up to ``noise``, shows that the chosen parts fly and are not at rest.
 
-    Large parts print coarse numbers, behind which a load on the chosen ones may hide.  Where these have no mass, as
+    Heavy parts print coarse numbers, which may hide a load on the chosen parts.  If the chosen parts have no mass, as
     springs, the members of the set count instead.
     """
     parts = momenta.chosen if momenta.values[:, list(momenta.chosen)].any() else members
@@ -247,9 +250,9 @@ def _moves(momenta: Momenta, members: Sequence[int], noise: float) -> bool:
 
 
 def _sets(momenta: Momenta, td: float) -> Iterator[tuple[int, ...]]:
-    """Sets of parts to try: the chosen ones, these with what hangs on them, all that move.
+    """Yield the sets of parts to try: the chosen parts, these with attached parts, and all moving parts.
 
-    Where all parts are chosen, nobody chose: then those that something carries are left out.
+    If all parts are chosen, the user chose none; then parts that something carries are left out.
     """
     chosen = tuple(momenta.chosen)
     yield chosen
@@ -266,10 +269,10 @@ def _sets(momenta: Momenta, td: float) -> Iterator[tuple[int, ...]]:
 
 
 def _attached(momenta: Momenta, chosen: Sequence[int], td: float) -> tuple[int, ...]:
-    """Give the parts that must be added for what bends the momenta of all before td to cancel.
+    """Return the parts that must be added so that the bending of all momenta before td cancels.
 
-    Within each body that flies, forces cancel: added up, the momenta of its parts are straight.  So such sums are the
-    null space of what is bent, and in its projector the parts of a body stand together.
+    Forces within a body that flies cancel: the sum of its parts' momenta is straight.  Such sums form the null space of
+    the bent momenta, and its projector groups the parts of a body.
     """
     time = momenta.time
     back = (time >= td - _LOOK_BACK * (time[-1] - time[0])) & (time <= td)
@@ -288,7 +291,7 @@ def _attached(momenta: Momenta, chosen: Sequence[int], td: float) -> tuple[int, 
         return ()
     wider = (
         len(moving) > rests.shape[1]
-    )  # else all of the left is there, and the right is large
+    )  # otherwise all left vectors are there, and the right ones are many
     left, values, _ = np.linalg.svd(
         rests[moving] / sizes[moving, np.newaxis], full_matrices=wider
     )
@@ -305,7 +308,7 @@ def _attached(momenta: Momenta, chosen: Sequence[int], td: float) -> tuple[int, 
 def _polished(
     rests: Samples, members: set[int], chosen: Sequence[int], moving: Sequence[int]
 ) -> tuple[int, ...]:
-    """Add or leave out single parts as long as what is bent of the sum, (parts, k), becomes less."""
+    """Add or leave out single parts as long as this makes the bending of the sum, (parts, k), smaller."""
     total = rests[sorted(members)].sum(axis=0)
     free = [i for i in moving if i not in chosen]
     while free:
@@ -324,14 +327,14 @@ ALL: Final = "all"
 
 
 def with_parts_by_number(run: Run, selection: Selection) -> Selection:
-    """Replace the words ``flying`` and ``all`` among the parts that are asked for by the numbers they stand for.
+    """Replace the words ``flying`` and ``all`` in a selection of parts by the part ids that they stand for.
 
-    A part with such a title is meant by it.
+    A part with such a title takes precedence over the word.
 
     Raises
     ------
     FormatError
-        If the run has no parts with energies, or does not tell which of them fly together.
+        If the run has no parts with energies, or does not show which of them fly together.
 
     Examples
     --------
@@ -351,9 +354,11 @@ def with_parts_by_number(run: Run, selection: Selection) -> Selection:
 
 
 def deformable_parts(run: Run) -> tuple[Part, ...]:
-    """Give the parts that ever have internal energy; FormatError where there are none."""
+    """Return the parts that ever have internal energy; raise FormatError if there are none."""
     parts = run.parts
-    energies = run.part_energies(parts)  # says why there are none
+    energies = run.part_energies(
+        parts
+    )  # raises an error that gives the reason if there are none
     found = tuple(
         part for part, energy in zip(parts, energies.T, strict=True) if energy.any()
     )
@@ -365,11 +370,11 @@ def deformable_parts(run: Run) -> tuple[Part, ...]:
 
 
 def flying_parts(run: Run) -> tuple[Part, ...]:
-    """Give the deformable parts that fly as one body; FormatError where momenta do not tell.
+    """Return the deformable parts that fly as one body; raise FormatError if momenta do not show them.
 
-    Of all sets that fly, the one with the largest product of mass and time counts: a loose tyre may fly for longer than
-    the car, which is what is to be switched.  Tried are the parts that hang together by the deck; without one, or where
-    none of these flies by itself, what `flying_together` tries.
+    Of all sets that fly, the one with the largest product of mass and time counts: a loose tyre may fly longer than the
+    car, which is the body to be switched.  The parts that the deck connects are tried; without a deck, or if none of
+    these flies by itself, the sets of `flying_together`.
     """
     deformable, momenta = _with_momenta(run)
     found = list(_of_bodies(momenta, run.surroundings.bodies())) if momenta else []
@@ -377,9 +382,9 @@ def flying_parts(run: Run) -> tuple[Part, ...]:
 
 
 def flying_together(run: Run) -> tuple[Part, ...]:
-    """Give the deformable parts that momenta show to fly together, in one body or in several; FormatError without.
+    """Return the deformable parts that momenta show to fly together, in one or more bodies; raise FormatError without.
 
-    All parts are tried, and each that is in no set yet, with what hangs on it.
+    All parts are tried together, then each part that is in no set yet, with the parts attached to it.
     """
     deformable, momenta = _with_momenta(run)
     found: list[FreeFlight] = []
@@ -394,9 +399,10 @@ def flying_together(run: Run) -> tuple[Part, ...]:
 
 
 def _cores(momenta: Momenta) -> Iterator[tuple[int, ...]]:
-    """Give sets that hang on the heaviest part at some time, without what slides then.
+    """Yield sets of parts that are attached to the heaviest part at some time, without parts that slide then.
 
-    What moves straight, as a loose wheel does that slides, bends no sum, so that it may pass for a part of the body.
+    A part that moves straight, such as a sliding loose wheel, bends no sum, and would otherwise pass for a part of the
+    body.
     """
     masses = momenta.masses
     places = [i for i in momenta.chosen if masses is not None and masses[i] > 0]
@@ -411,19 +417,20 @@ def _cores(momenta: Momenta) -> Iterator[tuple[int, ...]]:
         )
         if (
             len(core) <= len(attached) and core not in found
-        ):  # with all of them it was tried before
+        ):  # the set with all of them was tried before
             found.add(core)
             yield core
 
 
 def _slides(momenta: Momenta, part: int, td: float) -> bool:
-    """Whether a part is seen to move under a constant force around ``td`` [time] that is not gravity."""
+    """Return True if a part is seen to move under a constant force around ``td`` [time] that is not gravity."""
     laws = laws_of(momenta, (part,))
     straight = lasting_window(laws.fit, td, laws.extent, laws.noise, fades=True)
     return straight is not None and flight_of(momenta, (part,), td) is None
 
 
 def _with_momenta(run: Run) -> tuple[tuple[Part, ...], Momenta | None]:
+    """Return the deformable parts and their momenta, None if the run has no momenta of parts."""
     deformable = deformable_parts(run)
     return deformable, next(
         (one for one in run.momenta(deformable, None) if one.parts), None
@@ -433,7 +440,7 @@ def _with_momenta(run: Run) -> tuple[tuple[Part, ...], Momenta | None]:
 def _of_bodies(
     momenta: Momenta, bodies: Iterable[Iterable[int]]
 ) -> Iterator[FreeFlight]:
-    """Find the flights of parts that hang together, by their numbers."""
+    """Yield the flights of connected parts, given by their ids."""
     places = {part.id: place for place, part in enumerate(momenta.parts or ())}
     for body in bodies:
         members = tuple(places[part] for part in body if part in places)
@@ -447,7 +454,7 @@ def _heaviest(
     momenta: Momenta | None,
     found: Sequence[FreeFlight],
 ) -> tuple[Part, ...]:
-    """Give the deformable parts of the flight with the largest product of mass and time."""
+    """Return the deformable parts of the flight with the largest product of mass and time."""
     if not found or momenta is None:
         raise FormatError(
             f"{run.name}: no momenta show which parts fly together; name the parts to be switched"
@@ -468,9 +475,9 @@ def _heaviest(
 
 
 def believed(momenta: Momenta, whole: Momenta | None) -> tuple[slice, ...]:
-    """Give the states in which the momenta of parts are those of the ``whole`` model, by stretches.
+    """Return the ranges of states in which the momenta of parts add up to that of the ``whole`` model.
 
-    In the others a rigid body has taken some of them: then no quantity of a part is believed.
+    In the other states a rigid body has taken some of them, and no quantity of a part is used.
     """
     return stretches(complete(momenta, whole), FEWEST)
 
@@ -478,9 +485,9 @@ def believed(momenta: Momenta, whole: Momenta | None) -> tuple[slice, ...]:
 def complete(
     momenta: Momenta, whole: Momenta | None, before: float = 0.0
 ) -> NDArray[np.bool_]:
-    """Whether the momenta of parts (n,) are together those of the whole model.
+    """Return for each state (n,) whether the momenta of the parts add up to that of the whole model.
 
-    ``before`` is the largest momentum of the whole model in states before these.
+    ``before`` is the largest momentum of the whole model in earlier states.
     """
     if whole is None or whole.velocity or whole.time.size != momenta.time.size:
         return np.ones(momenta.time.size, np.bool_)

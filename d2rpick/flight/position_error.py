@@ -1,12 +1,12 @@
-"""How far a body is out of place at td because parts of it were frozen elsewhere.
+"""Compute how far a body is out of place at td because some of its parts were frozen elsewhere.
 
-A part that moves against the rest, an engine on its mounts, is frozen where it is at tr.  The centre of mass flies as
-if nothing had been switched, so the rest of the body is off by the part's share of the mass times its displacement
-against the rest from tr to td, in the frame that turns with the body (docs/explanation/flights.md, "Out of place").
-Displacements come from the velocities of the parts, which are their momenta over their masses.
+A part that moves against the rest, such as an engine on its mounts, is frozen where it is at tr.  The centre of mass
+flies as without switching, so the rest of the body is displaced by the part's share of the mass times the part's
+relative displacement from tr to td, in the frame that turns with the body ("Out of place" in docs).  Displacements come
+from the velocities of the parts, their momenta over their masses.
 
-Of several rigid bodies each is off by itself, and the largest error counts.  One of a single part moves as the part
-does: its momentum is kept, and nothing in it is frozen elsewhere.
+Each of several rigid bodies has its own error, and the largest counts.  A body of a single part moves as the part does:
+its momentum is kept, and nothing in it is frozen elsewhere.
 """
 
 from __future__ import annotations
@@ -35,23 +35,24 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
     from d2rpick.histories.names import Part
 
-# Rotations are looked for on so many states at most; the displacements come from all of them.
+# Rotations are fitted on at most this many states; displacements use all of them.
 _STATES: Final = 200
-# The velocity against the others of a part that nothing joins to them changes by no more than this share of it: where a
+# The relative velocity of a loose part changes by less than this share; that of a part of a body changes by more if the
+# body turns by 0.01 degrees.
 # body turns by a hundredth of a degree, that of its parts changes by more.
 _STEADY: Final = 1e-4
-# Others that bend so make the error a lower bound.  In computed cars whose errors came out right this was at most 0.24,
-# in a public one whose error was three and four times as large 1.1 and 1.4.
+# Bending of the other parts, relative to the part's motion, above which the error is a lower bound. In computed cars
+# with right errors it was at most 0.24, in a public car with an error 3 and 4 times too small 1.1 and 1.4.
 _NOTABLE_DOUBT: Final = 1 / 3
-# What moves the body by less than this share of the limit may be three times as much: it stays in place.
+# An error below this share of the limit may be three times as large and still be small: the body stays in place.
 _HARDLY: Final = 0.01
-# A body that has flown so many times its error is not out of place: that is a third of the margin before a contact,
-# 3 % of the flight, within which runs have moved their landing.
+# A body is out of place if its error exceeds this share of its path: 1/3 of the margin before a contact, 3 % of the
+# flight, within which landings of computed runs moved.
 MOST_OF_PATH: Final = 0.01
 
 
 class Drift:
-    """How far a body is off where the parts that move against it are: differences count, from tr to td.
+    """Displacement of a body over the flight, due to parts that move against it; differences from tr to td count.
 
     Attributes
     ----------
@@ -60,17 +61,17 @@ class Drift:
     place : array of shape (n, 3)
         Of the body against where a rigid body would be, in the frame that turns with it, up to a constant [length].
     path : array of shape (n,)
-        How far the centre of mass has flown [length].
+        Distance that the centre of mass has flown [length].
     part : Part
-        The part that moves against the others, of several the one with most effect.
+        The part that moves against the others; if there are several, the one with the largest effect.
     doubt : float
-        What may be wrong with the differences, since the others are not one rigid body either [length].
+        Possible error of the differences, since the others are not exactly one rigid body [length].
     turning : Turning or None
-        How the body turns, where a deck places its parts.
+        How the body turns, if a deck gives the places of its parts.
     moving : tuple of int
         Numbers of all parts that move against the others.
     slow : bool
-        Whether they swing for less than a period: most of that passes for the rotation.
+        True if they swing for less than a period: most of that looks like the rotation.
     """
 
     def __init__(
@@ -88,10 +89,10 @@ class Drift:
 
     @cached_property
     def at_least(self) -> bool:
-        """Whether errors and angles are lower bounds: inner motion passes for that of the body.
+        """Return True if errors and angles are lower bounds, since inner motion looks like motion of the body.
 
-        A slow one of the part does.  So does that of the others, where it turns their frame by more than is said of
-        the body, or where no deck tells that, moves them by a notable share of what the part does.
+        This is so if the part moves slowly, or if the motion of the others turns their frame by more than the body's
+        own angle, or, without a deck, moves them by a notable share of the part's motion.
         """
         moved = float(
             np.sqrt(
@@ -106,9 +107,10 @@ class Drift:
         return self.turning.doubt > float(np.sqrt(np.mean(said**2)))
 
     def errors(self, tr: Samples, td: float) -> Samples:
-        """Distances of the body at td from where it should be, for times tr (k,) [length]; NaN outside the flight.
+        """Return the distances of the body from its right place at td, for tr (k,) [length]; NaN outside the flight.
 
-        Where the deck tells how it turns, at the nodes of the body that the run watches, else at its centre of mass.
+        If the deck shows how the body turns, the largest distance at the watched nodes is used, else that of the centre
+        of mass.
         """
         if self.turning:
             return self._inside(tr, td, self.turning.offsets(tr, td))
@@ -119,7 +121,7 @@ class Drift:
         return self._inside(tr, td, there[:-1] - there[-1])
 
     def angles(self, tr: Samples, td: float) -> Samples:
-        """By how much the body is turned at td from where it should be, for times tr (k,) [degrees]; NaN if unknown."""
+        """Return by how much the body is turned at td, for times tr (k,) [degrees]; NaN if unknown."""
         turned = (
             np.full((tr.size, 3), np.nan)
             if self.turning is None
@@ -128,7 +130,7 @@ class Drift:
         return np.degrees(self._inside(tr, td, turned))
 
     def _inside(self, tr: Samples, td: float, vectors: Samples) -> Samples:
-        """Lengths of vectors (k, 3), NaN outside the flight."""
+        """Return the lengths of vectors (k, 3), NaN outside the flight."""
         inside = (
             (tr >= self.time[0])
             & (tr <= self.time[-1])
@@ -138,27 +140,27 @@ class Drift:
 
     @cached_property
     def limit(self) -> float:
-        """From which error on the body is out of place [length]."""
+        """Return the error above which the body is out of place [length]."""
         return MOST_OF_PATH * float(self.path[-1])
 
 
 def drift_of(seen: Flying, placement: Placement | None = None) -> Drift | None:
-    """Find how the body drifts in flight against where a rigid one would be.
+    """Find the displacement of a body in flight against the place of a rigid one.
 
-    The parts that move against the others are those without which the others are most nearly one rigid body that
-    turns at a constant rate; together they have at most half of the mass.
+    The parts that move against the others are those without which the others are most nearly one rigid body turning at
+    a constant rate; together they have at most half of the mass.
 
     Parameters
     ----------
     seen : Flying
     placement : Placement, optional
-        Where the deck puts the parts: how the body turns is known too then.
+        Places of the parts according to the deck, which show how the body turns.
 
     Returns
     -------
     Drift or None
-        None where it is not known: a mass is not, there are fewer than three parts, or two with hardly any mass beside
-        the third, or the others are no rigid body by far.
+        None if it is unknown: a mass is unknown, there are fewer than three parts, or two with almost no mass beside
+        the third, or the others are far from one rigid body.
     """
     momenta, masses, inside = (
         seen.momenta,
@@ -181,7 +183,7 @@ def drift_of(seen: Flying, placement: Placement | None = None) -> Drift | None:
         return None
     whole = float(
         np.nansum(masses[sorted({*seen.others, *members})])
-    )  # unknown ones left out: no error is told too small
+    )  # parts without a known place are left out: the error would be too small otherwise
     share = float(mass[moving].sum()) / whole
     doubt = share * float(
         np.sqrt(rest / ((mass.sum() - mass[moving].sum()) * -(-time.size // stride)))
@@ -202,7 +204,7 @@ def drift_of(seen: Flying, placement: Placement | None = None) -> Drift | None:
 
 
 def _ways(time: Samples, velocity: Samples, mass: Samples) -> tuple[Samples, Samples]:
-    """Give the ways of parts (n, parts, 3) against their centre of mass, and the path of that (n,) [length]."""
+    """Return the displacements of parts (n, parts, 3) against their centre of mass, and its path (n,) [length]."""
     centre = np.average(velocity, axis=1, weights=mass)
     ways = integral(
         time, (velocity - centre[:, np.newaxis]).reshape(time.size, -1)
@@ -213,7 +215,7 @@ def _ways(time: Samples, velocity: Samples, mass: Samples) -> tuple[Samples, Sam
 def _offsets(
     time: Samples, ways: Samples, mass: Samples, moving: Sequence[int], rate: Samples
 ) -> Samples:
-    """How far each of the moving parts pushes the others off, if no more flies, shape (n, moving, 3) [length]."""
+    """Return how far each moving part displaces the others if no more parts fly, shape (n, moving, 3) [length]."""
     others = np.setdiff1d(np.arange(mass.size), moving)
     shares = mass[list(moving), np.newaxis] / mass.sum()
     against = (
@@ -229,9 +231,9 @@ def drift_in_flight(
     parts: Sequence[Part] | None = None,
     placement: Placement | None = None,
 ) -> Drift | None:
-    """Find the drift of the body that ``parts``, or those to be switched, become in a flight.
+    """Find the displacement of the body that ``parts``, or the parts to be switched, become in a flight.
 
-    None also where the momentum of single parts does not show the flight.  ``placement`` is that of the deck.
+    None also if the momenta of single parts do not show the flight.  ``placement`` comes from the deck.
     """
     seen = _seen(history, flight, parts)
     return drift_of(seen, placement) if seen else None
@@ -240,9 +242,9 @@ def drift_in_flight(
 def apart_in_flight(
     history: History, flight: Flight, parts: Sequence[Part] | None = None
 ) -> tuple[Part, ...]:
-    """Give those of ``parts``, or of those to be switched, that fly away from the others: nothing joins them to these.
+    """Return those of ``parts``, or of the parts to be switched, that fly away from the others: nothing joins them.
 
-    The velocity of such a part against the others is constant, where that of a part of a body vibrates and turns.
+    The velocity of such a part against the others is constant; that of a part of a body vibrates and turns.
     """
     seen = _seen(history, flight, parts)
     if seen is None or seen.momenta.parts is None:
@@ -276,7 +278,7 @@ def apart_in_flight(
 def _seen(
     history: History, flight: Flight, parts: Sequence[Part] | None
 ) -> Flying | None:
-    """Collect what a drift rests on; None where the momentum of single parts does not show the flight."""
+    """Collect the input of a drift; None if the momenta of single parts do not show the flight."""
     momenta, masses = (
         next((one for one in history.momenta if one.parts is not None), None),
         history.masses,
@@ -297,15 +299,15 @@ def _seen(
     )
     flying = [
         i for i in momenta.moving if momenta.parts[i].id in ids
-    ]  # the ground does not fly
+    ]  # a fixed ground does not fly
     members = [i for i in flying if momenta.parts[i].id in wanted]
     return Flying(momenta, masses, members, *flight.within(momenta.time), flying)
 
 
 class RigidBody(NamedTuple):
-    """Numbers of the parts that become one rigid body; ``whole`` False: a single part whose pieces move by themselves.
+    """Ids of the parts that become one rigid body; ``whole`` is False for a single part with loose pieces.
 
-    Of pieces that do not hang together and yet become one body nobody writes how they move against each other.
+    No file shows how such pieces move against each other.
     """
 
     parts: tuple[int, ...]
@@ -313,14 +315,15 @@ class RigidBody(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Numbers of the parts, as `parts` takes them."""
+        """Return the ids of the parts in the form that `parts` accepts."""
         return ",".join(map(str, self.parts))
 
 
 class Off(NamedTuple):
-    """How far the body that is off most will be [length], and how it drifts; ``body`` is named where there are several.
+    """Place error of the body that is displaced most [length], and its cause; ``body`` is named if there are several.
 
-    ``assumed``: no deck tells that the parts become one body.  ``at_least``: it may be further off, or another body is.
+    ``assumed`` is True if no deck shows that the parts become one body.  ``at_least`` is True if the error may be
+    larger.
     """
 
     error: float
@@ -331,15 +334,15 @@ class Off(NamedTuple):
 
     @property
     def part(self) -> str | None:
-        """Name of the part that is frozen elsewhere; None where nothing is."""
+        """Return the name of the part that is frozen elsewhere, None if there is none."""
         return self.drift.part.name if self.error > 0 else None
 
 
 class Bodies:
-    """Rigid bodies of a flight, each with its drift; ``told`` are those of a deck, none where one body is assumed.
+    """Rigid bodies of a flight with their displacements; ``told`` are those of a deck, none if one body is assumed.
 
-    Where the drift of one of them is not known, no error is: it may be the largest.  ``apart`` are parts that are to
-    become one body with others, and fly away from them.
+    If one displacement is unknown the error is unknown too, since it may be the largest.  ``apart`` are parts that are
+    to become one body with others but fly away from them.
     """
 
     def __init__(
@@ -356,7 +359,7 @@ class Bodies:
         )
 
     def errors(self, tr: Samples, td: float) -> Samples:
-        """How far the body that is off most will be at td, for times tr (k,) [length]; NaN outside the flight."""
+        """Return the place error of the most displaced body at td, for tr (k,) [length]; NaN outside the flight."""
         return (
             np.asarray(self._each(tr, td).max(axis=0))
             if self._complete
@@ -365,13 +368,13 @@ class Bodies:
 
     @property
     def limit(self) -> float:
-        """From which error on a body is out of place, the least of those whose parts move [length]."""
+        """Return the error above which a body is out of place, the least of all bodies whose parts move [length]."""
         return min(
             (one.limit for one in self._known if one.place.any()), default=np.inf
         )
 
     def worst(self, tr: float, td: float) -> Off | None:
-        """Give the body that is off most; None outside the flight, and where one is not known."""
+        """Return the body that is displaced most; None outside the flight, or if an error is unknown."""
         found = (
             self._each(np.array([tr]), td)[:, 0]
             if self._complete
@@ -390,7 +393,7 @@ class Bodies:
         )
 
     def _each(self, tr: Samples, td: float) -> Samples:
-        """Errors by body, shape (bodies, k) [length]."""
+        """Return the errors of all bodies, shape (bodies, k) [length]."""
         return np.stack([one.errors(tr, td) for one in self._known])
 
 
@@ -400,7 +403,7 @@ def bodies_in_flight(
     told: Sequence[RigidBody] | None,
     placement: Placement | None = None,
 ) -> Bodies:
-    """Find how the bodies that the parts to be switched become drift in a flight.
+    """Find how far the bodies that the switched parts become are displaced in a flight.
 
     Parameters
     ----------
@@ -408,9 +411,9 @@ def bodies_in_flight(
     flight : Flight
         With the parts that fly in it.
     told : sequence of RigidBody or None
-        By a deck; without them the parts are taken for one body.
+        According to a deck; without it the parts are assumed to become one body.
     placement : Placement, optional
-        Where the deck puts the parts.
+        Places of the parts according to the deck.
     """
     if not told:
         away = apart_in_flight(history, flight)
@@ -437,7 +440,7 @@ def _drift(
     parts: Sequence[Part],
     placement: Placement | None,
 ) -> Drift | None:
-    """Drift of one body of those parts that have energy; of a single part none at all while it flies."""
+    """Return the displacement of one body of those parts that have energy; a single part that flies has none."""
     if not body.whole or len(parts) < len(body.parts):
         return None
     if len(parts) > 1:

@@ -1,8 +1,8 @@
-"""The steady rotation of a body that flies, as the ways of its parts about its centre show it.
+"""Find the steady rotation of a flying body from the displacements of its parts about its centre.
 
-While it turns at a constant rate, each part of a rigid body goes round on a circle.  What is left of the ways when
-these are taken off is how the parts move against each other, seen from a frame that turns with the body.  Those that
-move against the others are the ones without which these are most nearly one rigid body.
+In a body that turns at a constant rate each part moves on a circle.  Displacements less these circles are the motion of
+the parts against each other, in a frame that turns with the body.  The moving parts are those without which the others
+are most nearly one rigid body.
 """
 
 from __future__ import annotations
@@ -21,24 +21,24 @@ if TYPE_CHECKING:
 
     Places = NDArray[np.intp]
 
-# A rotation counts where it explains three quarters of how the parts move: less may be their vibration.
+# A rotation counts if it leaves less than this share of the displacements unexplained; more may be vibration.
 _SHOWN: Final = 0.25
-# Steps of Gauss and Newton; a dozen bring a good start to the last digit.
+# Most steps of the Gauss-Newton iteration; a dozen bring a good start to the last digit.
 _MOST_STEPS: Final = 25
-# Change of the rate, as a share of one turn over the record, by which derivatives are taken and below which it ends;
-# and the share of the rest that a step gains below which it ends.
+# Step of the rate for derivatives and the end of the iteration, as a share of one turn over the record; also the gain
+# of a step that ends the iteration.
 _SMALL: Final = 1e-6
 _LEAST_GAIN: Final = 1e-4
-# Directions in which arms move by less than this share of the others, squared, cannot be told: along the axis.
+# Directions in which arms move by less than this share of the others, squared, cannot be determined: along the axis.
 _ALONG_AXIS: Final = 1e-6
-# Periods in the record that are tried: in steps of a twentieth up to two, then by so much more each.
+# Numbers of periods that are tried: steps of 1/20 up to two periods, then 10 % more each.
 _PERIODS: Final = (*(n / 20 for n in range(4, 41)), *(2 * 1.1**n for n in range(1, 25)))
 
 
 def _steady_rotation(
     time: Samples, ways: Samples, masses: Samples, least: float
 ) -> tuple[Samples, float]:
-    """Find the constant rate of rotation that explains the ways of the parts of a body about its centre best.
+    """Find the constant rate of rotation that best explains the displacements of a body's parts about its centre.
 
     Parameters
     ----------
@@ -49,14 +49,14 @@ def _steady_rotation(
     masses : array of shape (parts,)
         [mass]
     least : float
-        Ways whose sum of m r^2 over parts and states is no more show no rotation [mass length^2].
+        Displacements whose sum of m r^2 over parts and states is smaller show no rotation [mass length^2].
 
     Returns
     -------
     rate : array of shape (3,)
-        At which the body turns [rad/time]; 0 where no rotation explains three quarters of the ways.
+        Of the body's rotation [rad/time]; 0 if no rotation explains three quarters of the displacements.
     rest : float
-        Sum of m r^2 over parts and states beside it [mass length^2].
+        Sum of m r^2 over parts and states that the rotation does not explain [mass length^2].
     """
     weights = np.sqrt(masses)[:, np.newaxis]
     stood = float(np.sum(_rest(time, ways, np.zeros(3), weights) ** 2))
@@ -94,9 +94,9 @@ def _steady_rotation(
 
 
 def off_the_circle(time: Samples, ways: Samples, rate: Samples) -> Samples:
-    """Give what is left of ways (n, parts, 3) beside a circle at a rate, in the frame that turns, without its mean.
+    """Return the displacements (n, parts, 3) less their circles at a rate, in the frame that turns, without their mean.
 
-    The circle of each is that which leaves the least: its place at the start, the arm, is not known otherwise.
+    The circle of each part is the one that leaves least, since its arm, the place at the start, is unknown.
     """
     frame = _frame(time, rate)
     turned = ways @ frame
@@ -108,11 +108,10 @@ def off_the_circle(time: Samples, ways: Samples, rate: Samples) -> Samples:
 
 
 def periods_of(time: Samples, left: Samples, rate: Samples) -> float:
-    """Give the number of periods in the record of the harmonic motion that explains best what is left of a way.
+    """Return the number of periods of the harmonic motion that best explains the rest of a displacement.
 
-    A motion of less than a period and an arc are alike: the circle that was taken off took most of it along.  So a
-    circle is taken off each motion before it is held against ``left`` (n, 3), a way without its own.  Infinite where
-    none explains half of that.
+    A motion of less than a period looks like an arc, so the subtracted circle took most of it.  Therefore a circle is
+    subtracted from each trial motion before it is compared with ``left`` (n, 3).  Infinite if none explains half of it.
     """
     wanted = (left - left.mean(axis=0)).ravel()
     least, found = 0.5 * float(wanted @ wanted), np.inf
@@ -147,7 +146,7 @@ def periods_of(time: Samples, left: Samples, rate: Samples) -> float:
 
 
 def _least_ways(ways: Samples, masses: Samples) -> Samples:
-    """Give for each part the m r^2 of the others about their own centre, in a frame at rest (parts,)."""
+    """Return for each part the m r^2 of the others about their own centre, in a frame at rest (parts,)."""
     return np.asarray(
         _without_each(
             masses * np.sum((ways - ways.mean(axis=0)) ** 2, axis=(0, 2)), masses
@@ -156,10 +155,10 @@ def _least_ways(ways: Samples, masses: Samples) -> Samples:
 
 
 def _least_rests(time: Samples, ways: Samples, masses: Samples) -> Samples:
-    """Estimate for each part how little of that a rotation of the others leaves over (parts,).
+    """Estimate for each part how much of that sum a rotation of the others leaves unexplained (parts,).
 
-    In a rotation the velocity changes by rate x way, so that ways less their straight lines are rate x their integrals:
-    linear in the rate, with normal equations that lose one part easily.
+    In a rotation the velocity is rate x displacement, so that displacements less their straight lines are rate x their
+    integrals: linear in the rate, with normal equations from which one part is easily removed.
     """
     square, right, normal = (
         _without_each(one, masses) for one in _linear(time, ways, masses)
@@ -171,14 +170,14 @@ def _least_rests(time: Samples, ways: Samples, masses: Samples) -> Samples:
 
 
 def _without_each(terms: Samples, masses: Samples) -> Samples:
-    """Sum quadratic terms (parts, ...) of ways about the centre over all parts but one, about the centre of these."""
+    """Sum quadratic terms (parts, ...) of displacements over all parts but one, about the centre of these."""
     return np.asarray(terms.sum(axis=0) - (terms.T / (1 - masses / masses.sum())).T)
 
 
 def _linear(
     time: Samples, ways: Samples, masses: Samples
 ) -> tuple[Samples, Samples, Samples]:
-    """Terms of the linear equations of each part: squares (parts,), right sides (parts, 3), normal (parts, 3, 3)."""
+    """Return each part's linear equations: squares (parts,), right sides (parts, 3), normal (parts, 3, 3)."""
     flat = ways.reshape(time.size, -1)
     left, arm = (
         bent(time, values).reshape(ways.shape)
@@ -194,11 +193,12 @@ def _linear(
 
 
 def _rest(time: Samples, ways: Samples, rate: Samples, weights: Samples) -> Samples:
+    """Return the sum of m r^2 that a rotation at ``rate`` leaves unexplained."""
     return np.asarray(weights * off_the_circle(time, ways, rate))
 
 
 def _frame(time: Samples, rate: Samples) -> Samples:
-    """Axes, shape (n, 3, 3), of a frame that turns at ``rate``: a row vector times it is the vector in that frame."""
+    """Return the axes (n, 3, 3) of a frame that turns at ``rate``; a row vector times it lies in that frame."""
     size = float(np.linalg.norm(rate))
     x, y, z = rate / size if size > 0 else np.zeros(3)
     angle = size * (time - time[0])[:, np.newaxis, np.newaxis]
@@ -210,24 +210,24 @@ def _frame(time: Samples, rate: Samples) -> Samples:
     )
 
 
-# Parts that are tried as the one that moves against the others, by what a rotation and by what rest leaves over.
+# Number of parts tried as the moving one, by each of two criteria: what rotation, and what rest leaves unexplained.
 _TRIED: Final = 2
-# Without a further part that moves, the others leave over no more than this of what they did with it.
+# Without a further moving part the others leave at most this share of the rest with it.
 _MORE_RIGID: Final = 0.5
-# Less than this share of all that the parts do, r^2, is nothing: a thousandth of the ways.
+# Less than this share of the parts' r^2 counts as nothing: 0.1 % of the displacements.
 _NOTHING: Final = 1e-6
-# A rotation by which the others move a tenth of what the part does changes its displacement by no more.
+# A rotation that moves the others by 10 % of the part's motion changes its displacement by no more.
 _NOTABLE_WAY: Final = 0.1
-# A body shows no rotation where one part has more than this share of it.
+# A body shows no rotation if one part has more than this share of its mass.
 _MOST_OF_BODY: Final = 0.95
-# Parts of a smaller share of the mass move the others too little to be asked about that.
+# Parts below this share of the mass are not tried: they move the others too little.
 _HEAVY: Final = 0.05
 
 
 def moving_apart(
     time: Samples, ways: Samples, mass: Samples
 ) -> tuple[list[int], Samples, float]:
-    """Find the parts that move against the others, the rate at which these turn, and their rest; none if unknown."""
+    """Find the parts that move against the others, the rate of these, and their rest; no parts if unknown."""
     moving: list[int] = []
     rate, rest = np.zeros(3), np.inf
     while True:
@@ -241,7 +241,7 @@ def moving_apart(
 
 
 class _Apart(NamedTuple):
-    """A part that is left out, how the others turn and what is left of them, and how far the part pushes them off."""
+    """A part left out, how the others turn, what is unexplained of them, and how far the part displaces them."""
 
     part: int
     rate: Samples
@@ -252,9 +252,10 @@ class _Apart(NamedTuple):
 def _next_apart(
     time: Samples, ways: Samples, mass: Samples, left: Places
 ) -> _Apart | None:
-    """Of the parts that are left, find that without which the others are most nearly rigid.
+    """Find the part without which the others are most nearly rigid.
 
-    A slide of one part may look like a rotation of all: of those alike in this, the one with most effect counts.
+    A slide of one part may look like a rotation of all; among parts alike in this, the one with the largest effect
+    counts.
     """
     about, masses = _about_centre(ways[:, left], mass[left]), mass[left]
     orders = (
@@ -279,7 +280,7 @@ def _next_apart(
 def _without(
     time: Samples, ways: Samples, mass: Samples, left: Places, part: int
 ) -> _Apart:
-    """Leave one part out and see how the others turn."""
+    """Leave one part out and fit the rotation of the others."""
     others = left[left != part]
     way = (
         ways[:, [part]]
@@ -302,11 +303,12 @@ def _without(
 
 
 def _about_centre(ways: Samples, mass: Samples) -> Samples:
+    """Return displacements about the centre of mass."""
     return np.asarray(ways - np.average(ways, axis=1, weights=mass)[:, np.newaxis])
 
 
 def _may_leave(mass: Samples, left: Places, part: int) -> bool:
-    """Whether the others have half of the mass, not nearly all of it in one part."""
+    """Return True if the others have half of the mass, and not almost all of it in one part."""
     others = mass[left[left != part]]
     return bool(
         2 * others.sum() >= mass.sum() and others.max() <= _MOST_OF_BODY * others.sum()
@@ -314,7 +316,7 @@ def _may_leave(mass: Samples, left: Places, part: int) -> bool:
 
 
 def shows_rotation(mass: Samples) -> bool:
-    """Whether the body without any of the heavy parts still shows how it turns."""
+    """Return True if the body still shows its rotation without any one of its heavy parts."""
     if mass.size < 3:
         return False
     places = np.arange(mass.size)

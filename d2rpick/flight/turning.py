@@ -28,24 +28,25 @@ if TYPE_CHECKING:
     from d2rpick.deck.geometry import Placement
     from d2rpick.histories.history import Momenta, Samples
 
-# Parts of the body may be this far from the places that one rotation of the deck gives them, as a share of the size
-# across: a body that is bent more, or lies elsewhere than the deck says, has no orientation to a tenth of a degree.
+# Largest deviation of the body's parts from the places that one rotation of the deck gives them, relative to their
+# size. A body bent more, or placed elsewhere than in the deck, has no orientation to 0.1 degrees.
 _MOST_BENT: Final = 0.05
-# On so many states at most; between them places are straight lines, and the vibration of a body hardly turns it.
+# Most states of the pass; between them places are straight lines, as vibration hardly turns a body.
 _STATES: Final = 2000
-# Parts that hang together make the frame where they have half of the mass of the body; else all that stand still do.
+# Connected parts make the frame if they have this share of the body's mass, else all parts that do not move.
 _MOST: Final = 0.5
-# Share of their inertia below which parts lie on a line.
+# Parts lie on a line if a moment of inertia is below this share of the others.
 _ALONG_LINE: Final = 1e-9
 
 
 class Turning(NamedTuple):
-    """What a pass over a flight leaves: arrays over ``time`` (n,), in the frame of the body.
+    """Result of one pass over a flight: arrays over ``time`` (n,), in the frame of the body.
 
-    ``place`` (n, 3): of the body against the centre of mass of all that flies, as far as parts that become rigid push
-    it; ``arm`` (n, 3) from there to where errors are looked at [length]; ``inertia`` (n, 3, 3) of those parts;
-    ``carried`` (n, 3, 3), ``pushed`` (n, 3) and ``kept`` (n, 3, 3, 3) solve the equation of psi.  ``doubt`` is by how
-    much the bending of the body turns its frame from one time to another [rad].
+    ``place`` (n, 3) is the body's displacement against the centre of mass of all flying parts, as far as the parts that
+    become rigid cause it; ``arm`` (n, 3) leads from there to the points where errors are evaluated [length];
+    ``inertia`` (n, 3, 3) belongs to those parts; ``carried`` (n, 3, 3), ``pushed`` (n, 3) and ``kept`` (n, 3, 3, 3)
+    solve the equation of psi.  ``doubt`` is the angle by which bending of the body turns its frame from one time to
+    another [rad].
     """
 
     time: Samples
@@ -58,7 +59,7 @@ class Turning(NamedTuple):
     doubt: float
 
     def angles(self, tr: Samples, td: float) -> Samples:
-        """By what a body that is rigid from each of ``tr`` (k,) is turned at td: psi, (k, 3) [rad]."""
+        """Return the angles psi by which a body that is rigid from ``tr`` (k,) on is turned at td, (k, 3) [rad]."""
         pushed, kept = (
             _at(self.time, one, np.array([td])) - _at(self.time, one, tr)
             for one in (self.pushed, self.kept)
@@ -69,7 +70,7 @@ class Turning(NamedTuple):
         return np.asarray(turned @ _at(self.time, self.carried, np.array([td]))[0].T)
 
     def offsets(self, tr: Samples, td: float) -> Samples:
-        """By how much it is out of place then, (k, 3) in its own frame [length]."""
+        """Return the displacements of that body, (k, 3) in its own frame [length]."""
         there = np.array([td])
         slid = _at(self.time, self.place, there) - _at(self.time, self.place, tr)
         return np.asarray(
@@ -78,10 +79,10 @@ class Turning(NamedTuple):
 
 
 class Flying(NamedTuple):
-    """Parts in a flight, from ``start`` to ``end`` [time]: ``momenta`` of single parts and their ``masses`` (parts,).
+    """Parts in a flight from ``start`` to ``end`` [time]: ``momenta`` of single parts and their ``masses`` (parts,).
 
-    A mass is NaN where it is unknown.  ``members`` are the places of those that become one rigid body, ``others`` of
-    all that fly with them, which what moves in the body pushes off too.
+    A mass is NaN if it is unknown.  ``members`` are the columns of the parts that become one rigid body, ``others``
+    those of all parts that fly with them, which the moving parts displace too.
     """
 
     momenta: Momenta
@@ -95,10 +96,10 @@ class Flying(NamedTuple):
 def turning_in_flight(
     seen: Flying, moving: Sequence[int], placement: Placement
 ) -> Turning | None:
-    """Follow the orientation of the body that parts become, from where the deck puts all parts that fly.
+    """Follow the orientation of the body that parts become, from the places of all flying parts in the deck.
 
-    ``moving`` are the places of those that move against the others.  None where a mass or a place is not known, the
-    record does not begin with the run, or the parts of the body do not tell its orientation.
+    ``moving`` are the columns of the parts that move against the others.  None if a mass or a place is unknown, the
+    record does not begin with the run, or the parts of the body do not determine its orientation.
     """
     momenta, masses = seen.momenta, seen.masses
     assert momenta.parts is not None
@@ -147,7 +148,7 @@ def turning_in_flight(
     doubt = _doubt(shape, places[:, part] - middle[:, np.newaxis] - shape, mass[part])
     looked_at = placement.watched_centre(
         momenta.parts[i].id for i in body
-    )  # by the deck
+    )  # according to the deck
     arm = middle + (0.0 if looked_at is None else looked_at - home)
     return Turning(time, place, arm, moving_inertia, *solved, doubt)
 
@@ -155,7 +156,7 @@ def turning_in_flight(
 def _frame_of(
     seen: Flying, moving: Sequence[int], placement: Placement
 ) -> Sequence[int]:
-    """Parts that make the frame of the body: those that hang together and do not move against each other."""
+    """Return the parts that make the frame of the body: connected parts that do not move against each other."""
     parts = seen.momenta.parts or ()
     still = [i for i in seen.members if i not in moving]
     together = placement.hanging_together([parts[i].id for i in still])
@@ -168,10 +169,10 @@ def _frame_of(
 
 
 def _doubt(shape: Samples, bent: Samples, mass: Samples) -> float:
-    """By how much the frame turns from one time to another where each of its parts in turn is left out (jackknife).
+    """Return the angle by which the frame turns from one time to another if each of its parts in turn is left out.
 
-    Parts about their centre, (parts, 3), are ``bent`` (n, parts, 3) off their shape; without one of them the others
-    turn by what its arm and its deviation would have held; two, about their line, by nothing.
+    Parts about their centre, (parts, 3), deviate from their shape by ``bent`` (n, parts, 3) (jackknife); two parts on a
+    line determine no angle and give 0.
     """
     count = mass.size
     alone = mass * mass.sum() / (mass.sum() - mass)
@@ -191,7 +192,7 @@ def _solved(
     whole: tuple[Samples, Samples],
     moving: tuple[Samples, Samples],
 ) -> tuple[Samples, Samples, Samples]:
-    """Solve the equation of psi: a matrix that carries it, what pushes it, and what the inertia at tr takes off."""
+    """Solve the equation of psi: return the matrix that carries it, the right side, and the effect of I(tr)."""
     (inertia, spin), steps = whole, np.diff(time)
     swept = np.einsum("nij,nj->ni", _halves(inertia), _turns(frames)) + spin
     kept = np.einsum("nij,nj->i", _halves(frames), swept) / steps.sum()  # L at rest
@@ -214,7 +215,7 @@ def _solved(
 
 
 def _carried(time: Samples, slope: Samples) -> Samples:
-    """Solution (n, 3, 3) of X' = slope X from the unit matrix on."""
+    """Return the solution (n, 3, 3) of X' = slope X that starts from the unit matrix."""
     found, unit = [np.eye(3)], np.eye(3)
     for step in _halves(slope) * np.diff(time)[:, np.newaxis, np.newaxis]:
         found.append((unit + step + step @ step / 2) @ found[-1])
@@ -222,7 +223,7 @@ def _carried(time: Samples, slope: Samples) -> Samples:
 
 
 def _orientations(shape: Samples, where: Samples, mass: Samples) -> Samples:
-    """Rotations (n, 3, 3) that bring a shape (parts, 3) nearest to each of ``where`` (n, parts, 3)."""
+    """Return the rotations (n, 3, 3) that bring a shape (parts, 3) nearest to each of ``where`` (n, parts, 3)."""
     left, _, right = np.linalg.svd(np.einsum("p,npi,pj->nij", mass, where, shape))
     mirrored = np.linalg.det(left @ right) < 0
     left[mirrored, :, 2] *= -1
@@ -230,7 +231,7 @@ def _orientations(shape: Samples, where: Samples, mass: Samples) -> Samples:
 
 
 def _bent(shape: Samples, places: Samples, mass: Samples) -> float:
-    """How far parts are from their shape, over its size across its longest axis; infinite for parts on a line."""
+    """Return how far parts deviate from their shape, over its size across its longest axis; infinite on a line."""
     least = (
         np.linalg.eigvalsh(_second(shape[np.newaxis], mass)[0])[:2].sum() / mass.sum()
     )
@@ -242,7 +243,7 @@ def _bent(shape: Samples, places: Samples, mass: Samples) -> float:
 
 
 def _turns(frames: Samples) -> Samples:
-    """Rotation from each frame to the next, (n - 1, 3) [rad]; small ones."""
+    """Return the rotation from each frame to the next, (n - 1, 3) [rad], for small angles."""
     between = frames[:-1].transpose(0, 2, 1) @ frames[1:]
     odd = (between - between.transpose(0, 2, 1)) / 2
     sine = np.stack([odd[:, 2, 1], odd[:, 0, 2], odd[:, 1, 0]], axis=1)
@@ -258,15 +259,17 @@ def _turns(frames: Samples) -> Samples:
 
 
 def _mean(values: Samples, mass: Samples) -> Samples:
+    """Return the mean of values weighted by mass."""
     return np.asarray(np.einsum("p,...pi->...i", mass, values) / mass.sum())
 
 
 def _second(places: Samples, mass: Samples) -> Samples:
+    """Return the second moments of mass of places."""
     return np.asarray(np.einsum("p,npi,npj->nij", mass, places, places))
 
 
 def _inertia(second: Samples) -> Samples:
-    """Tensor of inertia by the second moments (..., 3, 3)."""
+    """Return the tensor of inertia from the second moments (..., 3, 3)."""
     return np.asarray(
         np.trace(second, axis1=-2, axis2=-1)[..., np.newaxis, np.newaxis] * np.eye(3)
         - second
@@ -274,26 +277,27 @@ def _inertia(second: Samples) -> Samples:
 
 
 def _spin(places: Samples, mass: Samples) -> Samples:
-    """Integral of the angular momentum of parts against the frame over each step, (n - 1, 3): twice swept areas."""
+    """Return the integral over each step of the parts' angular momentum, (n - 1, 3): twice the swept areas."""
     return np.asarray(np.einsum("p,npi->ni", mass, np.cross(places[:-1], places[1:])))
 
 
 def _across(vectors: Samples) -> Samples:
-    """Matrices (n, 3, 3) whose product with a vector is the cross product of ``vectors`` (n, 3) with it."""
+    """Return matrices (n, 3, 3) whose product with a vector is the cross product of ``vectors`` (n, 3) with it."""
     return np.asarray(np.cross(vectors[:, np.newaxis], np.eye(3)).transpose(0, 2, 1))
 
 
 def _halves(values: Samples) -> Samples:
-    """Values in the middle of the steps."""
+    """Return the values in the middle of the steps."""
     return np.asarray((values[1:] + values[:-1]) / 2)
 
 
 def _running(steps: Samples) -> Samples:
+    """Return the running sum of steps, from 0."""
     return np.concatenate([np.zeros_like(steps[:1]), np.cumsum(steps, axis=0)])
 
 
 def _at(time: Samples, values: Samples, when: Samples) -> Samples:
-    """Values (n, ...) at times (k,), between samples on straight lines."""
+    """Return values (n, ...) at times (k,), linear between samples."""
     after = np.clip(np.searchsorted(time, when), 1, time.size - 1)
     share = (when - time[after - 1]) / (time[after] - time[after - 1])
     share = share.reshape(-1, *[1] * (values.ndim - 1))

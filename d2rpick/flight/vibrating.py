@@ -1,4 +1,4 @@
-"""What vibrates together in a flight: parts beside the chosen ones, and the kinetic energy of all of them."""
+"""Find what vibrates together in a flight: parts beside the chosen ones, and the kinetic energy of all of them."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import History, Samples
     from d2rpick.histories.names import Part
 
-# Of the range of the chosen parts' energy in the flight: other parts with less of it hardly vibrate with them.
+# Parts vibrate with the chosen ones if their energy changes by more than this share of the chosen parts' range.
 _HARDLY: Final = 0.02
-_FEWEST: Final = 16  # states that tell a fall from a vibration
+_FEWEST: Final = 16  # fewest states that separate a fall from a vibration
 
 
 class Beside(NamedTuple):
-    """Parts that vibrate with the chosen ones and were not chosen; ``energy``: by how much theirs changes [energy]."""
+    """Parts that vibrate with the chosen ones and were not chosen; ``energy`` is the range of their energy [energy]."""
 
     parts: tuple[Part, ...] = ()
     energy: float = 0.0
@@ -33,7 +33,7 @@ def vibrating_beside(history: History, flight: Flight) -> Beside:
     ----------
     history : History
     flight : Flight
-        Whose parts fly together; none are known to if it has none.
+        Its parts fly together; a flight without parts has none.
     """
     if flight.parts is None or history.parts is None:
         return Beside()
@@ -55,7 +55,7 @@ def vibrating_beside(history: History, flight: Flight) -> Beside:
 def kinetic_energy_of(
     history: History, flight: Flight
 ) -> tuple[Samples, Samples] | None:
-    """Give the kinetic energy of all that vibrates together in the flight, without that of its fall.
+    """Return the kinetic energy of all parts that vibrate together in the flight, without that of their fall.
 
     Parameters
     ----------
@@ -65,12 +65,12 @@ def kinetic_energy_of(
     Returns
     -------
     time, energy : array of shape (n,), or None
-        Within the flight [time], [energy]; None if no file holds it.
+        Within the flight [time], [energy]; None if no file contains it.
 
     Notes
     -----
-    The kinetic energy of the centre of mass is a quadratic function of time under a constant gravity, and what of it
-    is not, as under damping, is as slow: neither has any line.
+    The kinetic energy of the centre of mass is a quadratic function of time under constant gravity; what deviates from
+    it, as under damping, is as slow. Neither has a line.
     """
     kinetic = history.evidence.kinetic_energy(flight.parts)
     if kinetic is None:

@@ -1,4 +1,4 @@
-"""Windows around a time in which a record obeys a law of free flight, as long as they can be and no longer."""
+"""Find windows around a time in which a record obeys a law of free flight, as long as possible and no longer."""
 
 from __future__ import annotations
 
@@ -16,35 +16,35 @@ if TYPE_CHECKING:
     from d2rpick.histories.surroundings import Surroundings
 
 
-# Misfit that free flight may leave at first, as a share of the range over the record: contact shows at once.
+# First limit of the misfit in free flight, as a share of the range over the record; a contact exceeds it at once.
 TOLERANCE = 1e-3
-# Any smooth motion obeys a law for a moment; what is left of it there grows with the cube of time or faster.  At a
-# tenth of the tolerance such a moment shrinks by the cube root, free flight hardly does: the limit lies halfway.  A
-# load that fades smoothly shrinks the window too, but no more once the limit lies below what is left of it.  So the
-# limit is lowered, tenth by tenth, down to what the numbers resolve, as long as the window that was found stays.
+# Any smooth motion obeys a law for a moment; its misfit grows with the cube of time or faster. At 1/10 of the tolerance
+# such a moment shrinks by the cube root, a free flight hardly does: the limit of the shrinkage lies between. A smoothly
+# fading load shrinks the window too, until the limit is below what is left of it; so the limit is lowered by tenths,
+# down to the resolution of the numbers, while the window stays.
 _TIGHTER, _STAYS, _STANDS = 0.1, 0.95, 0.02
-# What rings in a window has this share of its misfit in the middle half, at least.
+# A vibration leaves at least this share of the window's misfit in its middle half (a smooth load leaves 1/8).
 _RINGS = 1 / 3
-# No window is shorter than this share of the record, or holds fewer states.
+# Least length of a window as a share of the record, and fewest states.
 SHORTEST, FEWEST = 0.05, 12
-# The misfit of the middle of a window, without this share at each end, is that of free flight itself.  The window may
-# leave so many times as much of what printed digits leave open, which has a bound, and of the rest, which has none: its
-# largest deviation is looked for among more states and over a longer time.
+# The misfit of a window's middle, without this share at each end, is that of free flight itself. The window may have
+# 1.5 times the part due to digits, which is bounded, and 3 times the rest, which is not: its maximum is taken over more
+# states and a longer time.
 _ENDS, _REACH_OF_DIGITS, _REACH = 0.1, 1.5, 3.0
-# Nothing is known more exactly than this share of its range: solvers add up in single precision.
+# Relative resolution of any quantity: solvers add up in single precision.
 ROUND_OFF = 1e-7
-# Every so many moments there is one from which a long flight is looked for.
+# One of this many times is a mark from which a long flight is searched.
 _FAR: Final = 5
-# Each time the window shrinks its middle is clearer of the contacts; it soon stays.
+# Most repetitions; each time the window shrinks its middle is clearer of the contacts, and soon it stays.
 _MOST_SHRINKS = 8
 
 
 class FreeFlight(NamedTuple):
-    """Window [time] in which ``parts`` fly freely together; None for parts: the whole model.
+    """A window [time] in which ``parts`` fly freely together; None for parts means the whole model.
 
-    ``end_seen`` is False where the record ends while it still flies.  ``damping`` is alpha, by which the momentum
-    decays there [1/time]; ``gravity`` the acceleration that was taken for gravity, 0 where there is none, NaN where
-    nothing but its constancy shows it, infinite where energies grow under a load of unknown size [length/time^2].
+    ``end_seen`` is False if the record ends while it still flies.  ``damping`` is alpha, the decay rate of the momentum
+    [1/time].  ``gravity`` is the acceleration taken as gravity: 0 without, NaN if nothing but its constancy shows it,
+    infinite if energies grow under a load of unknown size [length/time^2].
     """
 
     start: float
@@ -59,7 +59,7 @@ class FreeFlight(NamedTuple):
         cls, time: Samples, states: tuple[int, int], parts: tuple[Part, ...] | None = None, *,
         damping: float = 0.0, gravity: float = 0.0,
     ) -> FreeFlight:  # fmt: skip
-        """Give the flight from the first to the last of some states of a record."""
+        """Make the flight from the first to the last of some states of a record."""
         first, last = states
         return cls(
             float(time[first]),
@@ -72,9 +72,9 @@ class FreeFlight(NamedTuple):
 
 
 class Law:
-    """What free flight obeys over ``time`` (n,), and how far a record is off.
+    """A law of free flight over ``time`` (n,), and how far a record deviates from it.
 
-    It is held against no window twice: from one time to the next the same ones come up again.
+    The misfit of each window is computed once: neighbouring times ask for the same windows.
     """
 
     def __init__(self, time: Samples) -> None:
@@ -82,14 +82,14 @@ class Law:
         self._misfits: dict[tuple[int, int], float] = {}
 
     def misfit(self, first: int, last: int) -> float:
-        """Largest deviation of the states ``first`` to ``last``, in any order, from the law that suits them best."""
+        """Return the largest deviation of states ``first`` to ``last``, in any order, from the law's best fit."""
         window = min(first, last), max(first, last)
         if window not in self._misfits:
             self._misfits[window] = self._misfit(*window)
         return self._misfits[window]
 
     def _misfit(self, first: int, last: int) -> float:
-        """The same of states in order."""
+        """Compute the misfit of states in order."""
         raise NotImplementedError
 
 
@@ -98,7 +98,9 @@ class Constant(Law):
 
     def __init__(self, time: Samples, values: Samples) -> None:
         super().__init__(time)
-        self.values = np.asfortranarray(values)  # columns lie whole: windows are long
+        self.values = np.asfortranarray(
+            values
+        )  # contiguous columns, since windows are long
 
     def _misfit(self, first: int, last: int) -> float:
         return float(np.ptp(self.values[first : last + 1], axis=0).max()) / 2
@@ -114,7 +116,7 @@ def lasting_window(
     enough: float = 0.0,
     rings: bool = False,
 ) -> tuple[int, int] | None:
-    """Find the states around ``td`` that obey the law and go on doing so when it is taken strictly.
+    """Find the states around ``td`` that obey the law, and still do so under a stricter limit.
 
     Parameters
     ----------
@@ -122,18 +124,18 @@ def lasting_window(
     td : float
         [time]
     extent, noise : float
-        Range over the record, and what printed digits leave open, in the unit of the misfit.
+        Range over the record, and the error of printed digits, in the unit of the misfit.
     fades : bool
-        Go on to finer limits: a load that fades smoothly shows at these only.
+        Continue to finer limits, at which alone a smoothly fading load shows.
     enough : float
-        Share of the range that a window may leave although it goes on to shrink.
+        Share of the range that a window may leave although it still shrinks.
     rings : bool
-        Take a window in which the misfit is as large in its middle: a vibration, which no law of free flight describes.
+        Accept a window whose misfit is as large in its middle: a vibration, which no law of free flight describes.
 
     Returns
     -------
     (int, int) or None
-        First and last state; None where no window is long enough, or a strict one does not hold td.
+        First and last state; None if no window is long enough, or a strict one does not contain td.
     """
     time = law.time
     at = min(int(np.searchsorted(time, td)), time.size - 1)
@@ -146,7 +148,7 @@ def lasting_window(
     window, room, from_start = found
     first, last = _tightened(law, window, own, room)
     if first == 1 and from_start:
-        first = 0  # a solver may write the first state before its first step, with what belongs half a step earlier
+        first = 0  # a solver may write the first state before its first step, with velocities of half a step earlier
     return (
         (first, last)
         if time[first] <= td <= time[last] and _long_enough(time, (first, last))
@@ -164,10 +166,10 @@ def _converged(
     *,
     rings: bool,
 ) -> tuple[tuple[int, int], float, bool] | None:
-    """Find the window around the state ``at`` that hardly shrinks at a tenth of the limit; None where it does.
+    """Find the window around the state ``at`` that hardly shrinks at 1/10 of the limit; None if it does.
 
-    The limit is lowered as long as it is above ``finest``; from ``enough`` on a window may shrink on one side.  With it
-    come the room that it leaves, and whether it began with the record at first.
+    The limit is lowered while it is above ``finest``; from ``enough`` on a window may shrink on one side.  Also
+    returned: the misfit that the window may leave, and whether it first began with the record.
     """
     time, room, found = law.time, limit + noise, None
     window = longest_window(law, at, room)
@@ -203,7 +205,7 @@ def _converged(
 
 
 def _rings(law: Law, window: tuple[int, int]) -> bool:
-    """Whether a law is missed in the middle half of a window as in the whole; by what is smooth it is by an eighth."""
+    """Return True if a window's misfit is nearly as large in its middle half; a smooth load leaves 1/8 there."""
     quarter = (window[1] - window[0]) // 4
     return law.misfit(window[0] + quarter, window[1] - quarter) >= _RINGS * law.misfit(
         *window
@@ -211,16 +213,16 @@ def _rings(law: Law, window: tuple[int, int]) -> bool:
 
 
 def _fading(window: tuple[int, int], finer: tuple[int, int]) -> bool:
-    """Whether a window shrinks on one side only, as where a load fades there and a contact or the record ends it."""
+    """Return True if a window shrinks on one side only: a load fades there, a contact or the record ends the other."""
     moved = min(abs(finer[0] - window[0]), abs(finer[1] - window[1]))
     return moved <= _STANDS * (window[1] - window[0])
 
 
 def longest_window(law: Law, at: int, room: float) -> tuple[int, int]:
-    """First and last state of the longest window around the state ``at`` with a misfit below ``room``.
+    """Return the first and last state of the longest window around the state ``at`` with a misfit below ``room``.
 
-    Near an end of the flight a short window may reach across it: the side that is grown first decides, so both
-    orders are tried.
+    Near an end of the flight a short window may reach across it.  The side grown first decides, so both orders are
+    tried.
     """
     last_state = law.time.size - 1
     first = farthest(at, 0, lambda i: law.misfit(i, at) <= room)
@@ -231,15 +233,14 @@ def longest_window(law: Law, at: int, room: float) -> tuple[int, int]:
 
 
 def moments(time: Samples) -> Iterator[float]:
-    """Give times so close together that each flight that is long enough holds one."""
+    """Yield times so close together that each flight of sufficient length contains one."""
     yield from np.linspace(time[0], time[-1], round(1 / SHORTEST) + 1).tolist()
 
 
 def marks(time: Samples, td: float) -> Iterator[float]:
-    """Give the moments from which the flight around ``td`` is looked for, so that many td share what is found.
+    """Yield the times from which the flight around ``td`` is searched, so that many td share the result.
 
-    First the nearest of those far apart, whose long flight may hold td; then the two about td, of which each flight
-    that is long enough holds one.
+    First the nearest of the widely spaced times, whose long flight may contain td, then the two next to td.
     """
     times = tuple(moments(time))
     yield min(times[::_FAR], key=lambda moment: abs(moment - td))
@@ -249,12 +250,12 @@ def marks(time: Samples, td: float) -> Iterator[float]:
 def all_windows(
     time: Samples, around: Callable[[float], FreeFlight | None]
 ) -> tuple[FreeFlight, ...]:
-    """Find all flights of a record, ascending in time, where ``around`` gives the one around a time."""
+    """Find all flights of a record in ascending order; ``around`` returns the flight around a time."""
     found: list[FreeFlight] = []
     for moment in moments(time):
         if not found or moment > found[-1].end:
             flight = around(moment)
-            if flight:  # the tolerance may let it begin some samples before the last one has ended
+            if flight:  # the tolerance may let it begin some states before the last flight has ended
                 found.append(
                     flight._replace(start=max(flight.start, found[-1].end))
                     if found
@@ -266,12 +267,12 @@ def all_windows(
 def _tightened(
     law: Law, window: tuple[int, int], noise: float, loose: float
 ) -> tuple[int, int]:
-    """Shrink a window until its ends deviate no more than its middle: what is left of a load there is cut off.
+    """Shrink a window until its ends deviate no more than its middle, which cuts off the rest of a load.
 
-    The tolerance hides the last, weak pushes of a load.  The middle of the flight knows how exactly the run obeys
-    the law, be that by printed digits, round-off or the solver's own errors.  Where that is more strict than ``loose``,
-    by which the window was found, and still reaches farther, a state of a contact at the edge of ``loose`` had stopped
-    the search on the other side.
+    The tolerance hides the last, weak pushes of a load.  The middle of the flight shows how exactly the run obeys the
+    law, limited by digits, round-off or the solver's errors.  If that limit is stricter than ``loose``, by which the
+    window was found, and still reaches farther, a state of a contact at the edge of ``loose`` had stopped the search on
+    the other side.
     """
     room = 0.0
     for _ in range(_MOST_SHRINKS):
@@ -292,10 +293,10 @@ def _tightened(
 def _without_what_is_hidden(
     law: Law, window: tuple[int, int], room: float
 ) -> tuple[int, int]:
-    """Cut off what of a push the ``room`` still hides at the ends of a window.
+    """Cut off what ``room`` still hides of a push at the ends of a window.
 
-    A push that fades smoothly leaves a deviation that falls with the square of the time that is left of it: from four
-    times the room to the room takes as long as from there to its end.  Less than a state cannot be told.
+    The deviation of a smoothly fading push falls with the square of its remaining time: from 4 times the room to the
+    room takes as long as from there to its end.  Less than one state cannot be resolved.
     """
     first, last = window
     wide = longest_window(law, (first + last) // 2, 4 * room)
@@ -309,11 +310,13 @@ def _without_what_is_hidden(
 
 
 def _long_enough(time: Samples, window: tuple[int, int]) -> bool:
+    """Return True if a window is long enough to be a flight."""
     shortest = SHORTEST * float(time[-1] - time[0])
     return window[1] - window[0] + 1 >= FEWEST and _length(time, window) >= shortest
 
 
 def _length(time: Samples, window: tuple[int, int]) -> float:
+    """Return the duration of a window [time]."""
     return float(time[window[1]] - time[window[0]])
 
 
@@ -339,7 +342,7 @@ def unheld(
     parts: Sequence[Part] | None,
     td: float,
 ) -> FreeFlight | None:
-    """Give what of a flight around ``td`` [time] lies between the times in which parts, or the model, are held."""
+    """Return the part of a flight around ``td`` [time] between the times at which parts, or the model, are held."""
     between = surroundings.free(parts, td)
     if between is None or flight is None:
         return None

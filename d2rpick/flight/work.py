@@ -1,8 +1,7 @@
-"""Free flight, seen in the energies of the model: gravity and damping proportional to mass are all that works.
+"""Find free flight in the energies of the model: gravity and damping proportional to mass do all the work.
 
-With the resultant F of gravity, the momentum p and the mass m, gravity works by the integral of F p/m; such damping by
--2 alpha times the integral of the kinetic energy, which Radioss counts as external work.  While nothing touches, the
-contact energy does not change.
+With the resultant F of gravity, the momentum p and the mass m, gravity does the work int F p/m dt; such damping does -2
+alpha int K dt, which Radioss counts as external work.  While nothing touches, the contact energy is constant.
 """
 
 from __future__ import annotations
@@ -20,33 +19,33 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, Momenta, Samples
 
 
-# States from which a load can be told from gravity and damping: twice the unknowns.
+# Fewest states that separate a load from gravity and damping: twice the number of unknowns.
 FEWEST_STATES: Final = 6
-# What sampling and the solver's own sums leave of the work of gravity, as a share of its change: contacts do more.
+# Error of the work of gravity due to sampling and the solver's sums, as a share of its change; contacts change more.
 _OWN_ERROR: Final = 1e-3
-# Where no velocity is written, damping of the motion bends the parabola of the work of gravity.
+# If no velocity is written, damping bends the parabola of the work of gravity by this share.
 _BENT: Final = 1e-2
-# Mass follows from kinetic energy and velocity where it moves; states slower than this share (squared) are left out.
+# The mass follows from kinetic energy and velocity; states slower than this share (squared) are left out.
 _SLOW: Final = 1e-2
-# Mass so found is a bound already; a table may hold the kinetic energy of the chosen parts only, and a load that works
-# like gravity without moving the model exceeds it by orders of magnitude.
+# Factor on that mass, which is a bound already: a table may contain the kinetic energy of the chosen parts only, and a
+# load that works like gravity without moving the model exceeds it by orders of magnitude.
 _MASS_ERROR: Final = 2.0
-# What deviates by less than the tolerance of this share of the range of the internal energy shows no work.
+# A deviation below the tolerance of this share of the internal energy's range shows no work.
 _OF_INTERNAL: Final = 0.1
-# Of a sum of energies less the work of gravity so many times the relative error of a printed number is open: energies,
-# momenta and the mass that was found from both are rounded, the mass at the state at which that shows most.
+# Error of a sum of energies less the work of gravity, in relative errors of a printed number: energies, momenta and the
+# mass found from both are rounded, the mass at the state where this matters most.
 _OF_DIGITS: Final = 4
-# Momentum changes by half the share of the kinetic energy that is gained or lost along the motion.  A loss of this much
-# of it is told from that by friction.
+# Loss of kinetic energy that counts as none, and loss that separates damping from friction; the momentum changes by
+# half the share of the kinetic energy.
 _LITTLE, _MUCH = 5e-3, 0.5
 
 
 def work_beyond_gravity(balance: Balance, start: float, end: float) -> float | None:
-    """Largest external work in a window that neither gravity nor damping explains [energy].
+    """Return the largest external work in a window that neither gravity nor damping explains [energy].
 
-    Both factors have a sign: gravity acts along the mean change of the momentum, and damping takes energy.  Where
-    no velocity is written, the work of gravity is an upward parabola of time.  What printed digits and a solver's own
-    sums leave open is not counted.  None where the work is not written, or the window holds too few states.
+    Both factors have a sign: gravity acts along the mean change of the momentum, and damping takes energy.  If no
+    velocity is written, the work of gravity is an upward parabola of time.  Errors of digits and of the solver's sums
+    are subtracted.  None if the work is not written, or the window has too few states.
     """
     inside = window(balance.time, start, end)
     if balance.external_work is None or balance.time[inside].size < FEWEST_STATES:
@@ -74,7 +73,7 @@ def work_beyond_gravity(balance: Balance, start: float, end: float) -> float | N
 
 
 def _most_gravity(velocity: Samples, kinetic: Samples) -> float:
-    """Largest factor of the integral of F v: the motion as a whole has no more than all of the kinetic energy."""
+    """Return the largest factor of the integral of F v: the whole motion has at most all the kinetic energy."""
     squares = np.sum(velocity**2, axis=1)
     fast = squares > _SLOW * squares.max(initial=0.0)
     return (
@@ -87,7 +86,10 @@ def _most_gravity(velocity: Samples, kinetic: Samples) -> float:
 def _rest(
     values: Samples, free: Sequence[Samples], one_sided: Sequence[Samples], most: float
 ) -> Samples:
-    """What least squares leave of ``values``; columns of ``one_sided`` are only added, the first ``most`` times."""
+    """Return the residual of a least-squares fit to ``values`` (n,).
+
+    Columns of ``one_sided`` have factors >= 0, the first one at most ``most``.
+    """
     first, *others = one_sided
     for gravity in ([first], []):
         used = [
@@ -105,7 +107,7 @@ def _rest(
 def _least_squares(
     values: Samples, free: Sequence[Samples], used: Sequence[Samples]
 ) -> tuple[Samples, Samples]:
-    """What is left of ``values``, and the factors of the columns ``used``, none of them negative."""
+    """Return the residual of a fit to ``values``, and the factors of the columns ``used``, none of them negative."""
     kept = list(range(len(used)))
     while True:
         table = np.stack([*free, *(used[i] for i in kept)], axis=1)
@@ -118,14 +120,14 @@ def _least_squares(
 
 
 def can_tell(balance: Balance) -> bool:
-    """Whether work or energy is written that free flight would hold to a law."""
+    """Return True if work or energy is written that obeys a law in free flight."""
     return balance.time.size >= FEWEST and bool(_terms(balance))
 
 
 def change_of_balance(balance: Balance, start: float, end: float) -> float | None:
-    """Largest change of kinetic and internal energy in a window that neither gravity nor damping explains [energy].
+    """Return the largest change of kinetic plus internal energy that gravity and damping leave open [energy].
 
-    What printed digits leave open is not counted.  None where one of them is not written.
+    Errors of digits are subtracted.  None if one of the energies is not written.
     """
     whole = balance.kinetic_and_internal
     if whole is None:
@@ -143,11 +145,11 @@ def change_of_balance(balance: Balance, start: float, end: float) -> float | Non
 
 
 def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
-    """Find the window around ``td`` [time] in which energy changes by gravity and damping only, or None.
+    """Find the window around ``td`` [time] in which energy changes only by gravity and damping, or None.
 
-    Held to it are the external work, and kinetic and internal energy together.  Where the momentum of the model is
-    written, it shows what they can show, and more: a model whose momentum is never that of free flight may be driven
-    so smoothly that its energy looks like it.
+    The external work and kinetic plus internal energy must obey this.  If the momentum of the model is written it shows
+    all of that and more: a model whose momentum is never that of free flight may be driven so smoothly that its energy
+    looks like it.
     """
     time, terms = balance.time, _terms(balance)
     if (
@@ -165,7 +167,7 @@ def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
     noise = balance.precision.noise(np.stack(terms))
     if noise > _OWN_ERROR * extent:
         return None
-    # without and with a rate, which takes up what tells a load from free flight, too
+    # the second law also allows a rate, which would hide a load, so the first one is tried first
     exact, ringing = balance.known.once(
         "work",
         lambda: [
@@ -190,13 +192,12 @@ def balanced_around(balance: Balance, td: float) -> FreeFlight | None:
 def lowered_by_damping(
     balance: Balance, flight: FreeFlight, momenta: Momenta | None
 ) -> tuple[list[Samples], float]:
-    """Give energies (n,) of a balance that damping lowers in a flight, and what their digits leave open [energy].
+    """Return energies (n,) of a balance that damping lowers in a flight, and the error of their digits [energy].
 
-    The first is the sum of kinetic and internal energy; none is given where a load of unknown size works on it, too.
+    The first is kinetic plus internal energy; the list is empty if a load of unknown size works on the model as well.
 
-    Under gravity that sum grows as the body falls, so that it hides what damping takes: what is left of it without the
-    work of gravity, and the damping energy where it is written, show that.  ``momenta`` are those that show the flight,
-    and their gravity.
+    Under gravity that sum grows as the body falls, which hides what damping takes.  The sum less the work of gravity,
+    and the damping energy if it is written, show it.  ``momenta`` are those that show the flight and its gravity.
     """
     whole = balance.kinetic_and_internal
     assert whole is not None
@@ -215,9 +216,9 @@ def lowered_by_damping(
 
 
 def _work_of_gravity(balance: Balance, flight: FreeFlight, momenta: Momenta) -> Samples:
-    """Work of gravity since the first state (n,), by the momentum of the model that it changes [energy].
+    """Return the work of gravity since the first state (n,), from the momentum of the model that it changes [energy].
 
-    Of a velocity the mass is the largest that moves so at the kinetic energy that is written.
+    For a velocity, the mass is the largest one that the written kinetic energy allows.
     """
     from d2rpick.flight.free_fall import FreeFall
 
@@ -240,13 +241,12 @@ def taken_by_damping(
     vibration: Callable[[Samples], Samples],
     alpha: float | None,
 ) -> bool | None:
-    r"""Whether kinetic and internal energy together change between two times [time] as a vibration is damped.
+    r"""Return True if kinetic plus internal energy changes between two times [time] as a damped vibration does.
 
-    Damping within the body takes energy of the vibration alone, whose energy V(t) ``vibration`` gives:
-    :math:`K + E - V` is constant.  Damping proportional to mass takes the motion of the body as well, at the rate
-    ``alpha`` of its vibration [1/time]: :math:`K + E + 2 \alpha \int K dt` is constant.  Nothing is fitted, so that
-    no load is taken for either (docs/explanation/flights.md, "Energies that look like
-    flight").  None where an energy is missing.
+    Damping within the body takes energy only from the vibration, whose energy V(t) is ``vibration``: :math:`K + E - V`
+    is constant.  Damping proportional to mass also takes it from the motion of the body, at the rate ``alpha`` of its
+    vibration [1/time]: :math:`K + E + 2 \alpha \int K dt` is constant.  Nothing is fitted, so that no load can pass for
+    either ("Energies that look like flight" in docs).  None if an energy is missing.
     """
     inside = window(balance.time, start, end)
     whole, kinetic, time = (
@@ -266,11 +266,11 @@ def taken_by_damping(
 
 
 def _unexplained(balance: Balance, first: int, last: int) -> float:
-    """What stands for gravity in a window: 0 where energies change by nothing or damping alone, else of unknown size.
+    """Return the value for gravity in a window: 0 if energies change by nothing or damping alone, else unknown.
 
-    NaN where they are lost, by gravity, friction or damping: what damping takes falls off with the kinetic energy,
-    which shows when much of it is gone.  Infinity where they grow, or lose more than a vibration has and rather as a
-    constant force takes it than as damping does: by gravity or another load.
+    NaN if energies are lost, by gravity, friction or damping: the loss by damping falls with the kinetic energy, which
+    shows if much of it is gone.  Infinite if they grow, or lose more than the vibration has, and rather as a constant
+    force takes it than as damping does: by gravity or another load.
     """
     whole, kinetic = balance.kinetic_and_internal, balance.kinetic
     if whole is None or kinetic is None:
@@ -300,7 +300,7 @@ def _unexplained(balance: Balance, first: int, last: int) -> float:
 
 
 def _terms(balance: Balance) -> list[Samples]:
-    """Energies that change by gravity and damping only, as far as they are written and change at all."""
+    """Return the written energies that change by gravity and damping only, if they change at all."""
     whole, internal = balance.kinetic_and_internal, balance.internal
     changes = (
         whole is not None
@@ -315,9 +315,9 @@ def _terms(balance: Balance) -> list[Samples]:
 
 
 class _Parabola(Law):
-    """Energies that are parabolas of time but for damping, which takes a share of the kinetic energy.
+    """Energies that are parabolas of time except for damping, which takes a share of the kinetic energy.
 
-    Solvers know velocities half a step away from places: that adds the rate of the ``internal`` energy, where given.
+    Solvers know velocities half a step away from places, which adds the rate of the ``internal`` energy, if given.
     """
 
     def __init__(
@@ -347,18 +347,18 @@ class _Parabola(Law):
         table = np.stack([np.ones_like(elapsed), elapsed, elapsed**2, *others], axis=1)
         scale = 2.0 ** (
             np.frexp(np.abs(self.energies[states]).max())[1] - 1
-        )  # exact; squares of 1e200 would overflow
+        )  # a power of 2 scales exactly; squares of 1e200 would overflow
         energies = self.energies[states] / scale
         factors, *_ = np.linalg.lstsq(table, energies, rcond=None)
         return float(np.abs(energies - table @ factors).max()) * float(scale)
 
 
-# A contact energy that never exceeds its printed digits by this factor shows no contact at all.
+# A contact energy within this many times its printed digits shows no contact at all.
 _VISIBLE = 100
 
 
 def shows_contacts(balance: Balance) -> bool:
-    """Whether the model has contacts that were ever closed, as far as the contact energy tells."""
+    """Return True if the contact energy shows that contacts of the model were ever closed."""
     energy = balance.sliding
     if energy is None or energy.size < FEWEST:
         return False
@@ -368,8 +368,8 @@ def shows_contacts(balance: Balance) -> bool:
 def plateau_around(balance: Balance, td: float) -> FreeFlight | None:
     """Find the window around ``td`` [time] in which the contact energy is constant, or None.
 
-    Where it has been constant since the first state no contact has ended, and a load of another kind may act: such a
-    window counts only where the external work is written too, which shows that load.
+    If it has been constant since the first state no contact has ended, and another kind of load may act: such a window
+    counts only if the external work, which shows that load, is written too.
     """
     time, energy = balance.time, balance.sliding
     if energy is None or not time[0] <= td <= time[-1]:

@@ -79,6 +79,16 @@ class ContactForce(NamedTuple):
         return bool(self.acts.any()) and not bool(self.acts[1:].all())
 
 
+def find_force(
+    forces: Sequence[ContactForce], kind: str, number: int
+) -> ContactForce | None:
+    """Give the force of the contact, interface or rigid wall (``kind``) of this number; None if it is not written."""
+    head = f"{kind} {number}"
+    return next(
+        (force for force in forces if f"{force.name} ".startswith(f"{head} ")), None
+    )
+
+
 def joined(pieces: Sequence[ContactForce], keep: NDArray[np.bool_]) -> ContactForce:
     """Join what legs of a run tell of one contact; ``keep`` are the states that count, of all legs together.
 

@@ -41,6 +41,8 @@ _FOLLOW: Final = {
     "D2R207": {"D2R205", "D2R206"},
     "D2R206": {"D2R205"},
 }
+# A time after the end of the run lies outside its history, too; by what follows, on the same line.
+_FOLLOW_THERE: Final = {"D2R205": {"D2R101"}}
 RULES: Final[Mapping[str, Rule]] = {
     rule.id: rule for rule in sorted(_ALL, key=lambda rule: rule.id)
 }
@@ -272,10 +274,19 @@ def check_deck(
 
 
 def _without_what_follows(findings: list[Finding]) -> list[Finding]:
-    """Leave out findings that follow from a mistake of units which another finding reports."""
+    """Leave out findings that follow from a mistake of units, or of one time, which another finding reports."""
     causes = {finding.rule for finding in findings} & _FOLLOW.keys()
     follow = set[str]().union(*(_FOLLOW[rule] for rule in causes))
-    return [finding for finding in findings if finding.rule not in follow]
+    places = {(finding.rule, finding.file, finding.line) for finding in findings}
+    return [
+        finding
+        for finding in findings
+        if finding.rule not in follow
+        and not any(
+            (cause, finding.file, finding.line) in places
+            for cause in _FOLLOW_THERE.get(finding.rule, ())
+        )
+    ]
 
 
 def _told(windows: Iterable[Window]) -> Iterator[CheckedWindow]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, TypeVar
@@ -17,6 +18,7 @@ from d2rpick.deck.ls_dyna_parts import (
     read_sections,
 )
 from d2rpick.deck.switching import (
+    BY_SENSOR,
     Event,
     Header,
     SwitchSet,
@@ -31,10 +33,13 @@ if TYPE_CHECKING:
 
     from d2rpick.deck.card import Card, Field, Value
     from d2rpick.deck.radioss_files import Flaw
+    from d2rpick.deck.radioss_rigid import Body
     from d2rpick.deck.radioss_run import Run, RunWindows
+    from d2rpick.deck.radioss_sensors import Course
     from d2rpick.deck.reader import Deck, Unread
     from d2rpick.deck.unswitchable import Unswitchable
     from d2rpick.rules.by_force import Forced
+    from d2rpick.rules.by_sensor import Sensed
     from d2rpick.rules.judgement import HistoryJudge
 
 
@@ -142,7 +147,12 @@ class Case:
     @cached_property
     def windows(self) -> Windows:
         """The switching windows of every part, with those of switches by force that the history shows."""
-        timed = find_windows(self.sets, self.parts)
+        if self.sensed:
+            events = find_windows(self.sets, self.parts).events
+            by_sensor = [each for set_ in self.sensed for each in set_.events(events)]
+            timed = find_windows(self.sets, self.parts, by_sensor)
+        else:
+            timed = find_windows(self.sets, self.parts)
         by_force = [window for one in self.forced for window in one.windows]
         return timed._replace(
             windows=tuple(
@@ -165,6 +175,40 @@ class Case:
                 self.deck, find_windows(self.sets, self.parts).events, self.judge, end
             )
         )
+
+    @cached_property
+    def by_condition(self) -> tuple[Forced, ...]:
+        """Switches by force and by sensor, with their windows."""
+        if not self.sensed:
+            return self.forced
+        from d2rpick.rules.by_force import Forced  # not above: start-up
+
+        windows = self.windows.windows
+        by_sensor = [
+            (set_, tuple(one for one in windows if one.opened.by is set_.by))
+            for set_ in self.sensed
+        ]
+        return (
+            *self.forced,
+            *(
+                Forced(set_.by.card, (set_.by.card,), own, (), "TIMWIN")
+                for set_, own in by_sensor
+                if own
+            ),
+        )
+
+    @cached_property
+    def sensed(self) -> tuple[Sensed, ...]:
+        """Sets with CODE 5, with what their controls do: those of forces in the history, those of time without one."""
+        if not any(header.code.value == BY_SENSOR for _, header in self.headers):
+            return ()
+        from d2rpick.rules.by_sensor import (
+            follow_sensed_switches,  # not above: start-up
+        )
+
+        ends = (self.end, self.judge.end if self.judge else None)
+        end = min((time for time in ends if time is not None), default=math.inf)
+        return tuple(follow_sensed_switches(self.deck, self.headers, self.judge, end))
 
     @cached_property
     def constraints(self) -> Sequence[Constraint]:
@@ -271,7 +315,22 @@ class RunCase(Case):
         """Windows, and the parts of the bodies."""
         from d2rpick.deck.radioss_run import find_run_windows  # not above: start-up
 
-        return find_run_windows(self.run, self.judge.contacts if self.judge else None)
+        if self.judge is None:
+            return find_run_windows(self.run)
+        return find_run_windows(
+            self.run, self.judge.contacts, self.judge.find_force_spans
+        )
+
+    def _find_course(self, body: Body) -> Course:
+        """Give what is known of the course of the run for the sensor of a body."""
+        from d2rpick.deck.radioss_run import find_course  # not above: start-up
+
+        parts = self.found.parts.get(body.node.value, ())
+        if self.judge is None:
+            return find_course(self.run, parts, None)
+        return find_course(
+            self.run, parts, self.judge.contacts, self.judge.find_force_spans
+        )
 
     @cached_property
     def parts(self) -> Parts:
@@ -294,30 +353,25 @@ class RunCase(Case):
     @cached_property
     def forced(self) -> tuple[Forced, ...]:
         """Bodies that a sensor of a force switches, with what it does in the history."""
-        from d2rpick.deck.radioss_run import find_course  # not above: start-up
-        from d2rpick.deck.radioss_sensors import waits_for_force
+        from d2rpick.deck.radioss_sensors import (
+            find_contacts_of_sensor,
+        )  # not above: start-up
         from d2rpick.rules.by_force import Forced
 
         starter, found = self.run.starter, []
         for body in starter.bodies if starter and self.judge else ():
-            parts = self.found.parts.get(body.node.value, set())
-            contacts = find_course(
-                self.run, parts, self.judge.contacts if self.judge else None
-            ).contacts
             own = tuple(
-                one for one in self.windows.windows if one.opened.by.card is body.card
+                window
+                for window in self.windows.windows
+                if window.opened.by.card is body.card
             )
-            if (
-                starter
-                and contacts is not None
-                and own
-                and waits_for_force(starter, body.sensor)
-            ):
-                found.append(
-                    Forced(
-                        body.card, (body.card,), own, contacts, "Tdelay of the sensor"
-                    )
-                )
+            if starter is None or not body.sensor or not own:
+                continue
+            course = self._find_course(body)
+            contacts = find_contacts_of_sensor(starter, body.sensor, course)
+            if contacts is not None:
+                wait = "Tdelay of the sensor"
+                found.append(Forced(body.card, (body.card,), own, contacts, wait))
         return tuple(found)
 
     @cached_property
@@ -334,27 +388,14 @@ class RunCase(Case):
     @property
     def untimed(self) -> tuple[tuple[Field, str], ...]:
         """Bodies that a sensor switches whose time is not known."""
-        from d2rpick.deck.radioss_run import find_course  # not above: start-up
-        from d2rpick.deck.radioss_sensors import active_spans
+        from d2rpick.deck.radioss_sensors import active_spans  # not above: start-up
 
-        starter, legs = (
-            self.run.starter,
-            [leg for leg in self.run.legs[:-1] if leg.sensor],
-        )
+        starter = self.run.starter
+        legs = [leg for leg in self.run.legs[:-1] if leg.sensor]
         sensed = [body for body in starter.bodies if body.sensor] if starter else []
-        contacts = self.judge.contacts if self.judge else None
-        courses = [
-            (
-                body,
-                find_course(
-                    self.run, self.found.parts.get(body.node.value, ()), contacts
-                ),
-            )
-            for body in sensed
-        ]
         spans = [
-            (body, active_spans(starter, body.sensor, course))
-            for body, course in courses
+            (body, active_spans(starter, body.sensor, self._find_course(body)))
+            for body in sensed
             if starter
         ]
         told = [

@@ -1,34 +1,39 @@
 """Switches by the force of a contact or rigid wall, in a run whose history shows when something pushes.
 
-Momenta show that something pushes, not what: a deck with several contacts and walls is not judged.
+Forces that the solver wrote show when each contact and wall pushes.  Momenta show that something pushes, not what: with
+them alone a deck with several contacts and walls is not judged.
 """
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 from d2rpick.deck.force_switching import ForceSwitch, follow_pair
 from d2rpick.deck.ls_dyna_parts import read_entities
 from d2rpick.deck.switching import Event, SwitchSet, Window
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from d2rpick.deck.card import Card
     from d2rpick.deck.reader import Deck
-    from d2rpick.deck.switching import Unit
-    from d2rpick.flight.contact_times import ContactTimes
+    from d2rpick.deck.switching import Header, Unit
     from d2rpick.rules.judgement import HistoryJudge
 
     Spans = tuple[tuple[float, float], ...]  # of time
 
+# What pushes, and whether a set waits for a force or for none, by CODE.
 _CODES: Final = {
-    1: False,
-    2: False,
-    3: True,
-    4: True,
-}  # whether a set waits for a force
+    1: ("rigid wall", False),
+    2: ("contact", False),
+    3: ("rigid wall", True),
+    4: ("contact", True),
+}
+_KEYWORDS: Final[Mapping[str, Literal["CONTACT", "RIGIDWALL"]]] = {
+    "contact": "CONTACT",
+    "rigid wall": "RIGIDWALL",
+}
 _NEVER: Final = 1e20
 # A window of so much of the longest one is none that anybody wants.
 _SHORT: Final = 0.1
@@ -38,7 +43,7 @@ class Forced(NamedTuple):
     """A switch by force, or a pair of them, with its windows in the history, and when something pushes there [time].
 
     ``place`` is the card that makes the parts rigid, ``cards`` are those of the pair; ``wait`` is what to call the time
-    that keeps it from switching.
+    that keeps it from switching, ``source`` says what of the history shows the contacts.
     """
 
     place: Card
@@ -46,6 +51,7 @@ class Forced(NamedTuple):
     windows: tuple[Window, ...]
     contacts: Spans
     wait: str
+    source: str = "momenta"
 
     @property
     def times(self) -> list[tuple[float, float | None]]:
@@ -67,14 +73,20 @@ class Forced(NamedTuple):
         return [(tr, td) for tr, td in closed if td - tr >= _SHORT * longest]
 
 
+class _Seen(NamedTuple):
+    """The contacts that a switch set sees [time], and what of the history shows them."""
+
+    contacts: Spans
+    source: str
+
+
 def follow_forced_switches(
     deck: Deck, events: Sequence[Event], judge: HistoryJudge, end: float
 ) -> Iterator[Forced]:
     """Follow the sets of a deck of LS-DYNA that switch by force; none where the history does not show contacts."""
-    if not _has_one_force(deck):
-        return
     by_card = {
-        event.by: [one for one in events if one.by is event.by] for event in events
+        event.by: [other for other in events if other.by is event.by]
+        for event in events
     }
     waiting = {
         card: made for card in by_card if (made := _read_waiting(card)) is not None
@@ -84,17 +96,87 @@ def follow_forced_switches(
             continue
         back = _find_pair(there, by_card, waiting)
         windows: list[Window] = []
-        contacts: Spans = ()
+        known: _Seen | None = None
         for event in by_card[there]:
-            pushed = (
-                None if event.unit.part is None else judge.pushed([event.unit.part])
+            seen = _see_contacts(deck, there, event.unit, judge)
+            seen_back = _see_contacts(deck, back, event.unit, judge) if back else seen
+            if seen is None or seen_back is None:
+                continue
+            known = seen
+            closing = _find_event(event.unit, by_card[back]) if back else None
+            other = waiting[back] if back and closing else None
+            spans = follow_pair(rigid, other, seen.contacts, end, seen_back.contacts)
+            windows += (
+                Window(event.unit, tr, td, event, closing if td is not None else None)
+                for tr, td in spans
             )
-            if pushed is not None:
-                contacts = _shift_contacts(pushed, back)
-                windows += _follow_windows(event, back, by_card, waiting, contacts, end)
-        if windows:
+        if known:
             cards = (there.card, back.card) if back else (there.card,)
-            yield Forced(there.card, cards, tuple(windows), contacts, "TIME3")
+            yield Forced(
+                there.card, cards, tuple(windows), known.contacts, "TIME3", known.source
+            )
+
+
+def _see_contacts(
+    deck: Deck, card: SwitchSet, unit: Unit, judge: HistoryJudge
+) -> _Seen | None:
+    """Find the contacts that a set sees: by written forces, else by the momenta of a part if only one thing pushes.
+
+    A contact begins earlier for a set with OFFSET, by the time to fly so far.  None where the history does not show it,
+    and for a contact whose force triggers no switch (D2R008).
+    """
+    header = card.header
+    if header is None or not _can_trigger(deck, header):
+        return None
+    pushed = None if unit.part is None else judge.pushed([unit.part])
+    kind, _ = _CODES[header.code.value]
+    by_force = find_spans_of_force(deck, judge, kind, header.entno.value)
+    if by_force is not None:
+        seen = _Seen(by_force, "contact forces")
+    elif pushed is not None and _has_one_force(deck):
+        seen = _Seen(pushed.spans, "momenta")
+    else:
+        return None
+    offset = 0.0 if header.offset.problem else header.offset.value
+    if offset <= 0 or card.switched[0].to_rigid:
+        return seen
+    if pushed is None or not pushed.speed:
+        return None
+    lead = offset / pushed.speed
+    return seen._replace(
+        contacts=tuple((start - lead, end) for start, end in seen.contacts)
+    )
+
+
+def _can_trigger(deck: Deck, header: Header) -> bool:
+    """Whether the contact or rigid wall that ENTNO names may switch parts, as far as the deck has it."""
+    kind, _ = _CODES[header.code.value]
+    entity = read_entities(deck, _KEYWORDS[kind]).named(header.entno.value)
+    return entity is None or kind != "contact" or entity.triggers
+
+
+def find_spans_of_force(
+    deck: Deck, judge: HistoryJudge, kind: str, number: int, least: float = 0.0
+) -> Spans | None:
+    """Find when a contact or rigid wall pushes by more than ``least`` [force], by its written force [time].
+
+    Files call a contact by its id, or by its order if it has none.  Some call rigid walls by their order in any case:
+    of several whose ids are not their order, none is taken.
+    """
+    entities = read_entities(deck, _KEYWORDS[kind])
+    entity = entities.named(number)
+    if entity is None:
+        # cards alone have none to name: their deck is not at hand
+        alone = not entities.found and number > 0
+        return judge.find_force_spans(kind, number, least) if alone else None
+    name, is_order = entity.id or entity.number, kind == "rigid wall"
+    if is_order and any(each.id not in (0, each.number) for each in entities.found):
+        if len(entities.found) > 1:
+            return None
+        by_order = judge.find_force_spans(kind, entity.number, least)
+        if by_order is not None:
+            return by_order
+    return judge.find_force_spans(kind, name, least)
 
 
 def _has_one_force(deck: Deck) -> bool:
@@ -125,23 +207,12 @@ def _read_waiting(card: SwitchSet) -> ForceSwitch | None:
     latest = header.time2.value * factor
     return ForceSwitch(
         card.switched[0].to_rigid,
-        _CODES[header.code.value],
+        _CODES[header.code.value][1],
         header.time1.value * factor,
         latest if 0 < latest < _NEVER else math.inf,
         header.time3.value * factor,
         bool(header.paired.value),
     )
-
-
-def _shift_contacts(pushed: ContactTimes, back: SwitchSet | None) -> Spans:
-    """Give the contacts as the set sees them that makes parts deformable: earlier by the time to fly its OFFSET."""
-    offset = (
-        back.header.offset.value
-        if back and back.header and not back.header.offset.problem
-        else 0.0
-    )
-    lead = offset / pushed.speed if pushed.speed and offset > 0 else 0.0
-    return tuple((start - lead, end) for start, end in pushed.spans)
 
 
 def _find_pair(
@@ -155,22 +226,6 @@ def _find_pair(
         if not switch.to_rigid and units & {event.unit for event in by_card[card]}:
             return card
     return None
-
-
-def _follow_windows(
-    event: Event,
-    back: SwitchSet | None,
-    by_card: dict[SwitchSet, list[Event]],
-    waiting: dict[SwitchSet, ForceSwitch],
-    contacts: Spans,
-    end: float,
-) -> Iterator[Window]:
-    """Give the windows of a unit that an event makes rigid."""
-    rigid = waiting[event.by]
-    closing = _find_event(event.unit, by_card[back]) if back else None
-    other = waiting[back] if back and closing else None
-    for tr, td in follow_pair(rigid, other, contacts, end):
-        yield Window(event.unit, tr, td, event, closing if td is not None else None)
 
 
 def _find_event(unit: Unit, events: Sequence[Event]) -> Event | None:

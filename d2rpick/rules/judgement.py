@@ -16,7 +16,13 @@ from d2rpick.choice.question import Reference, Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.warnings import POOR_KINETIC_SHARE, end_of_flight, end_of_load
 from d2rpick.deck import read_inventory
-from d2rpick.flight.contact_times import ContactTimes, find_contact_times
+from d2rpick.flight.contact_times import (
+    ContactTimes,
+    find_contact_times,
+    find_force_times,
+    narrow_to_states,
+)
+from d2rpick.histories.contact_forces import find_force
 from d2rpick.histories.digits import above, first_as_read, in_the_record
 from d2rpick.histories.surroundings import UNKNOWN
 
@@ -119,10 +125,13 @@ class HistoryJudge:
             self._references[parts] = Reference.of(self.run, chosen)
         return self._references[parts]
 
-    def faults(self, window: Window, together: Iterable[int]) -> tuple[Fault, ...]:
+    def faults(
+        self, window: Window, together: Iterable[int], *, by_force: bool = False
+    ) -> tuple[Fault, ...]:
         """Everything that speaks against a window; of one that is not closed, or inverted, tr alone is judged.
 
-        ``together`` are the parts that are switched at the same times.
+        ``together`` are the parts that are switched at the same times.  One that a force switches (``by_force``) is
+        judged between states of the history.
         """
         td = window.td if window.td is not None and window.td > window.tr else None
         known = self._known
@@ -134,14 +143,17 @@ class HistoryJudge:
             if window.part is None
             else tuple(part for part in known if part in {*together})
         )
-        key = parts, window.tr, td
+        tr = window.tr
+        if by_force:
+            tr, td = narrow_to_states(self._reference(parts).history.time, tr, td)
+        key = parts, tr, td
         if key not in self._faults:
             if known and not parts:
                 which = "members" if window.unit.is_set else "parts"
                 who = f"the {which} of {window.unit.kind} {window.unit.id}"
                 what = f"{who} are not known, so it is judged by the whole model"
                 self._cautions[Caution("judged-by-whole", what)] = []
-            self._faults[key] = tuple(self._judged(parts, window.tr, td))
+            self._faults[key] = tuple(self._judged(parts, tr, td))
         return self._faults[key]
 
     def deforming(self, parts: Collection[int]) -> tuple[int, ...] | None:
@@ -174,6 +186,17 @@ class HistoryJudge:
             else None
         )
         return find_contact_times(momenta) if momenta else None
+
+    def find_force_spans(
+        self, kind: str, number: int, least: float = 0.0
+    ) -> tuple[tuple[float, float], ...] | None:
+        """Find when the force of a contact, interface or rigid wall acts [time]; None if the history has it not.
+
+        ``least``: only a force above it counts [force].
+        """
+        force = find_force(self.run.contact_forces, kind, number)
+        found = find_force_times(force, least) if force else None
+        return found and found.spans
 
     @property
     def _known(self) -> tuple[int, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from d2rpick.base.errors import listing
 from d2rpick.base.files import STDIN
 from d2rpick.deck.card import Field, Problem
 from d2rpick.deck.ls_dyna_parts import element_cards
@@ -30,7 +31,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from d2rpick.deck.card import Card
+    from d2rpick.rules.by_sensor import Sensed
 
+_MOST_LISTED: Final = 8
 _CURES: Final = {
     "no such file": "add the file or its *INCLUDE_PATH",
     UNKNOWN_KIND: "check that file separately",
@@ -292,8 +295,10 @@ def _disabled(case: Case) -> Iterator[Objection]:
 def _untimed(case: Case) -> Iterator[Objection]:
     """CODE 1 to 4 switch by a contact or wall force, CODE 5 by a sensor, restart cards when the restart begins, plain
     cards at the start, a Radioss body by a sensor other than /SENSOR/TIME: no time on the card can be compared with an
-    energy history. If a history has the momenta of the parts, and the deck has one contact or wall, the times at which
-    a force switches are found from them and judged. Restarts that are checked together with their main deck have
+    energy history. If a history has the force of the contact or wall (or the momenta of the parts, if the deck has one
+    contact or wall), the times at which it switches are found from it and judged. A *SENSOR_CONTROL is followed through
+    *SENSOR_SWITCH of the time, or of the magnitude of such a force; that its set is made while it is on and undone
+    while it is off was not tried with the solver. Restarts that are checked together with their main deck have
     times: each begins at the ENDTIM of the run before it.
     """
     for place, how in case.untimed:
@@ -301,9 +306,13 @@ def _untimed(case: Case) -> Iterator[Objection]:
     for card in case.sets:
         reason = _reason(card) if case.solver == LS_DYNA else ""
         forced = next((one for one in case.forced if card.card in one.cards), None)
+        sensed = next((one for one in case.sensed if one.by is card), None)
         if reason and forced:
-            times = f"by the momenta of the history {forced.switches} times, first at {forced.times[0][0]:.6g}"
-            yield card.card.here, f"*{card.card.name} {reason}: {times}"
+            first = f", first at {forced.times[0][0]:.6g}" if forced.times else ""
+            times = f"by the {forced.source} of the history {forced.switches} times"
+            yield card.card.here, f"*{card.card.name} {reason}: {times}{first}"
+        elif reason and sensed:
+            yield card.card.here, f"*{card.card.name} {reason}{_course_of(sensed)}"
         elif reason:
             yield card.card.here, f"*{card.card.name} {reason}; not judged by time"
 
@@ -376,6 +385,18 @@ def _without_parts(case: Case) -> Iterator[Objection]:
     ):
         told = "the parts are unknown: no *PART came with the cards, so their ids were not checked"
         yield case.sets[0].card.here, told
+
+
+def _course_of(sensed: Sensed) -> str:
+    """Say when a control is on, or why that is not known."""
+    if sensed.unknown:
+        return f", by {sensed.unknown}; not judged by time"
+    changes = sensed.changes
+    listed = listing(
+        [f"{'on' if change.on else 'off'} at {change.time:.6g}" for change in changes],
+        most=_MOST_LISTED,
+    )
+    return f": {listed}; its parts are taken to be switched while it is on, and back while it is off"
 
 
 def _reason(card: SwitchSet) -> str:

@@ -312,8 +312,8 @@ def _sensed(control: str) -> Example:
 @rule("D2R012", ERROR, "CODE 5 without a *SENSOR_CONTROL that switches the set")
 def _uncontrolled(case: Case) -> Iterator[Objection]:
     """A set with CODE 5 is switched by a *SENSOR_CONTROL with TYPE DEF2RIG whose TYPEID is its SWSET. Without one it
-    never switches. Judged only when all of the deck could be read and it has parts. When the sensor switches is not
-    followed (D2R302). Source: vendor keyword data.
+    never switches. Judged only when all of the deck could be read and it has parts. D2R302 says when the sensor
+    switches. Source: vendor keyword data.
     """
     if not case.whole:
         return
@@ -401,15 +401,18 @@ def _landed(wait: str) -> Example:
 @fails(_landed("0.0"))
 @rule("D2R208", WARNING, "a switch by force that chatters in the history", BOTH)
 def _chatters(case: Case) -> Iterator[Objection]:
-    """A force comes and goes many times in one impact. If the history has the momenta of the parts, and the deck has
-    one contact or wall, the switches are followed through it: windows below a tenth of the longest are no flight. A
-    TIME3 of the set that makes the parts deformable (Radioss: Tdelay of the sensor) that lasts longer than the contact
-    keeps them out. A force that comes and goes within one interval of the history is not seen.
+    """A force comes and goes many times in one impact. If the history has the force of the contact or wall, or if it
+    has the momenta of the parts and the deck has one contact or wall, d2rpick follows the switches: windows below a
+    tenth of the longest are no flight. A TIME3 of the set that makes the parts deformable (Radioss: Tdelay of the
+    sensor) that lasts longer than the contact keeps them out. A force that comes and goes within one interval of the
+    history is not seen.
     """
-    for one in case.forced:
+    for one in case.by_condition:
         short = len(one.times) - len(one.lasting)
         if short:
-            wait = find_delay_without_chatter(one.lasting, one.contacts)
+            wait = one.contacts and find_delay_without_chatter(
+                one.lasting, one.contacts
+            )
             cure = (
                 f"; {wait:.3g} or more as {one.wait} leaves {len(one.lasting)}"
                 if wait

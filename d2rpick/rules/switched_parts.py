@@ -1,10 +1,10 @@
-"""D2R103, D2R104, D2R106-108, D2R112, D2R113, D2R116-119: the parts that are switched, and what holds on to them."""
+"""D2R103, D2R104, D2R106-108, D2R112, D2R113, D2R116-120: the parts that are switched, and what holds on to them."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
-from d2rpick.base.errors import name_units
+from d2rpick.base.errors import are, name_units
 from d2rpick.base.graph import reached
 from d2rpick.deck.ls_dyna_parts import Parts, element_cards
 from d2rpick.rules.base import BOTH, ERROR, INFO, WARNING, Case, Objection, grouped
@@ -21,10 +21,10 @@ from d2rpick.rules.rule import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator
+    from collections.abc import Collection, Iterable, Iterator, Mapping
 
     from d2rpick.deck.card import Field
-    from d2rpick.deck.switching import Event, Header, Switched, SwitchSet, Unit
+    from d2rpick.deck.switching import Event, Switched, SwitchSet, Unit
 
 _NEAREST = 3  # ids that are named in place of one that the deck does not have
 
@@ -147,15 +147,16 @@ def _never_back(case: Case) -> Iterator[Objection]:
     """
     if _unknown_members(case, to_rigid=False):
         return
-    opened = [
-        window.opened
+    opened = {
+        window.opened: window.tr
         for window in case.windows.windows
         if window.closed is None and window.unit not in case.windows.other_deformable
-    ]
-    for card, place, named in _by_card(opened):
+    }
+    for card, place, named in _by_card([*opened]):
+        times = [tr for event, tr in opened.items() if event.by is card]
         yield (
             place,
-            f"{named} made rigid at {card.time:g} and never switched back in this deck",
+            f"{named} made rigid at {min(times):g} and never switched back in this deck",
         )
 
 
@@ -267,16 +268,7 @@ def _torn(case: Case) -> Iterator[Objection]:
     first = {event.unit.id: event for event in reversed(case.made_rigid)}
     if len(first) < 2:
         return
-    leads = {
-        part: event.line.lead.value for part, event in first.items() if event.line.lead
-    }
-    # each with the lead at the end of the LRB chain; a part that merges into nobody leads itself
-    bodies = {
-        part: reached([part], lambda one: [lead] if (lead := leads.get(one)) else [])[
-            -1
-        ]
-        for part in first
-    }
+    bodies = _find_bodies(first)
     cards = element_cards(case.deck, searched=True)
     if len(set(bodies.values())) < 2 or not cards:
         return
@@ -292,6 +284,22 @@ def _torn(case: Case) -> Iterator[Objection]:
             )
             found = f"{one} and {other} share node {node} but become separate rigid bodies that both own it"
             yield place, f"{found}; merge them: LRB {low} on the line of {other}"
+
+
+def _find_bodies(first: Mapping[int, Event]) -> dict[int, int]:
+    """Give the lead of the rigid body of each part by the event that makes it rigid: the end of its LRB chain.
+
+    A part that merges into nobody leads itself.
+    """
+    leads = {
+        part: event.line.lead.value for part, event in first.items() if event.line.lead
+    }
+    return {
+        part: reached([part], lambda one: [lead] if (lead := leads.get(one)) else [])[
+            -1
+        ]
+        for part in first
+    }
 
 
 def _together(case: Case, one: Unit, other: Unit) -> bool:
@@ -327,8 +335,8 @@ def _held(case: Case, *, nodal: bool) -> Iterator[Objection]:
         name = (
             f"{constraint.kind} {constraint.id}" if constraint.id else constraint.kind
         )
-        flag = f"{'NRBF' if nodal else 'NRBF and NCSF'} {switched[part].nrbf.value}"
-        found_at = f"{name} on part {part}, which is made rigid at {switched[part].nrbf.field.at} with {flag}"
+        flag = f"{'NRBF' if nodal else 'NRBF and NCSF'} {switched[part].nrbf}"
+        found_at = f"{name} on part {part}, which is made rigid at {switched[part].place.at} with {flag}"
         way_out = (
             "it stays active; delete it there (1) and activate it on the way back (2)"
         )
@@ -345,17 +353,40 @@ def _owners(case: Case, parts: Collection[int]) -> dict[int, int]:
     return first_parts(cards, parts)
 
 
-def _left_active(case: Case, *, nodal: bool) -> dict[int, Header]:
-    """Parts made rigid by cards that delete nothing, with the first such card."""
-    found: dict[int, Header] = {}
+class _Flags(NamedTuple):
+    """NRBF and NCSF with which a card makes parts rigid, and where they stand."""
+
+    nrbf: int
+    ncsf: int
+    place: Field
+
+
+def _find_flags(case: Case, card: SwitchSet) -> _Flags | None:
+    """Give the flags of a card; those of a restart are on its *RIGID_DEFORMABLE_CONTROL.  A plain card has none."""
+    if card.header:
+        nrbf, ncsf = card.header.nrbf, card.header.ncsf
+        return _Flags(nrbf.value, ncsf.value, nrbf.field)
+    if card.kind != "restart":
+        return None
+    controls = (
+        other
+        for other in case.sets
+        if other.card.file == card.card.file and other.card.name.endswith("_CONTROL")
+    )
+    values = next((control.values for control in controls if control.values), None)
+    if values is None:
+        return _Flags(0, 0, card.card.here)
+    nrbf_value, ncsf_value = values[0].value, values[1].value
+    return _Flags(int(nrbf_value), int(ncsf_value), values[0].field)
+
+
+def _left_active(case: Case, *, nodal: bool) -> dict[int, _Flags]:
+    """Parts made rigid by cards that delete nothing, with the flags of the first such card."""
+    found: dict[int, _Flags] = {}
     for event in case.made_rigid:
-        header = event.by.header
-        if (
-            header
-            and header.nrbf.value != _DELETED
-            and (nodal or header.ncsf.value != _DELETED)
-        ):
-            found.setdefault(event.unit.id, header)
+        flags = _find_flags(case, event.by)
+        if flags and flags.nrbf != _DELETED and (nodal or flags.ncsf != _DELETED):
+            found.setdefault(event.unit.id, flags)
     return found
 
 
@@ -457,6 +488,67 @@ def _d2r112(case: Case) -> Iterator[Objection]:
     tool reports). Source: vendor keyword data for NRBF, which says that such bodies cause instabilities.
     """
     return _held(case, nodal=True)
+
+
+_TWO: Final = _MESH + "       2       2       5       6       7       8\n"
+_JOINING: Final = (
+    "*SET_NODE_LIST\n         5\n         3         6        99\n" + _NODAL
+)
+
+
+def _joined(*lines: str) -> Example:
+    """Join two parts by a nodal rigid body that the card deletes; node 99 is of no element."""
+    there = automatic(1, "0.02", rigid=lines)
+    back = automatic(2, "0.09", deformable=["1", "2"][: len(lines)])
+    there, back = (
+        text.replace(_COUNTS[:40], f"{flag:10d}{_COUNTS[10:40]}", 1)
+        for text, flag in ((there, 1), (back, 2))
+    )
+    return deck(_TWO + _JOINING + there + back)
+
+
+@passes(PASS, _joined("1", "         2         1      PART"))
+@fails(_joined("1", "2"), _joined("1"))
+@rule("D2R120", ERROR, "a deleted nodal rigid body (NRBF 1) that joins separate bodies")
+def _come_apart(case: Case) -> Iterator[Objection]:
+    """While NRBF 1 deletes a nodal rigid body, only the rigid body of its parts holds them together. Parts that it
+    joined come apart if they become several rigid bodies, or if one of them is not switched. Merge them, or switch all
+    of them. Source: vendor keyword data for NRBF and LRB.
+    """
+    deleting = [
+        event
+        for event in case.made_rigid
+        if (flags := _find_flags(case, event.by)) and flags.nrbf == _DELETED
+    ]
+    joining = [
+        constraint
+        for constraint in (case.constraints if deleting else ())
+        if constraint.kind == "nodal rigid body"
+    ]
+    cards = element_cards(case.deck, searched=True) if joining else ()
+    if not cards:
+        return
+    from d2rpick.deck.ls_dyna_inventory import find_parts_of_nodes  # loads numpy
+
+    bodies = _find_bodies({event.unit.id: event for event in reversed(deleting)})
+    every = frozenset[int]().union(*(constraint.nodes for constraint in joining))
+    owners = find_parts_of_nodes(cards, every)
+    for constraint in joining:
+        parts = set[int]().union(*(owners.get(node, ()) for node in constraint.nodes))
+        switched = parts & bodies.keys()
+        if not switched or len({bodies.get(part) for part in parts}) == 1:
+            continue
+        found = f"nodal rigid body {constraint.id} joins {name_units(parts)} and is deleted (NRBF 1)"
+        if others := parts - switched:
+            yield (
+                constraint.place,
+                f"{found}, but {name_units(others)} {are(others)} not made rigid with the others; switch all of them",
+            )
+        else:
+            yield (
+                constraint.place,
+                f"{found}, but they become separate rigid bodies; merge them by LRB",
+            )
 
 
 @passes(

@@ -293,10 +293,13 @@ def _faults(case: Case, rule_id: str) -> Iterator[Objection]:
     together = grouped(
         ((one.tr, one.td), one.part) for one in windows if one.part is not None
     )
+    by_force = {window for each in case.by_condition for window in each.windows}
     found = grouped(
         ((event.by, one.unit.kind, fault.message), one.unit.id)
         for one in windows
-        for fault in case.judge.faults(one, together.get((one.tr, one.td), ()))
+        for fault in case.judge.faults(
+            one, together.get((one.tr, one.td), ()), by_force=one in by_force
+        )
         if (event := one.closed if fault.at_td else one.opened)
         and fault.rule == rule_id
     )

@@ -1,4 +1,4 @@
-"""What a first run needs to switch itself, looked at before anything is computed."""
+"""Check before anything is computed that a first run can switch itself."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ NO_CONTACT: Final = "no contact and no rigid wall, so nothing would end a flight
 
 
 def refuse_held(path: str, inventory: Inventory, parts: Collection[int]) -> None:
-    """Raise DeckError where a support holds the parts: its force is none of a contact."""
+    """Raise DeckError if a support holds one of the parts, since its force is not that of a contact."""
     if unknown := sorted(set(parts) - inventory.nodes_by_part.keys()):
         raise DeckError(
             f"{path}: {name_units(unknown)}: no elements in the deck; name others"
@@ -37,17 +37,11 @@ def refuse_held(path: str, inventory: Inventory, parts: Collection[int]) -> None
 
 
 def contacts_of(starter: Starter) -> Iterator[tuple[str, int]]:
-    """Kind of sensor and id of each contact and rigid wall."""
+    """Give kind of sensor and id of each contact and rigid wall."""
     for card in starter.named("INTER"):
         if card.words[1:] and card.words[1] not in WITHOUT_FORCE:
-            yield (
-                "INTER",
-                next(
-                    number
-                    for at in (2, 3)
-                    if (number := number_of(card, at)) or at == 3
-                ),
-            )
+            # /INTER/TYPE7/id or /INTER/LAGMUL/TYPE7/id
+            yield "INTER", number_of(card, 2) or number_of(card, 3)
     for card in starter.named("RWALL"):
         yield "RWALL", number_of(card, -1)
 
@@ -59,28 +53,25 @@ def check_driven(
     limits: Limits,
     wait: float | None,
 ) -> None:
-    """Look whether a Radioss run can be driven.
+    """Check that a Radioss run can be driven.
 
     Raises
     ------
     DeckError
-        If a support holds the parts, nothing is there to end a flight, or the history has not all parts.
+        If a support holds the parts, nothing can end a flight, or the history lacks momenta of parts.
     RangeError
-        If no flight can last for the ``wait``, or keep the margin of the ``limits``, in the run.
+        If no flight of the run can last for the ``wait`` or keep the margin of the ``limits``.
     """
     refuse_held(path, inventory, parts)
     starter = read_run(path).starter
     if starter is None or not any(contacts_of(starter)):
         raise DeckError(f"{path}: {NO_CONTACT}")
-    _check_history(
-        path,
-        starter,
-        {part for part in parts if not {*inventory.counts[part]} <= DISCRETE},
-    )
-    least = FEWEST * limits.interval
-    if wait is not None and not least <= wait < limits.end / 2:
+    not_springs = {part for part in parts if not {*inventory.counts[part]} <= DISCRETE}
+    _check_history(path, starter, not_springs)
+    shortest = FEWEST * limits.interval
+    if wait is not None and not shortest <= wait < limits.end / 2:
         raise RangeError(
-            f"{path}: `wait` {wait:g}: a time from {least:g}, {FEWEST} states of the history, to {limits.end / 2:g},"
+            f"{path}: `wait` {wait:g}: a time from {shortest:g}, {FEWEST} states of the history, to {limits.end / 2:g},"
             " half of the run, was expected"
         )
     if limits.margin is not None and not limits.margin < limits.end / 2:
@@ -90,7 +81,7 @@ def check_driven(
 
 
 def _check_history(path: str, starter: Starter, parts: Collection[int]) -> None:
-    """Raise DeckError where the time history has not the energies and momenta of all ``parts``."""
+    """Raise DeckError if the time history lacks the momenta of some ``parts``."""
     cards = [card for card in starter.named("TH") if card.words[1:2] == ("PART",)]
     written: set[int] = set()
     for card in cards:

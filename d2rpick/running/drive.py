@@ -1,4 +1,4 @@
-"""Drive a Radioss run that switches itself: compute a leg, look at what it shows, say which comes next."""
+"""Drive a Radioss run that switches itself: compute a leg, read its history, choose the next leg."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from d2rpick.running.inner_motion import InnerMotion, Wait
 from d2rpick.running.looks import Looks
 from d2rpick.running.sequence import (
     LOAD,
+    Findings,
     Leg,
     Order,
-    Seen,
-    next_order,
-    together,
-    window_of,
+    choose_next_leg,
+    collect_joined_legs,
+    find_window,
 )
-from d2rpick.running.swing import swing_in
+from d2rpick.running.swing import find_swing
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -37,21 +37,29 @@ if TYPE_CHECKING:
     from d2rpick.running.sequence import Limits, Window
 
 JOURNAL: Final = "drive.ndjson"
-# Largest step while rigid over the mean one before: a rigid leg costs a few percent of a deformable one then, and the
-# state of a run is written often enough to show a contact.
+# Largest step of a rigid leg over the mean step of the deformable legs.  A rigid leg then costs a few percent of a
+# deformable one, and its history still has enough states to show a contact.
 _STEP_RATIO: Final = 5.0
-# A flight that did not last for the wait is told where it did for this share of it.
-_TOLD: Final = 0.5
-# Between two looks whether the solver is still at work, and from when on silence is told [s].
+# A flight that was shorter than the wait is reported if it lasted for this share of the wait.
+_REPORTED: Final = 0.5
+# Pause between two checks whether the solver is running, and how long it may be silent before this is reported [s].
 _PAUSE, _SILENT = 0.05, 60.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Driven:
-    """What has come of a run so far.
+    """State of a driven run.
 
-    ``windows`` are those of all flights, ``legs`` what was computed, ``why`` the reason of the wait.  ``saved``: what
-    share of a deformable run is saved, by the cost model and by the processor time of this run; None where unknown.
+    Attributes
+    ----------
+    windows : tuple of Window
+        All flights, switched or left out.
+    legs : tuple of Leg
+        All computed legs.
+    why : str
+        Reason of the wait.
+    saved : (float or None, float or None)
+        Share of a deformable run that is saved, by the cost model and by processor time; None if unknown.
     """
 
     run: Run
@@ -65,9 +73,9 @@ class Driven:
 
 @dataclass
 class Driver:
-    """One run in its folder, as far as its journal says.
+    """Computes one run in its folder, from where its journal ends.
 
-    ``told`` gets each thing that happens, in a line; ``at`` is the leg that is computed and when it began [s].
+    ``told`` is called with each event, in one line.  ``at`` is the leg that is being computed.
     """
 
     deck: DrivenDeck
@@ -78,42 +86,46 @@ class Driver:
     observer: Observer
     told: Callable[[str], None]
     at: Order | None = None
-    _again: set[Order] = field(default_factory=set)
+    _repeated: set[Order] = field(default_factory=set)
 
     @property
     def legs(self) -> list[Leg]:
-        """Legs that are over, those that were thrown away too, but for those behind which the run went back."""
-        found: list[Leg] = []
-        for one in self.journal.records:
-            if one["event"] == "ended":
-                short = tuple(map(tuple, one["seen"][6]))
-                seen = Seen(*one["seen"])._replace(short=short)
-                found.append(Leg(Order(*one["order"]), seen, one["cycles"], one["cpu"]))
-            elif one["event"] == "back":
-                del found[one["legs"] :]
-        return found
+        """Computed legs, discarded ones included, except those before whose start the run went back."""
+        legs: list[Leg] = []
+        for record in self.journal.records:
+            if record["event"] == "ended":
+                legs.append(_read_leg(record))
+            elif record["event"] == "back":
+                del legs[record["legs"] :]
+        return legs
 
     @property
     def out_of_place(self) -> tuple[Caution, ...]:
-        """What was said of parts that still swung as they became rigid."""
-        said = dict.fromkeys(one["place"] for one in self.journal.all("ended"))
-        return tuple(Caution("out-of-place", place) for place in said if place)
+        """Warnings for all windows in which parts still swung at tr."""
+        messages = dict.fromkeys(
+            record["place"] for record in self.journal.all("ended")
+        )
+        return tuple(Caution("out-of-place", text) for text in messages if text)
 
     def prepare(self) -> None:
-        """Copy the deck into the folder and run the starter, unless that is done."""
-        self._wait_for_end()  # of what an earlier driver has left
+        """Copy the deck into the folder and run the starter, unless that is done.
+
+        Raises
+        ------
+        D2RPickError
+            If the starter fails.
+        """
+        self._wait_for_end()  # an earlier driver may have left a solver running
         if self.journal.all("prepared") and self.solver.whole(0):
             return
+        folder = self.solver.folder
         for name, content in self.deck.files.items():
-            (self.solver.folder / name).parent.mkdir(parents=True, exist_ok=True)
-            write_whole(self.solver.folder / name, content)
-        first = self.solver.file(1, ".rad")
-        write_whole(
-            first, self.deck.leg(1, self.deck.end, None)
-        )  # the starter looks for /RBODY/OFF there
-        self.solver.start(
-            self.commands.words("starter", self.solver.file(0, ".rad").name), 0
-        )
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            write_whole(folder / name, content)
+        # The starter reads /RBODY/OFF from the first engine file.
+        first_engine_file = self.solver.file(1, ".rad")
+        write_whole(first_engine_file, self.deck.leg(1, self.deck.end, None))
+        self._start_solver("starter", 0)
         self._wait_for_end()
         if not self.solver.started_well():
             raise D2RPickError(
@@ -122,11 +134,11 @@ class Driver:
         self.journal.add("prepared")
 
     def progress(self, seconds: float) -> str:
-        """Say which leg is computed; until the first one has begun, for how many seconds."""
-        at = self.at
-        if at is None:
+        """Describe the leg that is being computed; before the first one, for how many ``seconds`` the starter runs."""
+        leg = self.at
+        if leg is None:
             return f"starting ... {seconds:.0f} s"
-        return f"leg {at.number}, {at.kind}: {at.start:.6g} to {at.until:.6g} of {self.limits.end:g}"
+        return f"leg {leg.number}, {leg.kind}: {leg.start:.6g} to {leg.until:.6g} of {self.limits.end:g}"
 
     def run(self) -> None:
         """Compute leg after leg to the end of the run.
@@ -134,37 +146,38 @@ class Driver:
         Raises
         ------
         D2RPickError
-            If the solver fails, or the disk has no room; the run goes on from there when it is driven again.
+            If the solver fails or the disk is full.  The run goes on from there when it is driven again.
         """
         if legs := self.legs:
             self.told(
                 f"resumed: legs that are over: {len(legs)}, the last at {legs[-1].order.until:.6g}"
             )
-        while order := self._next():
+        while order := self._choose_next():
             self.at = order
-            if not self._under_way(order):
+            if not self._is_computed(order):
                 self._start(order)
             self._wait_for_end()
             self._end(order)
         self.at = None
 
-    def _next(self) -> Order | None:
-        """Say which leg comes next, from a restart that is whole: the run goes back until there is one."""
+    def _choose_next(self) -> Order | None:
+        """Choose the next leg; go back leg by leg until the restart that it begins with is whole."""
         legs = self.legs
-        order, count = next_order(legs, self.limits), len(legs)
+        leg_count = len(legs)
+        order = choose_next_leg(legs, self.limits)
         while order is not None and legs and not self.solver.whole(order.number - 1):
             legs.pop()
-            order = next_order(legs, self.limits)
-        if len(legs) < count:
+            order = choose_next_leg(legs, self.limits)
+        if len(legs) < leg_count:
             self.journal.add("back", legs=len(legs))
-            at = 0.0 if order is None else order.start
+            start = 0.0 if order is None else order.start
             self.told(
-                f"the restart of the last leg is not whole: the run goes back to {at:.6g}"
+                f"the restart of the last leg is not whole: the run goes back to {start:.6g}"
             )
         return order
 
-    def _under_way(self, order: Order) -> bool:
-        """Whether this leg was begun, by an earlier driver, and came to its end."""
+    def _is_computed(self, order: Order) -> bool:
+        """Whether an earlier driver began this leg, and the solver has finished it since."""
         last = self.journal.records[-1]
         begun = last["event"] == "started" and Order(*last["order"]) == order
         return (
@@ -174,45 +187,47 @@ class Driver:
         )
 
     def _start(self, order: Order) -> None:
+        """Write the engine file of a leg and start the engine."""
         number = order.number
         self.solver.check_room(number, 1 - order.start / self.limits.end)
         self.solver.clear(number)
-        frozen = order.rigid and len(together(order, self.legs)) > 1
-        text = self.deck.leg(
-            number, order.until, self._cap() if order.rigid else None, frozen=frozen
-        )
+        already_rigid = order.rigid and len(collect_joined_legs(order, self.legs)) > 1
+        largest_step = self._limit_rigid_step() if order.rigid else None
+        text = self.deck.leg(number, order.until, largest_step, frozen=already_rigid)
         write_whole(self.solver.file(number, ".rad"), text)
         self.journal.add("started", order=order)
-        self.solver.start(
-            self.commands.words("engine", self.solver.file(number, ".rad").name), number
-        )
+        self._start_solver("engine", number)
         self.told(
             f"leg {number}: {order.kind} from {order.start:.6g} to {order.until:.6g}"
         )
 
-    def _cap(self) -> float:
-        """Largest step of a rigid leg, by the smallest mean one of the deformable legs before [time]."""
-        known = [
+    def _start_solver(self, program: str, number: int) -> None:
+        """Start the starter or the engine on the deck of a leg, 0 for the starter."""
+        deck = self.solver.file(number, ".rad").name
+        self.solver.start(self.commands.words(program, deck), number)
+
+    def _limit_rigid_step(self) -> float:
+        """Return the largest step of a rigid leg, from the smallest mean step of the deformable legs [time]."""
+        steps = [
             leg.length / leg.cycles
             for leg in self.legs
             if not leg.order.rigid and leg.cycles
         ]
-        return min(
-            self.deck.interval,
-            _STEP_RATIO * float(f"{min([self.deck.interval, *known]):.3g}"),
-        )
+        interval = self.deck.interval
+        smallest = float(f"{min([interval, *steps]):.3g}")
+        return min(interval, _STEP_RATIO * smallest)
 
     def _wait_for_end(self) -> None:
-        """Wait until no solver is at work; tell of silence, and end the solver where the driver is interrupted."""
-        said = _SILENT
+        """Wait until no solver is running; report silence, and stop the solver on KeyboardInterrupt."""
+        reported_at = _SILENT
         try:
             while self.solver.alive:
                 time.sleep(_PAUSE)
-                silent = self.solver.silent_for()
-                if silent > said:
-                    said = 2 * silent
+                silence = self.solver.silent_for()
+                if silence > reported_at:
+                    reported_at = 2 * silence
                     self.told(
-                        f"the solver has written nothing for {silent:.0f} s; Ctrl-C ends it, then --resume"
+                        f"the solver has written nothing for {silence:.0f} s; Ctrl-C ends it, then --resume"
                     )
         except KeyboardInterrupt:
             self.told(
@@ -222,72 +237,78 @@ class Driver:
             raise
 
     def _end(self, order: Order) -> None:
-        """Write down what a leg has shown; one that is not whole is begun again, once.
+        """Write the findings of a leg to the journal.
 
-        D2RPickError where the solver failed.
+        A leg that left no whole restart or history is computed again, once.
+
+        Raises
+        ------
+        D2RPickError
+            If the solver failed, or the leg left no whole restart for the second time.
         """
         number = order.number
         if not self.solver.ended_well(number):
             self._fail(order)
             return
         cycles, cpu = self.solver.took(number)
-        step = (order.until - order.start) / (cycles or 1)
-        last_state = order.until - max(3 * self.limits.interval, 2 * step)
-        if not self.solver.whole(number) or not self.solver.came_to(number, last_state):
-            if order in self._again:
-                where = self.solver.file(number, ".out")
-                raise D2RPickError(
-                    f"{where}: the leg left no whole restart; make room on the disk, then --resume"
-                )
-            self._again.add(order)
-            self.told(
-                f"leg {number}: it left no whole restart or history, and is begun again at {order.start:.6g}"
-            )
-            self.journal.add("lost", order=order)
+        if not self._is_whole(order, cycles):
+            self._repeat(order)
             return
         legs = self.legs
-        record = together(order, legs)
-        before = [
-            leg.seen
-            for leg in legs
-            if leg.order.until <= record[0].start and not leg.seen.idle
-        ]
-        known = max((seen.wait or 0.0 for seen in before), default=0.0)
-        seen = self.observer.look(
-            order, [self.solver.history(one.number) for one in record], known
+        joined_legs = collect_joined_legs(order, legs)
+        first = joined_legs[0]
+        findings = self.observer.look(
+            order,
+            [self.solver.history(leg.number) for leg in joined_legs],
+            _find_longest_wait(legs, first.start),
         )
-        place = self._place([*legs, Leg(order, seen, cycles, cpu)], record[0])
+        leg = Leg(order, findings, cycles, cpu)
+        place = self._warn_of_swing([*legs, leg], first)
         if place:
             self.told(f"warning: out-of-place: {place}")
         self.journal.add(
-            "ended", order=order, seen=seen, cycles=cycles, cpu=cpu, place=place
+            "ended", order=order, seen=findings, cycles=cycles, cpu=cpu, place=place
         )
-        # a window that is left out is computed from where it begins
-        self.solver.keep(
-            {
-                number,
-                number - 1,
-                number - 2,
-                *([record[0].number - 1] if order.rigid else []),
-            }
+        kept_restarts = {number, number - 1, number - 2}
+        if order.rigid:
+            kept_restarts.add(first.number - 1)  # for a window that is left out
+        self.solver.keep(kept_restarts)
+
+    def _is_whole(self, order: Order, cycles: int | None) -> bool:
+        """Whether a leg left whole restarts, and a history that ends with it."""
+        step = (order.until - order.start) / (cycles or 1)
+        last_state = order.until - max(3 * self.limits.interval, 2 * step)
+        number = order.number
+        return self.solver.whole(number) and self.solver.came_to(number, last_state)
+
+    def _repeat(self, order: Order) -> None:
+        """Note that a leg is to be computed again; D2RPickError if it was before."""
+        if order in self._repeated:
+            listing = self.solver.file(order.number, ".out")
+            raise D2RPickError(
+                f"{listing}: the leg left no whole restart; make room on the disk, then --resume"
+            )
+        self._repeated.add(order)
+        self.told(
+            f"leg {order.number}: it left no whole restart or history, and is begun again at {order.start:.6g}"
         )
+        self.journal.add("lost", order=order)
 
     def _fail(self, order: Order) -> None:
-        """Raise D2RPickError with what the solver said; a leg that failed before begins with a restart that is damaged.
+        """Raise D2RPickError with the error of the solver.
 
-        Then the run goes back by the leg that has written it.
+        If a leg fails twice before its first state, its restart is damaged although it looks whole.  Then the run goes
+        back by the leg that wrote it, without an error.
         """
-        events = [one["event"] for one in self.journal.records]
-        latest = max(
-            (place for place, event in enumerate(events) if event in ("ended", "back")),
+        events = [record["event"] for record in self.journal.records]
+        since_last_leg = max(
+            (row for row, event in enumerate(events) if event in ("ended", "back")),
             default=0,
         )
         self.journal.add("failed", order=order)
-        if (
-            "failed" not in events[latest:]
-            or not self.legs
-            or self.solver.came_to(order.number, order.start)
-        ):
+        failed_before = "failed" in events[since_last_leg:]
+        has_states = self.solver.came_to(order.number, order.start)
+        if not failed_before or not self.legs or has_states:
             words = self.solver.last_words(order.number)
             path = self.solver.file(order.number, ".out")
             raise D2RPickError(f"{path}: the solver failed: {words}; --resume goes on")
@@ -296,21 +317,48 @@ class Driver:
             f"leg {order.number} failed again before its first state: the leg before it is computed again"
         )
 
-    def _place(self, legs: Sequence[Leg], first: Order) -> str:
-        """Say so where parts swing too much to be rigid in a window, from its ``first`` leg on, whose end is known."""
-        planned = (
-            window_of(legs, self.limits) if legs[-1].seen.contact is not None else None
-        )
-        if planned is None or planned.reason or first.number == 1:
+    def _warn_of_swing(self, legs: Sequence[Leg], first: Order) -> str:
+        """Return a warning if parts swing too much in the window that the last leg ends; "" if not.
+
+        ``first`` is the leg in which the parts became rigid.
+        """
+        if legs[-1].findings.contact is None or first.number == 1:
             return ""
-        numbers = [one.number for one in together(first._replace(kind=LOAD), legs)[:-1]]
-        return self.observer.swing(
-            [self.solver.history(number) for number in numbers], planned
-        )
+        window = find_window(legs, self.limits)
+        if window.reason:
+            return ""
+        deformable_legs = collect_joined_legs(first._replace(kind=LOAD), legs)[:-1]
+        histories = [self.solver.history(leg.number) for leg in deformable_legs]
+        return self.observer.warn_of_swing(histories, window)
+
+
+def _read_leg(record: dict[str, Any]) -> Leg:
+    """Make a leg of a record of the journal."""
+    findings = Findings(*record["seen"])
+    short = tuple((start, end) for start, end in findings.short)
+    return Leg(
+        Order(*record["order"]),
+        findings._replace(short=short),
+        record["cycles"],
+        record["cpu"],
+    )
+
+
+def _find_longest_wait(legs: Sequence[Leg], time: float) -> float:
+    """Return the longest wait of the legs that ended by a time and in which something vibrated [time]."""
+    waits = [
+        leg.findings.wait or 0.0
+        for leg in legs
+        if leg.order.until <= time and not leg.findings.idle
+    ]
+    return max(waits, default=0.0)
 
 
 class Observer:
-    """Looks at the record of some ``parts`` of a deck, with the ``wait`` that was given or that the deck tells."""
+    """Reads the histories of legs for some ``parts`` of a deck.
+
+    ``wait`` is the one the user gave, ``of_deck`` the one that follows from the deck.
+    """
 
     def __init__(
         self,
@@ -325,91 +373,98 @@ class Observer:
         selection = Selection(
             parts=tuple(map(str, parts)), springs=tuple(map(str, springs))
         )
-        self._looks, self._whole = (
-            Looks(selection, inventory),
-            Looks(selection, inventory),
-        )
+        # One follows the legs as they are added, the other reads the record before a window as a whole.
+        self._new_states = Looks(selection, inventory)
+        self._whole_record = Looks(selection, inventory)
         self._given, self._of_deck = wait, of_deck
         self._evidence, self._motion = Evidence(), InnerMotion(None, of_deck)
 
-    def look(self, order: Order, histories: Sequence[Path], known: float) -> Seen:
-        """Say what is seen at the end of a leg, whose history is the last.
+    def look(
+        self, order: Order, histories: Sequence[Path], wait_before: float
+    ) -> Findings:
+        """Return what the histories of joined legs show at the end of the last one.
 
-        ``known`` is the longest wait that the record before these histories asked for [time].  A wait that was given is
-        kept to where the record shows a longer one: ``why`` says so.
+        ``wait_before`` is the longest wait of the legs before these [time].  A wait that the user gave is kept even if
+        the record shows a longer one, which ``why`` then says.
         """
-        states, follows = self._looks.new_states([str(path) for path in histories])
+        names = [str(path) for path in histories]
+        states, follows = self._new_states.new_states(names)
         if not follows:
-            self._evidence, self._motion = (
-                Evidence(),
-                InnerMotion(None, self._of_deck, known),
-            )
+            self._evidence = Evidence()
+            self._motion = InnerMotion(None, self._of_deck, wait_before)
         if states is not None and states.time.size:
             self._evidence.take(states)
             self._motion.take(states, self._evidence)
         history = self._evidence.history
         if order.rigid:
-            return Seen(contact=self._evidence.contact_after(float(history.time[0])))
-        return self._seen(order, history)
+            start = float(history.time[0])
+            return Findings(contact=self._evidence.contact_after(start))
+        return self._find_flight(order, history)
 
-    def _seen(self, order: Order, history: History) -> Seen:
-        flights, now = self._evidence.flights(self._needed), float(history.time[-1])
+    def _find_flight(self, order: Order, history: History) -> Findings:
+        """Return the findings of a deformable leg."""
+        now = float(history.time[-1])
+        flights = self._evidence.flights(self._get_needed_wait)
         free = self._evidence.free_since(now)
-        asked = self._motion.wait(free, now)
-        wait, idle = (
-            self._needed(free, now),
-            asked is not None and asked.source == "at-rest",
-        )
-        why = asked.reason if asked else ""
+        shown_wait = self._motion.wait(free, now)
+        wait = self._get_needed_wait(free, now)
+        idle = shown_wait is not None and shown_wait.source == "at-rest"
+        why = shown_wait.reason if shown_wait else ""
         if self._given is not None and not idle:
-            why = (
-                f"as given, but {why}"
-                if asked and asked.time > self._given
-                else "as given"
-            )
-        least = _TOLD * (wait or 0.0)
-        pauses = self._evidence.pauses(order.start)
-        energies = [
-            history.energy_at(max(time, float(history.time[0])))
-            for time in (order.start, now)
-        ]
-        earlier = energies[0] > energies[1] and order.start >= max(free, order.after)
-        return Seen(
+            longer = shown_wait is not None and shown_wait.time > self._given
+            why = f"as given, but {why}" if longer else "as given"
+        return Findings(
             free=free,
             wait=wait,
             why=why,
             flies=bool(flights) and flights[-1].end is None,
-            tr=order.start if earlier else order.until,
+            tr=_choose_end(order, history, free),
             idle=idle,
-            short=tuple(
-                one
-                for one in pauses
-                if wait and least <= one[1] - one[0] and one[0] >= order.after
-            ),
+            short=self._find_short_flights(order, wait),
             swing=self._motion.longest_swing(now),
         )
 
-    def _needed(self, start: float, now: float) -> float | None:
-        asked = self._motion.wait(start, now)
-        if self._given is not None and (asked is None or asked.source != "at-rest"):
-            return self._given
-        return asked and asked.time
-
-    def swing(self, histories: Sequence[Path], planned: Window) -> str:
-        """Say so where parts swing too much to be rigid in a window, by the record before it."""
-        history = self._whole.whole([str(path) for path in histories])
-        found = swing_in(history, planned.free, planned.tr)
-        return (
-            f"tr = {planned.tr:.6g}: {found.told}"
-            if found and found.flight > planned.td - planned.free
-            else ""
+    def _find_short_flights(
+        self, order: Order, wait: float | None
+    ) -> tuple[tuple[float, float], ...]:
+        """Return start and end of each flight in a leg that lasted for less than the wait, but not for much less."""
+        if not wait:
+            return ()
+        return tuple(
+            (start, end)
+            for start, end in self._evidence.pauses(order.start)
+            if end - start >= _REPORTED * wait and start >= order.switch_after
         )
+
+    def _get_needed_wait(self, start: float, now: float) -> float | None:
+        """Return the wait for a flight since ``start``; the user's, unless nothing vibrates [time]."""
+        shown_wait = self._motion.wait(start, now)
+        at_rest = shown_wait is not None and shown_wait.source == "at-rest"
+        if self._given is not None and not at_rest:
+            return self._given
+        return shown_wait.time if shown_wait else None
+
+    def warn_of_swing(self, histories: Sequence[Path], window: Window) -> str:
+        """Return a warning if parts swing too much before a window to become rigid; "" if not."""
+        history = self._whole_record.whole([str(path) for path in histories])
+        swing = find_swing(history, window.free, window.tr)
+        if swing is None or swing.flight <= window.td - window.free:
+            return ""
+        return f"tr = {window.tr:.6g}: {swing.told}"
+
+
+def _choose_end(order: Order, history: History, free: float) -> float:
+    """Choose tr at that end of a leg with the higher internal energy, of those in flight [time]."""
+    start = max(order.start, float(history.time[0]))
+    falls = history.energy_at(start) > history.energy_at(float(history.time[-1]))
+    starts_in_flight = order.start >= max(free, order.switch_after)
+    return order.start if falls and starts_in_flight else order.until
 
 
 class Journal:
     """Records that are only appended, each on the disk when `add` returns.
 
-    A line that is cut or damaged is passed over: what it said was not done.
+    A cut or damaged line is ignored: what it reports is done again.
     """
 
     def __init__(self, path: Path) -> None:
@@ -418,22 +473,22 @@ class Journal:
         self.records = [
             record for line in content.split(b"\n") if (record := record_of(line))
         ]
-        self._end = b"\n" if content and not content.endswith(b"\n") else b""
+        self._line_end = b"\n" if content and not content.endswith(b"\n") else b""
 
     def add(self, event: str, **values: Any) -> dict[str, Any]:
-        """Append a record; D2RPickError where there is no room for it."""
+        """Append a record; D2RPickError if the disk has no room for it."""
         record = {"event": event, **values}
         line = signed(json.dumps(record, allow_nan=False)).encode()
         try:
-            append_whole(self.path, self._end + line + b"\n", durable=True)
+            append_whole(self.path, self._line_end + line + b"\n", durable=True)
         except OSError as error:
             raise D2RPickError(
                 f"{self.path}: cannot be written ({error.strerror}); make room, then --resume"
             ) from None
-        self._end = b""
+        self._line_end = b""
         self.records.append(record)
         return record
 
     def all(self, event: str) -> list[dict[str, Any]]:
-        """Records of one kind, in the order they were written."""
+        """Return the records of one kind, in the order in which they were written."""
         return [record for record in self.records if record["event"] == event]

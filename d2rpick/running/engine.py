@@ -1,6 +1,6 @@
-"""The solver's processes in the folder of a run: how they are started and ended, and what they leave.
+"""Start and stop the processes of a solver in the folder of a run, and read what they leave.
 
-Restarts and what they are called: runs with OpenRadioss 2026-08.
+Names and heads of restarts come from runs with OpenRadioss 2026-08.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from d2rpick.histories.formats.radioss_th import TimeHistory
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
 
-# Where an installation has its programs, and how they are called.
+# Paths of the programs in an installation, and their arguments.
 _PROGRAMS: Final = {
     "starter": (
         ("bin/starter_gf", "exec/starter_linux64_gf"),
@@ -34,18 +34,20 @@ _HOME: Final = "OPENRADIOSS_PATH"
 _STARTER_ERROR: Final = re.compile(rb"^ *[1-9]\d* +ERROR\(S\)", re.MULTILINE)
 _CYCLES: Final = re.compile(rb"TOTAL NUMBER OF CYCLES *: *(\d+)")
 _TOTAL: Final = re.compile(rb"^ TOTAL\.+: +([\d.E+-]+)", re.MULTILINE)
-_TAIL: Final = 1 << 14
-# The listing of a starter says first what is wrong, and much behind it: bytes of it, how that begins, and its lines.
-_LISTING, _ERROR, _OF_ERROR = 1 << 22, "** ERROR", 4
-_LAST_LINES: Final = 8
-# A restart that is whole has so much of the size of the starter's.
+# Bytes that are read from the end of a listing.
+_TAIL_SIZE: Final = 1 << 14
+# The listing of a starter reports errors first and much else after them: how many bytes are read from its end, how an
+# error begins, and how many lines it has.
+_LISTING_SIZE, _ERROR, _ERROR_LINES = 1 << 22, "** ERROR", 4
+_MOST_LINES: Final = 8
+# A whole restart has at least this share of the size of the starter's.
 _WHOLE: Final = 0.98
-# How long a solver may take to end when it is asked to, and between two looks whether it has [s].
-_ENDS, _PAUSE = 4.0, 0.05
+# Time that a solver has to stop, and pause between two checks whether it has [s].
+_TIME_TO_STOP, _PAUSE = 4.0, 0.05
 
 
 class Commands(NamedTuple):
-    """How starter and engine are started, None for those of the installation, on so many threads."""
+    """Commands of starter and engine, None for those of the installation, and the number of threads."""
 
     starter: str | None = None
     engine: str | None = None
@@ -54,11 +56,16 @@ class Commands(NamedTuple):
     def words(self, program: str, deck: str) -> list[str]:
         """Split the command that starts a program on a deck as a shell would.
 
-        ConfigurationError where it cannot be split or does not name the deck, or no installation is known.
+        Raises
+        ------
+        ConfigurationError
+            If the command cannot be split or does not name the deck, or no installation is known.
         """
         template = getattr(self, program)
         try:
-            split = _installed(program) if template is None else shlex.split(template)
+            split = (
+                _find_installed(program) if template is None else shlex.split(template)
+            )
         except ValueError as error:
             raise ConfigurationError(
                 f"--{program} {template!r}: cannot be split into words ({error})"
@@ -67,66 +74,55 @@ class Commands(NamedTuple):
             raise ConfigurationError(
                 f"--{program} {template!r}: {{deck}} was expected, where the name of the file goes"
             )
+        executable, *arguments = split
+        if "/" in executable:  # the program is started in another folder
+            executable = str(Path(executable).absolute())
+        threads = str(self.threads)
         return [
-            _whole(split[0]),
+            executable,
             *(
-                word.replace("{deck}", deck).replace("{threads}", str(self.threads))
-                for word in split[1:]
+                word.replace("{deck}", deck).replace("{threads}", threads)
+                for word in arguments
             ),
         ]
 
     def missing(self) -> str:
-        """Name the first program that is not there, or cannot be started; empty where all can.
-
-        ConfigurationError as of `words`.
-        """
-        programs = (self.words(program, "{deck}")[0] for program in _PROGRAMS)
-        return next((one for one in programs if shutil.which(one) is None), "")
-
-
-def _whole(program: str) -> str:
-    """Give the path of a program that is named by one: it is started in another folder."""
-    return str(Path(program).absolute()) if "/" in program else program
+        """Return the first program that cannot be started, "" if there is none; errors as `words`."""
+        for program in _PROGRAMS:
+            executable = self.words(program, "{deck}")[0]
+            if shutil.which(executable) is None:
+                return executable
+        return ""
 
 
-def _installed(program: str) -> list[str]:
+def _find_installed(program: str) -> list[str]:
+    """Return the path of a program of the installation, with its arguments; ConfigurationError without one."""
     home = os.environ.get(_HOME, "")
-    names, options = _PROGRAMS[program]
-    for path in (Path(home, name) for name in names if home):
-        if path.is_file():
-            return [str(path.resolve()), *options.split()]
+    names, arguments = _PROGRAMS[program]
+    for name in names:
+        path = Path(home, name)
+        if home and path.is_file():
+            return [str(path.resolve()), *arguments.split()]
     raise ConfigurationError(
         f"no {program} is known; set {_HOME} to the folder of OpenRadioss, or give --{program} 'CMD {{deck}}'"
     )
 
 
-def _surroundings(threads: int) -> dict[str, str]:
-    """What the programs of an installation need in their environment, beside what is there."""
-    home = os.environ.get(_HOME)
-    own = {"OMP_NUM_THREADS": str(threads), "OMP_STACKSIZE": "400m"}
-    if home:
-        libraries = (
-            f"{home}/exec",
-            os.environ.get("LD_LIBRARY_PATH"),
-            f"{home}/syslib",
-        )
-        own |= {
-            "RAD_CFG_PATH": f"{home}/hm_cfg_files",
-            "LD_LIBRARY_PATH": os.pathsep.join(filter(None, libraries)),
-        }
-    return {
-        **own,
-        **os.environ,
-        "LD_LIBRARY_PATH": own.get(
-            "LD_LIBRARY_PATH", os.environ.get("LD_LIBRARY_PATH", "")
-        ),
-    }
+def _make_environment(threads: int) -> dict[str, str]:
+    """Return the environment of the programs: ours, with what those of an installation need."""
+    environment = {"OMP_NUM_THREADS": str(threads), "OMP_STACKSIZE": "400m"}
+    libraries = os.environ.get("LD_LIBRARY_PATH", "")
+    if home := os.environ.get(_HOME):
+        environment["RAD_CFG_PATH"] = f"{home}/hm_cfg_files"
+        paths = (f"{home}/exec", libraries, f"{home}/syslib")
+        libraries = os.pathsep.join(filter(None, paths))
+    return {**environment, **os.environ, "LD_LIBRARY_PATH": libraries}
 
 
 @contextmanager
 def alone(folder: Path) -> Iterator[None]:
-    """Keep every other driver out of a folder; D2RPickError where one is at work there."""
-    lock = _locked(folder / ".drive.lock")
+    """Keep every other driver out of a folder; D2RPickError if one is running there."""
+    lock = _lock(folder / ".drive.lock")
     if lock is None:
         raise D2RPickError(
             f"{folder}: another d2rpick drives this run; wait for it, or choose another folder"
@@ -137,8 +133,8 @@ def alone(folder: Path) -> Iterator[None]:
         os.close(lock)
 
 
-def _locked(path: Path) -> int | None:
-    """Lock a file, as long as the number that is given stays open; None where it is locked."""
+def _lock(path: Path) -> int | None:
+    """Lock a file and return its descriptor, which keeps the lock while it is open; None if the file is locked."""
     import fcntl
 
     lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
@@ -153,32 +149,29 @@ def _locked(path: Path) -> int | None:
 class Solver:
     """The solver in the folder of a run, one process at a time.
 
-    The process holds a lock as long as it lives, so that a driver that comes later knows of it.
+    The process keeps a lock while it lives, so that a later driver can see it.
     """
 
     def __init__(self, folder: Path, name: str, threads: int = 1) -> None:
         self.folder, self.name, self.threads = folder, name, threads
-        self._lock = folder / ".solver.lock"
+        self._lock_path = folder / ".solver.lock"
         self._process: subprocess.Popen[bytes] | None = None
-        self._signal = 0  # by which the last process was ended; 0: by none
+        self._signal = 0  # that ended the last process; 0 if none did
 
     def file(self, number: int, suffix: str) -> Path:
-        """Name a file of a leg, 0 for the starter."""
+        """Return the path of a file of a leg, 0 for the starter."""
         return self.folder / f"{self.name}_{number:04d}{suffix}"
 
     def history(self, number: int) -> Path:
-        """Name the time history of a leg."""
+        """Return the path of the time history of a leg."""
         return self.folder / f"{self.name}T{number:02d}"
 
     def clear(self, number: int) -> None:
         """Remove what an earlier leg of this number left."""
-        for path in (
-            self.history(number),
-            *(self.file(number, one) for one in (".ctl", ".out", ".log")),
-        ):
+        suffixes = (".ctl", ".out", ".log")
+        paths = [self.file(number, suffix) for suffix in suffixes]
+        for path in (self.history(number), *paths, *self._list_restarts(number)):
             path.unlink(missing_ok=True)
-        for path in self._restarts(number):
-            path.unlink()
 
     def start(self, command: Sequence[str], number: int) -> None:
         """Start the solver on a leg.
@@ -186,19 +179,19 @@ class Solver:
         Raises
         ------
         D2RPickError
-            If it cannot be started, or one is at work in the folder.
+            If it cannot be started, or another one is running in the folder.
         """
-        lock = _locked(self._lock)
+        lock = _lock(self._lock_path)
         if lock is None:
             raise D2RPickError(
                 f"{self.folder}: a solver is at work there; wait for its end"
             )
         try:
-            _let_stack_grow()
+            _raise_stack_limit()
             with self.file(number, ".log").open("wb") as log:
-                # of its own session: Ctrl-C reaches the driver, which ends all processes of the solver
+                # In its own session, Ctrl-C does not reach it: the driver stops all processes of the solver.
                 self._process = subprocess.Popen(
-                    command, cwd=self.folder, env=_surroundings(self.threads), stdin=subprocess.DEVNULL, stdout=log,
+                    command, cwd=self.folder, env=_make_environment(self.threads), stdin=subprocess.DEVNULL, stdout=log,
                     stderr=subprocess.STDOUT, start_new_session=True, pass_fds=[lock],
                 )  # fmt: skip
             os.ftruncate(lock, 0)
@@ -212,118 +205,121 @@ class Solver:
 
     @property
     def alive(self) -> bool:
-        """Whether a solver is at work, also one that an earlier driver started."""
+        """Whether a solver is running, even if an earlier driver started it."""
         if self._process is not None:
             code = self._process.poll()
             if code is None:
                 return True
             self._process, self._signal = None, max(-code, 0)
-        lock = _locked(self._lock)
+        lock = _lock(self._lock_path)
         if lock is not None:
             os.close(lock)
         return lock is None
 
     def end(self) -> None:
-        """End the solver, also one that an earlier driver started, with all its processes."""
-        text = self._lock.read_bytes() if self._lock.exists() else b""
+        """Stop the solver with all its processes, even if an earlier driver started it."""
+        text = self._lock_path.read_bytes() if self._lock_path.exists() else b""
         for sign in (signal.SIGTERM, signal.SIGKILL):
             if not self.alive or not text.isdigit():
                 return
             with suppress(ProcessLookupError, PermissionError):
                 os.killpg(int(text), sign)
             begun = time.monotonic()
-            with suppress(KeyboardInterrupt):  # of somebody who cannot wait
-                while time.monotonic() - begun < _ENDS and self.alive:
+            with suppress(KeyboardInterrupt):  # pressed again
+                while time.monotonic() - begun < _TIME_TO_STOP and self.alive:
                     time.sleep(_PAUSE)
 
     def silent_for(self) -> float:
-        """For how long the solver has written nothing [s]."""
-        times = [
-            one.stat().st_mtime
-            for one in self.folder.glob(f"{self.name}*")
-            if one.exists()
-        ]
-        return max(0.0, time.time() - max(times, default=time.time()))
+        """Return for how long the solver has written nothing [s]."""
+        now = time.time()
+        paths = self.folder.glob(f"{self.name}*")
+        written = max(
+            (path.stat().st_mtime for path in paths if path.exists()), default=now
+        )
+        return max(0.0, now - written)
 
     def ended_well(self, number: int) -> bool:
-        """Whether the listing of a leg says that it came to its end."""
-        return b"NORMAL TERMINATION" in _tail(self.file(number, ".out"))
+        """Whether the listing of a leg reports its normal end."""
+        return b"NORMAL TERMINATION" in _read_tail(self.file(number, ".out"))
 
     def took(self, number: int) -> tuple[int | None, float | None]:
-        """Give cycles and processor time [s] of a leg; None where its listing does not say them."""
-        listing = _tail(self.file(number, ".out"))
-        cycles, total = (
-            found[-1] if (found := one.findall(listing)) else None
-            for one in (_CYCLES, _TOTAL)
+        """Return cycles and processor time [s] of a leg; None if its listing does not contain them."""
+        listing = _read_tail(self.file(number, ".out"))
+        cycles, seconds = _CYCLES.findall(listing), _TOTAL.findall(listing)
+        return (
+            int(cycles[-1]) if cycles else None,
+            float(seconds[-1]) if seconds else None,
         )
-        return None if cycles is None else int(
-            cycles
-        ), None if total is None else float(total)
 
     def whole(self, number: int) -> bool:
-        """Whether the restarts of a leg are whole, 0 for the starter: those of all domains, as long as at first.
+        """Whether a leg, 0 for the starter, has left whole restarts of all domains.
 
-        A restart of OpenRadioss begins with its own name, and is as long as the first one but for what has changed of
-        the contacts; a disk that is full leaves shorter ones, although the listing ends as it should.
+        A restart of OpenRadioss begins with its own name.  It is as long as the one of the starter except for what has
+        changed in the contacts.  A full disk leaves shorter restarts although the listing reports a normal end.
         """
-        first, own = self._restarts(0), self._restarts(number)
-        sizes = {path.name[-8:]: path.stat().st_size for path in first}
-        named = all(map(_begins_with_its_name, first))
-        return {path.name[-8:] for path in own} >= sizes.keys() != set() and all(
-            path.stat().st_size >= max(_WHOLE * sizes.get(path.name[-8:], 1), 1)
-            and (not named or _begins_with_its_name(path))
-            for path in own
-        )
+        of_starter, restarts = self._list_restarts(0), self._list_restarts(number)
+        sizes = {_get_domain(path): path.stat().st_size for path in of_starter}
+        if not sizes or not sizes.keys() <= {_get_domain(path) for path in restarts}:
+            return False
+        has_names = all(_has_its_name(path) for path in of_starter)
+        for path in restarts:
+            least_size = max(_WHOLE * sizes.get(_get_domain(path), 1), 1)
+            if path.stat().st_size < least_size:
+                return False
+            if has_names and not _has_its_name(path):
+                return False
+        return True
 
     def came_to(self, number: int, end: float) -> bool:
-        """Whether the history of a leg reaches a time [time]."""
+        """Whether the history of a leg has a state at a time or after it [time]."""
         path = self.history(number)
         try:
-            written = TimeHistory(path.read_bytes(), str(path)).time
+            times = TimeHistory(path.read_bytes(), str(path)).time
         except (FormatError, OSError):
             return False
-        return bool(written.size) and float(written[-1]) >= end
+        return bool(times.size) and float(times[-1]) >= end
 
     def started_well(self) -> bool:
-        """Whether the starter has ended without an error, and left a restart."""
-        return self.whole(0) and not _STARTER_ERROR.search(_tail(self.file(0, ".out")))
+        """Whether the starter has ended without an error and left a whole restart."""
+        return self.whole(0) and not _STARTER_ERROR.search(
+            _read_tail(self.file(0, ".out"))
+        )
 
     def last_words(self, number: int) -> str:
-        """Give what the solver said of its error, or the last lines that it printed, in one."""
-        listing = (
-            _tail(self.file(number, ".out"), _LISTING).decode("latin-1").splitlines()
-        )
-        at = [place for place, line in enumerate(listing) if _ERROR in line]
-        text = (
-            (_tail(self.file(number, ".log")) or _tail(self.file(number, ".out")))
-            .decode("latin-1")
-            .splitlines()
-        )
-        errors = [line for place in at for line in listing[place : place + _OF_ERROR]]
-        lines = [" ".join(line.split()) for line in errors or text if line.strip(" -*")]
-        told = lines[:_LAST_LINES] if errors else lines[-_LAST_LINES:]
+        """Return the errors that the solver reported, or the last lines that it printed, in one line."""
+        listing = _read_lines(self.file(number, ".out"), _LISTING_SIZE)
+        lines: list[str] = []
+        for row, line in enumerate(listing):
+            if _ERROR in line:
+                lines += listing[row : row + _ERROR_LINES]
+        has_errors = bool(lines)
+        if not has_errors:
+            lines = _read_lines(self.file(number, ".log")) or _read_lines(
+                self.file(number, ".out")
+            )
+        texts = [" ".join(line.split()) for line in lines if line.strip(" -*")]
+        texts = texts[:_MOST_LINES] if has_errors else texts[-_MOST_LINES:]
         ended = f"ended by signal {self._signal}; " if self._signal else ""
-        return ended + (printable(" | ".join(told)) or "nothing was printed")
+        return ended + (printable(" | ".join(texts)) or "nothing was printed")
 
     def keep(self, numbers: Collection[int]) -> None:
-        """Remove the restarts of legs but for these, and of the starter's."""
+        """Remove the restarts of all legs except these and the starter."""
         for path in self.folder.glob(f"{self.name}_[0-9][0-9][0-9][0-9]_*.rst"):
             number = int(path.name[len(self.name) + 1 :][:4])
             if number and number not in numbers:
                 path.unlink(missing_ok=True)
 
     def check_room(self, number: int, share: float) -> None:
-        """Raise D2RPickError where the disk has no room for a leg that has this share of the run still before it."""
-        files = list(self.folder.iterdir())
-        restart = max(
-            (one.stat().st_size for one in files if one.suffix == ".rst"), default=0
-        )
-        histories = sum(
-            self.history(one).stat().st_size
-            for one in range(number)
-            if self.history(one).exists()
-        )
-        needed = 2 * restart + round(histories * share / max(1 - share, 0.1))
+        """Raise D2RPickError if the disk has no room for a leg that starts with this share of the run still to come."""
+        sizes = [
+            path.stat().st_size
+            for path in self.folder.iterdir()
+            if path.suffix == ".rst"
+        ]
+        histories = [self.history(leg) for leg in range(number)]
+        written = sum(path.stat().st_size for path in histories if path.exists())
+        to_come = round(written * share / max(1 - share, 0.1))
+        needed = 2 * max(sizes, default=0) + to_come
         free = shutil.disk_usage(self.folder).free
         if free < needed:
             raise D2RPickError(
@@ -331,26 +327,36 @@ class Solver:
                 "make room, then --resume"
             )
 
-    def _restarts(self, number: int) -> list[Path]:
+    def _list_restarts(self, number: int) -> list[Path]:
         return list(self.folder.glob(f"{self.name}_{number:04d}_*.rst"))
 
 
-def _begins_with_its_name(restart: Path) -> bool:
+def _get_domain(restart: Path) -> str:
+    """Return the number of the domain at the end of the name of a restart, with its suffix."""
+    return restart.name[-8:]
+
+
+def _has_its_name(restart: Path) -> bool:
     with restart.open("rb") as stream:
         return stream.read(len(restart.name)) == restart.name.encode()
 
 
-def _tail(path: Path, size: int = _TAIL) -> bytes:
+def _read_tail(path: Path, size: int = _TAIL_SIZE) -> bytes:
     with suppress(OSError), path.open("rb") as stream:
         stream.seek(max(path.stat().st_size - size, 0))
         return stream.read()
     return b""
 
 
-def _let_stack_grow() -> None:
-    """Give the processes that are started as much stack as the system allows: solvers hold arrays on it."""
+def _read_lines(path: Path, size: int = _TAIL_SIZE) -> list[str]:
+    """Return the lines at the end of a file; none if it is not there."""
+    return _read_tail(path, size).decode("latin-1").splitlines()
+
+
+def _raise_stack_limit() -> None:
+    """Give the solver as much stack as the system allows, since it keeps arrays there."""
     import resource
 
-    _, most = resource.getrlimit(resource.RLIMIT_STACK)
+    _, limit = resource.getrlimit(resource.RLIMIT_STACK)
     with suppress(OSError, ValueError):
-        resource.setrlimit(resource.RLIMIT_STACK, (most, most))
+        resource.setrlimit(resource.RLIMIT_STACK, (limit, limit))

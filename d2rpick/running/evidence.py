@@ -1,6 +1,7 @@
-"""When a record that grows shows a flight of some parts: each answer rests on the states up to it.
+"""Find the flights of some parts in a record that grows.
 
-As no answer asks when somebody looked, those of a record that grows are those of the finished one.
+Each answer depends on the states up to it, never on when somebody looked.  A growing record therefore has the flights
+of the finished one.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from d2rpick.flight.momentum import complete, laws_of
 from d2rpick.flight.window import FEWEST
 from d2rpick.histories.history import EXACT, rows_of
 from d2rpick.histories.samples import stretches
-from d2rpick.running.record import Column, GrowingRecord
+from d2rpick.running.record import Column, GrowingRecord, find_momenta
 from d2rpick.running.witness import Quiet, Witness
 
 if TYPE_CHECKING:
@@ -25,31 +26,26 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Balance, History, Momenta, Samples
     from d2rpick.running.witness import Needed
 
-# A switch is good where the internal energy is this share of the way from the lowest to the highest of one wait: in a
-# trough of computed runs the energy after td was half of what it should be, from a peak 0.9 of it and more.
+# tr is good if the internal energy is this share of the way from its lowest to its highest value within one wait.  In
+# computed runs a tr in a trough kept half of the energy that td should have, one at a peak 0.9 of it and more.
 _HIGH: Final = 0.75
-# States before a flight, and in it, that tell whether it is gravity that acts.
-_TOLD: Final = 1000
+# Gravity is determined from so many states before a flight and so many in it, at most.
+_GRAVITY_STATES: Final = 1000
 
 
 class Evidence:
-    """Since when no force has acted on the parts of a record that grows, and the flights that were seen in it."""
+    """Finds since when no force has acted on the parts of a growing record, and their flights."""
 
     def __init__(self) -> None:
         self._record = GrowingRecord()
-        self._witnesses: dict[bool, list[Witness]] = {
-            True: [],
-            False: [],
-        }  # of parts; of the whole model
-        self._going_on: dict[
-            tuple[int, ...], Witness
-        ] = {}  # by their members, of parts
-        self._at_first: Samples | None = None
-        self._moved, self._complete = (
-            Column(),
-            Column(),
-        )  # by state: of each part; of all, as against the whole model
-        self._largest = 0.0
+        self._of_parts: list[Witness] = []
+        self._of_model: list[Witness] = []  # at most one
+        # Witnesses of parts that are not over, by the numbers of their parts.
+        self._going_on: dict[tuple[int, ...], Witness] = {}
+        self._first_momenta: Samples | None = None
+        # For each state, which parts have moved so far, and whether the parts have all of the momentum of the model.
+        self._moved, self._complete = Column(), Column()
+        self._largest_momentum = 0.0
 
     @property
     def history(self) -> History:
@@ -58,228 +54,222 @@ class Evidence:
 
     @property
     def witnesses(self) -> list[Witness]:
-        """Those of parts first, then that of the whole model, of which there is one where anything is written."""
-        return [*self._witnesses[True], *self._witnesses[False]]
+        """Witnesses of parts, then the one of the whole model if it writes a momentum or contact energy."""
+        return [*self._of_parts, *self._of_model]
 
     def take(self, states: History) -> None:
-        """Append states that follow those so far; HistoryError where they hold other quantities."""
+        """Append states; HistoryError if they have other quantities than the states so far."""
         self._record.add(states)
-        whole = next((one for one in states.momenta if one.parts is None), None)
-        for momenta in states.momenta:
-            if momenta.parts is not None:
-                self._add_parts(momenta, whole, states.balance)
-        self._add_whole(whole, states.balance)
-        of_contact = states.balance.precision if states.balance else EXACT
+        of_model = find_momenta(states, of_parts=False)
+        of_parts = find_momenta(states, of_parts=True)
+        balance = states.balance
+        if of_parts is not None:
+            self._add_parts(of_parts, of_model, balance)
+        self._add_model(of_model, balance)
+        contact_precision = balance.precision if balance else EXACT
         for witness in self.witnesses:
-            own = next(
-                (
-                    one
-                    for one in states.momenta
-                    if (one.parts is None) is (witness.parts is None)
-                ),
-                None,
-            )
-            witness.follow(own.precision if own else EXACT, of_contact)
+            momenta = of_model if witness.parts is None else of_parts
+            precision = momenta.precision if momenta else EXACT
+            witness.follow(precision, contact_precision)
 
     def _add_parts(
-        self, momenta: Momenta, whole: Momenta | None, balance: Balance | None
+        self, momenta: Momenta, of_model: Momenta | None, balance: Balance | None
     ) -> None:
-        """Append momenta of parts to the witnesses of sets that may fly; those end where they are not believed."""
-        believed = complete(momenta, whole, self._largest)
-        if whole is not None:
-            self._largest = max(
-                self._largest, float(np.abs(whole.values).max(initial=0.0))
-            )
-        before, moved = self._complete.size, self._moving(momenta)
-        self._complete.add(believed)
+        """Append momenta of parts to the witnesses of all sets of parts that may fly together.
+
+        A witness ends at a state at which the parts lack momentum of the model, as when a rigid body has taken it.
+        """
         assert momenta.parts is not None
-        for stretch in stretches(believed):
+        is_complete = complete(momenta, of_model, self._largest_momentum)
+        if of_model is not None:
+            largest = float(np.abs(of_model.values).max(initial=0.0))
+            self._largest_momentum = max(self._largest_momentum, largest)
+        origin = self._complete.size
+        moved = self._add_moved(momenta)
+        self._complete.add(is_complete)
+        part_numbers = range(len(momenta.parts))
+        for stretch in stretches(is_complete):
             if stretch.start > 0:
                 self._going_on.clear()
-            for members in dict.fromkeys(_sets(momenta)):
+            for members in dict.fromkeys(_list_sets(momenta)):
                 if members not in self._going_on:
-                    flying = tuple(momenta.parts[i] for i in members)
-                    self._going_on[members] = Witness(
-                        members, flying, before + stretch.start
-                    )
-                    self._witnesses[True].append(self._going_on[members])
-                others = sorted({*range(len(momenta.parts))} - {*members})
+                    self._begin(members, momenta, origin + stretch.start)
+                other_parts = sorted({*part_numbers} - {*members})
                 self._going_on[members].add(
                     time=momenta.time[stretch],
                     momentum=momenta.of(members)[stretch],
-                    contact=_contact(balance, momenta.time, stretch),
-                    alone=np.asarray(~moved[stretch][:, others].any(axis=1)),
+                    contact=_get_contact_energy(balance, momenta.time, stretch),
+                    alone=np.asarray(~moved[stretch][:, other_parts].any(axis=1)),
                 )
-        if believed.size and not believed[-1]:
+        if is_complete.size and not is_complete[-1]:
             self._going_on.clear()
 
-    def _moving(self, momenta: Momenta) -> NDArray[np.bool_]:
-        """Which parts have changed their momentum up to each of these states, shape (k, parts)."""
-        if self._at_first is None:
-            self._at_first = momenta.values[0]
-        moved = (momenta.values != self._at_first).any(axis=2)
+    def _begin(self, members: tuple[int, ...], momenta: Momenta, origin: int) -> None:
+        """Add the witness of a set of parts that begins at a state."""
+        assert momenta.parts is not None
+        parts = tuple(momenta.parts[number] for number in members)
+        witness = Witness(members, parts, origin)
+        self._going_on[members] = witness
+        self._of_parts.append(witness)
+
+    def _add_moved(self, momenta: Momenta) -> NDArray[np.bool_]:
+        """Append which parts have changed their momentum up to each of these states; give it, shape (k, parts)."""
+        if self._first_momenta is None:
+            self._first_momenta = momenta.values[0]
+        moved = (momenta.values != self._first_momenta).any(axis=2)
         if self._moved.size:
             moved[0] |= self._moved.rows[-1]
         self._moved.add(np.logical_or.accumulate(moved, axis=0))
         return self._moved.rows[-len(moved) :]
 
     def alike(self, count: int) -> Iterator[tuple[slice, tuple[int, ...], bool]]:
-        """Give the last so many states in pieces: in each the same parts have moved, and are believed or not."""
+        """Split the last ``count`` states where a further part begins to move, or the parts begin to lack momentum.
+
+        Gives for each piece its states, the numbers of the parts that move, and whether the momenta are complete.
+        """
         states = np.column_stack(
             [self._moved.rows[-count:], self._complete.rows[-count:]]
         )
         changes = 1 + np.flatnonzero((states[1:] != states[:-1]).any(axis=1))
         for begin, end in pairwise([0, *changes.tolist(), count]):
-            *moved, believed = states[begin].tolist()
-            yield (
-                slice(begin, end),
-                tuple(i for i, one in enumerate(moved) if one),
-                believed,
-            )
+            *moved, is_complete = states[begin].tolist()
+            moving = tuple(number for number, moves in enumerate(moved) if moves)
+            yield slice(begin, end), moving, is_complete
 
-    def _add_whole(self, whole: Momenta | None, balance: Balance | None) -> None:
-        """Append what is written of the whole model; the energy of its contacts alone where it has no momentum."""
-        if whole is None and (balance is None or balance.sliding is None):
+    def _add_model(self, momenta: Momenta | None, balance: Balance | None) -> None:
+        """Append momentum and contact energy of the whole model to its witness, if one of them is written."""
+        members: tuple[int, ...] = ()
+        momentum: Samples | None = None
+        if momenta is not None:
+            members = (0,)
+            time, momentum = momenta.time, momenta.of(members)
+        elif balance is not None and balance.sliding is not None:
+            time = balance.time
+        else:
             return
-        if not self._witnesses[False]:
-            self._witnesses[False].append(
-                Witness(() if whole is None else (0,), None, 0)
-            )
-        (witness,) = self._witnesses[False]
-        time = (
-            balance.time
-            if whole is None and balance
-            else whole.time
-            if whole
-            else np.empty(0)
-        )
-        momentum = None if whole is None else whole.of((0,))
-        witness.add(
+        if not self._of_model:
+            self._of_model.append(Witness(members, None, 0))
+        self._of_model[0].add(
             time=time,
             momentum=momentum,
-            contact=_contact(balance, time),
+            contact=_get_contact_energy(balance, time),
             alone=np.ones(time.size, np.bool_),
         )
 
     def flights(self, needed: Needed) -> tuple[Quiet, ...]:
-        """Give all times without force that lasted for a wait, ascending; what is ``needed`` is asked of each state.
+        """Return all flights that lasted for their wait, ascending; ``needed`` returns the wait at a state.
 
-        As long as the run goes on the answer only grows, but for the ``end`` of its last member.
+        As the run goes on, flights are only added, and the last one gets its ``end``.
         """
         for witness in self.witnesses:
-            witness.look(needed, self._gravity)
-        seen = [
-            (one, float(witness.time[-1]))
+            witness.look(needed, self._find_gravity)
+        candidates = [
+            (flight, float(witness.time[-1]))
             for witness in self.witnesses
-            for one in witness.flights
+            for flight in witness.flights
         ]
-        kept: list[Quiet] = []
-        for one, reach in sorted(seen, key=lambda pair: pair[0].seen):
-            if not kept or (kept[-1].end is not None and one.seen > kept[-1].end):
-                kept.append(_going_on(one, reach, [other for other, _ in seen]))
-        return tuple(kept)
+        all_flights = [flight for flight, _ in candidates]
+        chosen: list[Quiet] = []
+        for flight, last_time in sorted(candidates, key=lambda pair: pair[0].seen):
+            last_end = chosen[-1].end if chosen else -np.inf
+            if last_end is not None and flight.seen > last_end:
+                chosen.append(_find_end(flight, last_time, all_flights))
+        return tuple(chosen)
 
-    def _gravity(self, witness: Witness, first: int, last: int) -> float | None:
-        """Gravity between two states, as of `Laws.gravity`, by what was written up to then; None where parts are held.
+    def _find_gravity(self, witness: Witness, first: int, last: int) -> float | None:
+        """Return the gravity between two states of a witness, as `Laws.gravity`; None if a support holds parts.
 
-        Of a long record some of the states are enough.
+        Only states up to the last one are used, and of a long record only some.
         """
-        history, now = self.history, float(witness.time[last])
-        if history.surroundings.held(history.parts, now):
+        history = self.history
+        if history.surroundings.held(history.parts, float(witness.time[last])):
             return None
         if not witness.members:
             return 0.0
-        momenta = next(
-            one
-            for one in history.momenta
-            if (one.parts is None) is (witness.parts is None)
-        )
-        states = np.zeros(momenta.time.size, np.bool_)
+        momenta = find_momenta(history, of_parts=witness.parts is not None)
+        assert momenta is not None
+        is_used = np.zeros(momenta.time.size, np.bool_)
         for begin, end in ((0, first), (first, last)):
-            count = min(end - begin + 1, _TOLD)
-            states[
-                witness.origin + np.linspace(begin, end, count).round().astype(np.intp)
-            ] = True
-        so_far = rows_of(momenta, states)
+            count = min(end - begin + 1, _GRAVITY_STATES)
+            states = np.linspace(begin, end, count).round().astype(np.intp)
+            is_used[witness.origin + states] = True
+        so_far = rows_of(momenta, is_used)
         if so_far.change(witness.members) <= so_far.noise(witness.members):
             return 0.0
-        begin = int(np.searchsorted(so_far.time, witness.time[first]))
-        return laws_of(so_far, witness.members, history.balance).gravity(
-            begin, so_far.time.size - 1
-        )
+        start = int(np.searchsorted(so_far.time, witness.time[first]))
+        laws = laws_of(so_far, witness.members, history.balance)
+        return laws.gravity(start, so_far.time.size - 1)
 
     def free_since(self, time: float) -> float:
-        """Since when nothing had acted at a ``time``, by the states up to it; the time itself where no state tells."""
-        found = [time]
-        for one in self.witnesses:
-            state = int(np.searchsorted(one.time, time, side="right")) - 1
-            if state >= 0 and time <= one.time[-1]:
-                found.append(float(one.time[one.free[state]]))
-        return min(found)
+        """Return since when no force had acted at a time, by the states up to it; the time itself without states."""
+        starts = [time]
+        for witness in self.witnesses:
+            state = int(np.searchsorted(witness.time, time, side="right")) - 1
+            if state >= 0 and time <= witness.time[-1]:
+                starts.append(float(witness.time[witness.free[state]]))
+        return min(starts)
 
     def pauses(self, since: float) -> tuple[tuple[float, float], ...]:
-        """Give from when to when nothing acted in what ended after a time, but for flights: too short for the wait."""
+        """Return start and end of all times without force that ended after ``since`` and were shorter than the wait."""
         if not self.witnesses:
             return ()
-        best = next(
-            (one for one in self.witnesses if one in self._going_on.values()),
-            self.witnesses[-1],
-        )
-        time, starts = best.time, best.time[np.array(best.free, np.intp)]
-        over = 1 + np.flatnonzero(
-            (starts[1:] - starts[:-1] > (time[1:] - starts[:-1]) / 2)
-            & (time[1:] > since)
-        )
-        found = [
-            (float(starts[state - 1]), float(time[state])) for state in over.tolist()
+        going_on = [
+            witness for witness in self.witnesses if witness in self._going_on.values()
         ]
-        seen = [one.end for one in best.flights]
-        return tuple(one for one in found if one[1] not in seen)
+        witness = going_on[0] if going_on else self.witnesses[-1]
+        time = witness.time
+        starts = time[np.array(witness.free, np.intp)]
+        is_over = starts[1:] - starts[:-1] > (time[1:] - starts[:-1]) / 2
+        ends = 1 + np.flatnonzero(is_over & (time[1:] > since))
+        pauses = [(float(starts[end - 1]), float(time[end])) for end in ends.tolist()]
+        flight_ends = {flight.end for flight in witness.flights}
+        return tuple(pause for pause in pauses if pause[1] not in flight_ends)
 
     def contact_after(self, start: float, least: int = FEWEST) -> float | None:
-        """Give the first state after ``start`` at which a force acts that did not then; None where none does [time].
+        """Return the first state after ``start`` at which a force acts; None if no force does [time].
 
-        Nothing acts at ``start``, as in a rigid leg that begins in flight; ``least`` states from there on tell it.
+        No force acts at ``start``, as in a rigid leg that begins in flight.  A witness is used if it has at least
+        ``least`` states from there on.
         """
         begin = max(start, float(self.history.time[0]))
-        for one in self.witnesses:
-            first = int(np.searchsorted(one.time, start))
-            if one.time[0] <= begin and first + least <= one.time.size:
-                last = one.last_without(first)
-                return None if last == one.time.size - 1 else float(one.time[last + 1])
+        for witness in self.witnesses:
+            first = int(np.searchsorted(witness.time, start))
+            state_count = witness.time.size
+            if witness.time[0] <= begin and first + least <= state_count:
+                last = witness.last_without(first)
+                at_end = last == state_count - 1
+                return None if at_end else float(witness.time[last + 1])
         return None
 
     def rigid_times(self) -> tuple[tuple[float, float, float], ...]:
-        """Give the times in which a rigid body has taken momenta of parts: start, when that was seen, end [time].
+        """Return when rigid bodies had the momenta of parts: start, the state that shows it, and end [time].
 
-        Those that go on end with the record.
+        A stretch that goes on ends with the record.
         """
-        time = next(
-            (one.time for one in self.history.momenta if one.parts is not None),
-            np.empty(0),
-        )
+        momenta = find_momenta(self.history, of_parts=True)
+        if momenta is None:
+            return ()
+        time = momenta.time
+        is_rigid = ~self._complete.rows.astype(np.bool_)
         return tuple(
             (
-                float(time[at.start]),
-                float(time[at.start + FEWEST - 1]),
-                float(time[min(at.stop, time.size - 1)]),
+                float(time[stretch.start]),
+                float(time[stretch.start + FEWEST - 1]),
+                float(time[min(stretch.stop, time.size - 1)]),
             )
-            for at in stretches(~self._complete.rows.astype(np.bool_), FEWEST)
+            for stretch in stretches(is_rigid, FEWEST)
         )
 
 
 def quiet_times(history: History, needed: Needed) -> tuple[Quiet, ...]:
-    """Find all times without force that lasted for a wait, ascending, as `Evidence.flights`."""
+    """Find all flights of a finished record, as `Evidence.flights`."""
     evidence = Evidence()
     evidence.take(history)
     return evidence.flights(needed)
 
 
 def highest_energy(history: History, start: float, end: float) -> float:
-    """Give the state from ``start`` to ``end`` with the highest internal energy, tr without td [time].
-
-    The later of two alike: it is never shorter of the end of a load.
-    """
+    """Return the state from ``start`` to ``end`` with the highest internal energy; of equal ones the last [time]."""
     time, energy = history.between(start, end)
     return float(time[energy.size - 1 - int(np.argmax(energy[::-1]))])
 
@@ -287,38 +277,52 @@ def highest_energy(history: History, start: float, end: float) -> float:
 def range_of_energy(
     history: History, now: float, wait: float
 ) -> tuple[float, float, float]:
-    """Give the lowest and the highest internal energy within the last wait, and from which one on tr is good."""
+    """Return the lowest and highest internal energy within the last wait, and the least one that is good for tr."""
     energy = history.between(now - wait, now)[1]
     low, high = float(energy.min()), float(energy.max())
     return low, high, low + _HIGH * (high - low)
 
 
-def _going_on(one: Quiet, reach: float, found: Sequence[Quiet]) -> Quiet:
-    """Let another witness tell how a flight ends that was followed to ``reach``, from where parts are not believed."""
-    if one.end is not None:
-        return one
-    after = (q.end for q in found if q.end is not None and q.start < reach < q.end)
-    return one._replace(end=next(after, None))
+def _find_end(flight: Quiet, last_time: float, flights: Sequence[Quiet]) -> Quiet:
+    """Give a flight the end that another witness has seen, if its own witness ended at ``last_time`` in the flight."""
+    if flight.end is not None:
+        return flight
+    ends = (
+        other_flight.end
+        for other_flight in flights
+        if other_flight.end is not None
+        and other_flight.start < last_time < other_flight.end
+    )
+    return flight._replace(end=next(ends, None))
 
 
-def _contact(
+def _get_contact_energy(
     balance: Balance | None, time: Samples, states: slice = slice(None)
 ) -> Samples | None:
-    """Energy of all contacts at these times; None where it is not written there."""
+    """Return the energy of all contacts at some ``states`` of these times; None if it is not written at them."""
     if balance is None or balance.sliding is None or balance.time.size != time.size:
         return None
     return balance.sliding[states]
 
 
-def _sets(momenta: Momenta) -> Iterator[tuple[int, ...]]:
-    """Give sets of parts that may fly together: those asked for, what hangs on them by the deck, all."""
+def _list_sets(momenta: Momenta) -> Iterator[tuple[int, ...]]:
+    """Give the sets of parts that may fly together: the chosen parts, these with all that the deck joins to them, all.
+
+    Parts are given by their numbers in the momenta.
+    """
     assert momenta.parts is not None
     chosen = tuple(momenta.flying or momenta.chosen)
     yield chosen
-    number = {part.id: place for place, part in enumerate(momenta.parts)}
-    own = {momenta.parts[i].id for i in chosen}
-    hung = {
-        part for body in momenta.surroundings.bodies() if own & {*body} for part in body
+    number_of_part = {part.id: number for number, part in enumerate(momenta.parts)}
+    chosen_ids = {momenta.parts[number].id for number in chosen}
+    joined_ids = {
+        part_id
+        for body in momenta.surroundings.bodies()
+        if chosen_ids & {*body}
+        for part_id in body
     }
-    yield tuple(sorted({*chosen, *(number[part] for part in hung if part in number)}))
+    joined = {
+        number_of_part[part_id] for part_id in joined_ids if part_id in number_of_part
+    }
+    yield tuple(sorted({*chosen, *joined}))
     yield tuple(range(momenta.values.shape[1]))

@@ -1,6 +1,6 @@
-"""Cards of a first run that switches itself: no reference tells when it flies, so the solver sees it by contact forces.
+"""Print the cards of a first run that switches itself: without a reference, the solver sees flights by contact forces.
 
-Radioss: legs that sensors end, each by /STOP/LSENSOR (docs/reference/first-run.md).  LS-DYNA: a pair of
+Radioss: legs that sensors end by /STOP/LSENSOR (tried with OpenRadioss; docs/reference/first-run.md).  LS-DYNA: a pair of
 switch sets with CODE 2 (no contact force) and 4 (contact force), from published text.
 """
 
@@ -33,15 +33,18 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Sequence
 
     from d2rpick.deck.model import Inventory
+    from d2rpick.deck.radioss_bodies import Bodies
     from d2rpick.deck.radioss_deck import Starter
     from d2rpick.deck.radioss_run import Run
+    from d2rpick.deck.reader import Deck
 
-# The starter of OpenRadioss looks for /RBODY/OFF in so many engine files.  A leg behind the end of the run is one step.
+# The starter of OpenRadioss reads /RBODY/OFF in so many engine files.  A leg after the end of the run takes one step.
 _MOST_LEGS: Final = 9
-# Largest step while rigid, of the wait: a contact is seen at most so late.
-_CAP_SHARE: Final = 300
-# LS-DYNA: how long after it becomes rigid the first contact may not release it, of the wait.
-_SHORT: Final = 100
+# The largest step while rigid is the wait over this number: a contact is seen at most so late.
+_STEPS_PER_WAIT: Final = 300
+# LS-DYNA: a contact does not release the parts for the wait over this number after they became rigid.
+_DELAYS_PER_WAIT: Final = 100
+# Radioss: loads that act without a contact.
 _LOADS: Final = ("CLOAD", "PLOAD", "MONVOL", "LOAD", "PRELOAD", "LASER", "PFLUID")
 _UNSEEN: Final = "pushes without a contact, so that a flight is not seen by contacts"
 _OF_ALL: Final = (
@@ -63,16 +66,15 @@ _OF_LS_DYNA: Final = (
     "Other contacts, rigid walls and loads are not seen by these switches.",
     "These cards were not tried with the solver.",
 )
-
-
-# LS-DYNA: what acts on parts without a contact, but for gravity.
+# LS-DYNA: loads that act without a contact, and those of them that are gravity.
 _PUSHES, _OF_GRAVITY = ("LOAD_", "AIRBAG_"), ("LOAD_BODY", "LOAD_GRAVITY")
-# The offset must be more than the thickness of the contact, half of both shells: so many times the thickest one.
-_CLEAR: Final = 2
+# LS-DYNA: offset before a contact over the thickest shell.  It must be above the thickness of the contact: half of the
+# thickness of each shell.
+_OFFSET_THICKNESSES: Final = 2
 
 
 class First(NamedTuple):
-    """A card for the first run, the wait that it goes by, and what to know about it."""
+    """A card for the first run, its wait, and notes for the user."""
 
     card: PrintedCard
     wait: Wait
@@ -116,197 +118,223 @@ def first_card(
             f"no parts were given, and {path} keeps no body off; name them with `parts`"
         )
     refuse_held(path, inventory, chosen)
-    known = _wait(path, inventory, wait)
-    make = _radioss if inventory.solver == "radioss" else _ls_dyna
-    return make(path, inventory, chosen, known, after)
+    reasoned_wait = _choose_wait(path, inventory, wait)
+    if inventory.solver == "radioss":
+        return _make_radioss_card(path, inventory, chosen, reasoned_wait, after)
+    return _make_ls_dyna_card(path, inventory, chosen, reasoned_wait, after)
 
 
-def _wait(path: str, inventory: Inventory, given: float | None) -> Wait:
-    """Give the wait and its reason."""
+def _choose_wait(path: str, inventory: Inventory, given: float | None) -> Wait:
+    """Return the given wait, or half of the longest inner period of the deck; ArgumentError without either."""
     if given is not None:
         check_wait(given, wait_of_deck(inventory), path)
         return Wait(given, "given", "as given")
-    known = inner_period(inventory)
-    if known is None:
+    period = inner_period(inventory)
+    if period is None:
         raise ArgumentError(
             f"`wait` is not given, and {path} does not tell it: no masses on springs that are followed; give the time"
             " without force that counts as flight, above half of the longest inner period"
         )
+    half = float(f"{period.time / 2:.3g}")
     return Wait(
-        float(f"{known.time / 2:.3g}"),
-        "deck",
-        f"half of the period {known.time:.3g} of {known.reason}",
+        half, "deck", f"half of the period {period.time:.3g} of {period.reason}"
     )
 
 
 # Radioss.
 
 
-def _radioss(
+def _make_radioss_card(
     path: str,
     inventory: Inventory,
     parts: Sequence[int],
     wait: Wait,
     after: float | None,
 ) -> First:
+    """Print the engine files and sensors of a Radioss run; DeckError if a flight would not show by contact forces."""
     run, bodies = read_run(path), bodies_for(path, parts)
     if run.starter is None or len(run.legs) != 1:
         raise DeckError(
             f"{path}: the run has {len(run.legs)} engine files; its starter deck and one were expected"
         )
     _refuse_loads(run.starter)
-    (leg,) = run.legs
-    forces = list(contacts_of(run.starter))
-    if not forces:
+    contacts = list(contacts_of(run.starter))
+    if not contacts:
         raise DeckError(f"{path}: {NO_CONTACT}")
-    at_rest = after is None and _falls(run, inventory, parts)
-    start = wait.time if after is None else max(after, wait.time)
-    sensors, contact, flight = _sensors(forces, wait.time, start, bodies.sensor)
-    cap = float(f"{wait.time / _CAP_SHARE:.2g}")
-    others = tuple(node for node in kept_off(run.legs) if node not in bodies.nodes)
-    files = {}
-    for number in range(1, _MOST_LEGS + 1 - at_rest):
-        rigid = number % 2 == at_rest
-        last = number == _MOST_LEGS - at_rest
-        stop = (
-            ()
-            if last
-            else ("/STOP/LSENSOR", str(contact if rigid else flight), "0 0 0 0 0 0")
-        )
-        lines = [f"/RUN/{leg.name}/{number}", f"{leg.stop.value!r:>20}", *stop]
-        switch = ("/RBODY/ON", *listed(bodies.nodes), *capped(cap), *off(others))
-        lines += switch if rigid else off((*bodies.nodes, *others))
-        files[f"{leg.name}_{number:04d}.rad"] = "\n".join(lines) + "\n"
-    how = (
-        f"at rest in free fall: rigid from 0; then {_waited(wait)}"
-        if at_rest
-        else _waited(wait)
-    )
-    told = (note.format(cap=cap) for note in _OF_RADIOSS)
-    notes = (
-        how,
-        *bodies.notes,
-        *_OF_ALL,
-        *told,
-        *((_OF_WALLS,) if run.starter.named("RWALL") else ()),
-    )
+    at_rest = after is None and _falls_from_rest(run, inventory, parts)
+    first_switch = wait.time if after is None else max(after, wait.time)
+    sensors = _write_sensors(contacts, wait.time, first_switch, bodies.sensor)
+    largest_step = float(f"{wait.time / _STEPS_PER_WAIT:.2g}")
+    files = _write_legs(run, bodies, sensors, largest_step, at_rest=at_rest)
+    reason = _explain_wait(wait)
+    if at_rest:
+        reason = f"at rest in free fall: rigid from 0; then {reason}"
+    of_radioss = [note.format(cap=largest_step) for note in _OF_RADIOSS]
+    of_walls = (_OF_WALLS,) if run.starter.named("RWALL") else ()
+    notes = (reason, *bodies.notes, *_OF_ALL, *of_radioss, *of_walls)
     head = "".join(f"# {line}\n" for line in comments([*notes, *PHYSICS]))
-    return First(
-        PrintedCard(head, (), files, starter=bodies.cards + sensors), wait, notes
-    )
+    card = PrintedCard(head, (), files, starter=bodies.cards + sensors.text)
+    return First(card, wait, notes)
 
 
 def _refuse_loads(starter: Starter) -> None:
+    """Raise DeckError if a load acts without a contact."""
     for card in starter.named(*_LOADS):
         raise DeckError(f"{card.at}: /{card.name} {_UNSEEN}")
 
 
-def _falls(run: Run, inventory: Inventory, parts: Collection[int]) -> bool:
-    """Whether the parts are at rest at first and gravity acts on them; nothing holds them."""
-    starter = run.starter
-    still = (
-        starter is not None
-        and not starter.named("INIVEL")
-        and not any(leg.starts for leg in run.legs)
-    )
-    return still and bool(inventory.boundary.gravity) and bool(parts)
+def _falls_from_rest(run: Run, inventory: Inventory, parts: Collection[int]) -> bool:
+    """Whether the parts are at rest at first and gravity acts on them; no support holds them."""
+    if run.starter is None or run.starter.named("INIVEL"):
+        return False
+    if any(leg.starts for leg in run.legs):
+        return False
+    return bool(inventory.boundary.gravity) and bool(parts)
 
 
-def _sensors(
-    forces: Sequence[tuple[str, int]], wait: float, start: float, first: int
-) -> tuple[str, int, int]:
-    """Write sensors: of a force within the wait, and of a flight; their text and the ids of both."""
-    texts, contact, free = list[str](), first, first + len(forces)
-    for number, (kind, what) in enumerate(forces, start=first):
-        row = f"{what:10d}{'NF':>10}{-1.0:20}{0.0:20}{0.0:20}"
-        texts.append(
-            f"/SENSOR/{kind}/{number}\nforce, or shortly after\n{shortest(wait, 20):>20}\n{row}\n"
+class _Sensors(NamedTuple):
+    """The cards of the sensors, and the ids of those of a contact force and of a flight."""
+
+    text: str
+    contact: int
+    flight: int
+
+
+def _write_sensors(
+    contacts: Sequence[tuple[str, int]], wait: float, first_switch: float, first_id: int
+) -> _Sensors:
+    """Write sensors of a contact force within the wait, and of a flight: no such force, from a first time on."""
+    cards: list[str] = []
+    for sensor, (kind, contact_id) in enumerate(contacts, start=first_id):
+        row = f"{contact_id:10d}{'NF':>10}{-1.0:20}{0.0:20}{0.0:20}"
+        cards.append(
+            f"/SENSOR/{kind}/{sensor}\nforce, or shortly after\n{shortest(wait, 20):>20}\n{row}\n"
         )
-    for other in range(first + 1, first + len(forces)):
-        texts.append(
-            f"/SENSOR/OR/{free}\nany force\n{0:20d}\n{contact:10d}{other:10d}\n"
+    any_force, next_id = first_id, first_id + len(contacts)
+    for sensor in range(first_id + 1, first_id + len(contacts)):
+        cards.append(
+            f"/SENSOR/OR/{next_id}\nany force\n{0:20d}\n{any_force:10d}{sensor:10d}\n"
         )
-        contact, free = free, free + 1
-    texts.append(f"/SENSOR/NOT/{free}\nno force\n{0:20d}\n{contact:10d}\n")
-    texts.append(f"/SENSOR/TIME/{free + 1}\nfrom then on\n{shortest(start, 20):>20}\n")
-    texts.append(f"/SENSOR/AND/{free + 2}\nflight\n{0:20d}\n{free:10d}{free + 1:10d}\n")
-    return "".join(texts), contact, free + 2
+        any_force, next_id = next_id, next_id + 1
+    no_force, late_enough, flight = next_id, next_id + 1, next_id + 2
+    start = f"{shortest(first_switch, 20):>20}"
+    cards += [
+        f"/SENSOR/NOT/{no_force}\nno force\n{0:20d}\n{any_force:10d}\n",
+        f"/SENSOR/TIME/{late_enough}\nfrom then on\n{start}\n",
+        f"/SENSOR/AND/{flight}\nflight\n{0:20d}\n{no_force:10d}{late_enough:10d}\n",
+    ]
+    return _Sensors("".join(cards), any_force, flight)
 
 
-def _waited(wait: Wait) -> str:
+def _write_legs(
+    run: Run, bodies: Bodies, sensors: _Sensors, largest_step: float, *, at_rest: bool
+) -> dict[str, str]:
+    """Write the engine files, deformable and rigid in turn; rigid first if the parts fall from rest."""
+    (leg,) = run.legs
+    other_nodes = tuple(node for node in kept_off(run.legs) if node not in bodies.nodes)
+    leg_count = _MOST_LEGS - at_rest
+    files = {}
+    for number in range(1, leg_count + 1):
+        rigid = number % 2 == at_rest
+        lines = [f"/RUN/{leg.name}/{number}", f"{leg.stop.value!r:>20}"]
+        if number < leg_count:
+            sensor = sensors.contact if rigid else sensors.flight
+            lines += ["/STOP/LSENSOR", str(sensor), "0 0 0 0 0 0"]
+        if rigid:
+            lines += ["/RBODY/ON", *listed(bodies.nodes), *capped(largest_step)]
+            lines += off(other_nodes)
+        else:
+            lines += off((*bodies.nodes, *other_nodes))
+        files[f"{leg.name}_{number:04d}.rad"] = "\n".join(lines) + "\n"
+    return files
+
+
+def _explain_wait(wait: Wait) -> str:
+    """Return the note on the wait."""
     return f"flight is {wait.time:.4g} without force: {wait.reason}"
 
 
 # LS-DYNA.
 
 
-def _ls_dyna(
+def _make_ls_dyna_card(
     path: str,
     inventory: Inventory,
     parts: Sequence[int],
     wait: Wait,
     after: float | None,
 ) -> First:
+    """Print the switch sets of an LS-DYNA run; DeckError if a flight would not show by the force of one contact."""
     deck = read_deck(path)
-    entities = read_entities(deck, "CONTACT")
-    able = [one for one in entities.found if one.triggers]
+    contact, keyword = _find_contact(path, deck)
+    part_ids = check_ids(parts)
+    printing = Printing(part=tuple(part_ids), bodies=inventory.bodies(part_ids))
+    rigid_set, deformable_set = printing.swset
+    offset, offset_note = _choose_offset(inventory, keyword)
+    notes = [_explain_wait(wait)]
+    falls_from_rest = bool(inventory.boundary.gravity) and not deck.named(
+        "INITIAL_VELOCITY"
+    )
+    if after is None and falls_from_rest:
+        notes.append("At rest in free fall: rigid from 0, TIME1 0.")
+    notes += [*_OF_ALL, *_OF_LS_DYNA, offset_note]
+    if after is None and not falls_from_rest:
+        notes.append(
+            "TIME1 is 0: give the time of the last push (--after) where it is known."
+        )
+    delay = wait.time / _DELAYS_PER_WAIT
+    lines = [f"$ {line}" for line in comments([*notes, *PHYSICS])]
+    lines += header(
+        rigid_set,
+        shortest(after or 0.0),
+        shortest(delay),
+        (len(part_ids), 0),
+        Waiting(2, contact, delay, deformable_set, 1),
+    )
+    lines += to_rigid(part_ids, printing)
+    lines += header(
+        deformable_set,
+        "0.0",
+        "0.0",
+        (0, len(part_ids)),
+        Waiting(4, contact, wait.time, rigid_set, -1, offset=offset),
+    )
+    lines += to_deformable(part_ids)
+    text = "\n".join(lines) + "\n"
+    return First(PrintedCard(text, (), {"switches.k": text}), wait, tuple(notes))
+
+
+def _find_contact(path: str, deck: Deck) -> tuple[int, str]:
+    """Return id and keyword of the one contact that a switch can wait for; DeckError without one or if loads act."""
     for card in deck.cards:
         if card.name.startswith(_PUSHES) and not card.name.startswith(_OF_GRAVITY):
-            raise DeckError(
-                f"{card.at}: *{card.name} pushes without a contact, so that a flight is not seen by contacts"
-            )
-    if not entities.all_known or len(able) != 1:
-        found = (
-            f"{len(able)} contacts"
-            if entities.all_known
-            else "contacts that are not all known"
-        )
+            raise DeckError(f"{card.at}: *{card.name} {_UNSEEN}")
+    entities = read_entities(deck, "CONTACT")
+    contacts = [contact for contact in entities.found if contact.triggers]
+    if not entities.all_known or len(contacts) != 1:
+        count = "contacts that are not all known"
+        if entities.all_known:
+            count = f"{len(contacts)} contacts"
         raise DeckError(
-            f"{path}: {found} between surfaces, or of nodes with a surface; one was expected: a switch waits for one,"
+            f"{path}: {count} between surfaces, or of nodes with a surface; one was expected: a switch waits for one,"
             " and single-surface contacts never trigger it"
         )
-    contact, ids = able[0].id or able[0].number, check_ids(parts)
-    printing = Printing(part=tuple(ids), bodies=inventory.bodies(ids))
-    one, other = printing.swset
-    falls = bool(inventory.boundary.gravity) and not deck.named("INITIAL_VELOCITY")
-    hint = (
-        "TIME1 is 0: give the time of the last push (--after) where it is known.",
-    ) * (after is None and not falls)
-    fall = ("At rest in free fall: rigid from 0, TIME1 0.",) * (after is None and falls)
-    offset, where = _offset(inventory, able[0].keyword)
-    notes = (_waited(wait), *fall, *_OF_ALL, *_OF_LS_DYNA, where, *hint)
-    lines = [f"$ {line}" for line in comments([*notes, *PHYSICS])]
-    short = wait.time / _SHORT
-    lines += header(
-        one,
-        shortest(after or 0.0),
-        shortest(short),
-        (len(ids), 0),
-        Waiting(2, contact, short, other, 1),
-    )
-    lines += to_rigid(ids, printing)
-    lines += header(
-        other,
-        "0.0",
-        "0.0",
-        (0, len(ids)),
-        Waiting(4, contact, wait.time, one, -1, offset=offset),
-    )
-    lines += to_deformable(ids)
-    text = "\n".join(lines) + "\n"
-    return First(PrintedCard(text, (), {"switches.k": text}), wait, notes)
+    return contacts[0].id or contacts[0].number, contacts[0].keyword
 
 
-def _offset(inventory: Inventory, keyword: str) -> tuple[float, str]:
-    """Give how far apart the surfaces of a contact are when the parts become deformable again [length], and say so."""
+def _choose_offset(inventory: Inventory, keyword: str) -> tuple[float, str]:
+    """Return the distance of the surfaces at which the parts become deformable again [length], with a note."""
     sections = [part.section for part in inventory.parts.values()]
-    thickest = max((one.thickness for one in sections if one.thickness), default=0.0)
+    thickest = max(
+        (section.thickness for section in sections if section.thickness), default=0.0
+    )
     if keyword.startswith("CONTACT_AUTOMATIC_") and thickest > 0:
-        offset = float(shortest(_CLEAR * thickest))
-        return (
-            offset,
-            f"OFFSET {offset:g}: the parts are deformable before the contact, {_CLEAR} shell thicknesses from it.",
+        offset = float(shortest(_OFFSET_THICKNESSES * thickest))
+        note = (
+            f"OFFSET {offset:g}: the parts are deformable before the contact, "
+            f"{_OFFSET_THICKNESSES} shell thicknesses from it."
         )
+        return offset, note
     return (
         0.0,
         "OFFSET 0: the parts become deformable in the contact; only automatic contacts of shells have a margin.",

@@ -1,9 +1,8 @@
-"""How parts swing inside a body, by what a run shows so far: what is to be waited for.
+"""Determine the wait: how long no force must act to count as flight, from how parts swing inside the body.
 
-Before it counts as flight nothing must act for half of the longest inner period.
-Inside a load contacts open and close again, as parts on springs swing to and fro: the longest gap is shorter than half
-of the longest period (measured: 13 of 17 ms in a falling box, 14 of 22 ms in a car).  A wait that is shorter takes
-such a gap for flight, and a body that is frozen there never makes the push that was to come.
+The wait is half of the longest inner period.  Inside a load, contacts open and close as parts swing on their springs,
+and the longest gap between them is shorter than that (measured: 13 of 17 ms in a falling box, 14 of 22 ms in a car).  A
+shorter wait treats such a gap as flight, and a body that is frozen in it never makes the push that was to come.
 """
 
 from __future__ import annotations
@@ -26,34 +25,35 @@ if TYPE_CHECKING:
     from d2rpick.deck.model import Inventory
     from d2rpick.histories.history import History, Momenta, Samples
 
-# A swing is one by this share of the range so far of a velocity.
+# A change of a velocity is a swing from this share of its range so far on.
 _SWING: Final = 1 / 3
-# From a tenth of a swing to nine tenths takes a harmonic motion this share of half its period: its ends may be flat.
-_INNER, _SHARE = 0.1, float(np.arccos(-0.8) - np.arccos(0.8)) / np.pi
-# A swing with less than this share of the strongest mean force of all is that of a body that turns.
-_SLOW: Final = 0.05
+# A swing is measured from 10 % to 90 % of its way, since its ends may be flat.  A harmonic motion takes this share of
+# half its period for that.
+_INNER, _INNER_TIME = 0.1, float(np.arccos(-0.8) - np.arccos(0.8)) / np.pi
+# A swing with less than this share of the strongest mean force so far is the rotation of a body.
+_ROTATION: Final = 0.05
 # A swing of fewer states is a jump, as of an energy in the first state.
-_RESOLVED: Final = 4
-# What moves at less than this share of the speed of all stands still against them.
-_SLOWEST: Final = 1e-3
-# What has swung for so many times its longest half period goes on for nobody knows how long.
-_LONGER: Final = 2.0
-# A swing that no push disturbed and that takes more than so many times half of the period of the deck is that of a body
-# that turns; one that was pushed counts as so long at most.
-_TURNS, _BEYOND = 1.5, 2.5
-# A period is known no better: a wait that is given may be so much shorter.
+_FEWEST_STATES: Final = 4
+# A part whose velocity against the others is less than this share of the velocity of all does not swing.
+_AT_REST: Final = 1e-3
+# A swing that has lasted for so many times the longest half period before it may last for any time.
+_MUCH_LONGER: Final = 2.0
+# A swing without a push that takes more than 1.5 times half of the period of the deck is the rotation of a body.  One
+# that was pushed is cut to 2.5 times that.
+_LONGEST_FREE, _LONGEST_PUSHED = 1.5, 2.5
+# A period is known to 10 %: a given wait may be shorter than half of it by so much.
 _EXACT: Final = 0.9
-# Parts of a smaller share of the mass move the others too little.
+# Parts with a smaller share of the mass hardly move the others.
 _HEAVY: Final = 0.05
-# Below this share of the largest energy so far the internal energy is round-off: nothing vibrates.
+# Internal energy below this share of the largest energy is round-off: nothing vibrates.
 _ROUND_OFF: Final = 1e-6
 
 
 class Wait(NamedTuple):
-    """Time without force that counts as flight [time], where it comes from and why.
+    """How long no force must act to count as flight [time], with its source and reason.
 
-    ``source``: "given", "record", "deck" or "at-rest".  ``least``: what half of a period of the deck cannot be below
-    [time]; else it is the wait itself.
+    ``source``: "given", "record", "deck" or "at-rest".  ``least`` is a lower bound of half of a period of the deck
+    [time]; None if that is the wait itself.
     """
 
     time: float
@@ -63,35 +63,42 @@ class Wait(NamedTuple):
 
 
 class _HalfPeriod(NamedTuple):
-    """Half a period of an inner motion from one time to another, ``known`` from a third one on [time].
+    """A swing: half a period of an inner motion from ``begin`` to ``end``, which shows at ``seen_at`` [time].
 
-    ``half`` is what it took [time], ``strength`` its mean change by time, 0 where it is less than a swing.
+    ``half`` is half of its period [time], ``strength`` its mean change by time, 0 if that is less than a swing.
     """
 
     begin: float
     end: float
-    known: float
+    seen_at: float
     half: float
     strength: float
 
 
-class _Motion:
-    """Something that swings by ``name``: the states of its ``values`` so far, and its swings.
+class _OngoingSwing(NamedTuple):
+    """A swing that is not over: its mean change by time, its duration, and the longest half period before it [time]."""
 
-    Half a period takes ``times`` as long as a swing of the values.
+    strength: float
+    duration: float
+    longest_half_before: float
+
+
+class _Motion:
+    """One quantity that swings, as the velocity of a part along an axis: its states and swings so far.
+
+    Half a period takes ``halves_per_swing`` swings of its values: 1 for a velocity, 2 for an energy.
     """
 
-    def __init__(self, name: str, times: float = 1.0) -> None:
-        self.name, self._times = name, times
-        self.has_own = False  # whether it has shown a swing that no push disturbed
+    def __init__(self, name: str, halves_per_swing: float = 1.0) -> None:
+        self.name, self._factor = name, halves_per_swing
+        self.has_free_swing = False  # whether it has swung once without a push
         self.swings: list[_HalfPeriod] = []
-        self._columns = {what: Column() for what in ("time", "values", "room")}
+        self._columns = {name: Column() for name in ("time", "values", "least_swing")}
         self._lowest, self._highest = np.inf, -np.inf
-        self._turn: int | None = (
-            None  # state of the last turn; None before anything moves
-        )
-        self._far, self._rising = 0, False
-        self._sets_out: float | None = None
+        # State of the last turn, None before anything moves, and of the extreme value since then.
+        self._turn: int | None = None
+        self._extreme, self._rising = 0, False
+        self._first_moved: float | None = None  # [time]
 
     @property
     def begins(self) -> float:
@@ -104,86 +111,101 @@ class _Motion:
         return float(self._columns["time"].rows[-1])
 
     def add(
-        self, time: Samples, values: Samples, least: Samples
+        self, time: Samples, values: Samples, least_swing: Samples
     ) -> Iterator[_HalfPeriod]:
-        """Append states (k,), whose least change that is a swing is at least ``least`` (k,); give the swings seen."""
+        """Append states (k,) and give the swings that show in them: changes of at least ``least_swing`` (k,)."""
         lows = np.minimum(np.minimum.accumulate(values), self._lowest)
         highs = np.maximum(np.maximum.accumulate(values), self._highest)
         self._lowest, self._highest = float(lows[-1]), float(highs[-1])
-        room = np.maximum(_SWING * (highs - lows), least)
+        limits = np.maximum(_SWING * (highs - lows), least_swing)
         begin = self._columns["time"].size
-        moved = np.flatnonzero(highs - lows > room)
-        for what, rows in (("time", time), ("values", values), ("room", room)):
-            self._columns[what].add(rows)
-        every, limits = self._columns["values"].rows, room.tolist()
+        self._columns["time"].add(time)
+        self._columns["values"].add(values)
+        self._columns["least_swing"].add(limits)
+        all_values = self._columns["values"].rows
+        skipped = 0
         if self._turn is None:
+            moved = np.flatnonzero(highs - lows > limits)
             if not moved.size:
                 return
-            state = begin + int(moved[0])
-            self._sets_out = float(time[moved[0]])
-            self._turn = _last_extreme(every[: state + 1])
-            self._far, self._rising = state, bool(every[state] > every[self._turn])
-            begin, limits = state, limits[int(moved[0]) :]
+            skipped = int(moved[0])
+            state = begin + skipped
+            self._first_moved = float(time[skipped])
+            self._turn = _find_last_extreme(all_values[: state + 1])
+            self._extreme = state
+            self._rising = bool(all_values[state] > all_values[self._turn])
+        new_values = values[skipped:].tolist()
+        new_limits = limits[skipped:].tolist()
         for state, (value, limit) in enumerate(
-            zip(every[begin:].tolist(), limits, strict=True), start=begin
+            zip(new_values, new_limits, strict=True), start=begin + skipped
         ):
-            yield from self._turned(state, value, limit, every)
+            swing = self._follow(state, value, limit, float(all_values[self._extreme]))
+            if swing is not None:
+                yield swing
 
-    def _turned(
-        self, state: int, value: float, room: float, every: Samples
-    ) -> Iterator[_HalfPeriod]:
-        """Follow the swing by a state; give it where the next one has gone back by its room."""
-        if (value >= every[self._far]) if self._rising else (value <= every[self._far]):
-            self._far = state
-        elif abs(every[self._far] - value) > room:
-            assert self._turn is not None
-            if self._far - self._turn >= _RESOLVED:
-                self.swings.append(
-                    self._half_period(self._turn, self._far, state, room)
-                )
-                yield self.swings[-1]
-            self._turn, self._far, self._rising = self._far, state, not self._rising
-
-    def _half_period(
-        self, begin: int, end: int, state: int, room: float
-    ) -> _HalfPeriod:
-        time, values = (
-            self._columns["time"].rows,
-            self._columns["values"].rows[begin : end + 1],
+    def _follow(
+        self, state: int, value: float, least_swing: float, extreme_value: float
+    ) -> _HalfPeriod | None:
+        """Follow the swing by a state; return it if the values have gone back by ``least_swing`` since its end."""
+        goes_on = value >= extreme_value if self._rising else value <= extreme_value
+        if goes_on:
+            self._extreme = state
+            return None
+        if abs(extreme_value - value) <= least_swing:
+            return None
+        assert self._turn is not None
+        swing = None
+        if self._extreme - self._turn >= _FEWEST_STATES:
+            swing = self._measure(self._turn, self._extreme, state, least_swing)
+            self.swings.append(swing)
+        self._turn, self._extreme, self._rising = (
+            self._extreme,
+            state,
+            not self._rising,
         )
-        way = np.abs(values - values[0])
-        begun = int(np.flatnonzero(way <= _INNER * way[-1])[-1])
-        ended = begun + int(np.argmax(way[begun:] >= (1 - _INNER) * way[-1]))
-        half = self._times * float(time[begin + ended] - time[begin + begun]) / _SHARE
-        strength = float(way[-1]) / half if way[-1] > room else 0.0
+        return swing
+
+    def _measure(
+        self, begin: int, end: int, state: int, least_swing: float
+    ) -> _HalfPeriod:
+        """Measure the swing between two states, which shows at a third one."""
+        time = self._columns["time"].rows
+        values = self._columns["values"].rows[begin : end + 1]
+        distance = np.abs(values - values[0])
+        whole = distance[-1]
+        low = int(np.flatnonzero(distance <= _INNER * whole)[-1])
+        high = low + int(np.argmax(distance[low:] >= (1 - _INNER) * whole))
+        inner_time = float(time[begin + high] - time[begin + low])
+        half = self._factor * inner_time / _INNER_TIME
+        strength = float(whole) / half if whole > least_swing else 0.0
         return _HalfPeriod(
             float(time[begin]), float(time[end]), float(time[state]), half, strength
         )
 
-    def going_on(self, now: float) -> tuple[float, float, float] | None:
-        """Tell what swings ``now``: its mean change by time, how long it has, and the longest half period before."""
+    def find_ongoing(self, now: float) -> _OngoingSwing | None:
+        """Return the swing that is not over ``now``; None if the motion has come to rest or is a rotation."""
         time, values = self._columns["time"].rows, self._columns["values"].rows
-        state = int(np.searchsorted(time, now, side="right")) - 1
-        if self._turn is None or self._sets_out is None or self._sets_out > now:
+        if self._turn is None or self._first_moved is None or self._first_moved > now:
             return None
-        before = [one for one in self.swings if one.known <= now]
-        turned = before[-1].end if before else self._sets_out
-        begin = int(np.searchsorted(time, turned))
-        room = float(self._columns["room"].rows[state])
-        change, lately = (
-            abs(float(values[state] - values[one]))
-            for one in (begin, (begin + state) // 2)
-        )
-        if change <= room or lately <= room / 2:
-            return None  # it has come to rest, or turns with the body
-        took = self._times * (now - turned)
-        return change / took, took, max((one.half for one in before), default=0.0)
+        state = int(np.searchsorted(time, now, side="right")) - 1
+        swings_before = [swing for swing in self.swings if swing.seen_at <= now]
+        turned_at = swings_before[-1].end if swings_before else self._first_moved
+        begin = int(np.searchsorted(time, turned_at))
+        middle = (begin + state) // 2
+        change = abs(float(values[state] - values[begin]))
+        change_of_late = abs(float(values[state] - values[middle]))
+        least_swing = float(self._columns["least_swing"].rows[state])
+        if change <= least_swing or change_of_late <= least_swing / 2:
+            return None
+        duration = self._factor * (now - turned_at)
+        longest = max((swing.half for swing in swings_before), default=0.0)
+        return _OngoingSwing(change / duration, duration, longest)
 
 
-class _Known(NamedTuple):
-    """What is known ``since`` a time: the longest ``half`` period, when it was ``over`` [time], and what it was of.
+class _Longest(NamedTuple):
+    """The longest half period that is known ``since`` a time: of what, and when that swing was ``over`` [time].
 
-    ``strength`` is that of the strongest mean force so far, ``swing`` the longest of all, pushed or not [time].
+    ``strength`` is the strongest mean change by time so far, ``swing`` half of the longest swing, pushed or not [time].
     """
 
     since: float
@@ -195,9 +217,9 @@ class _Known(NamedTuple):
 
 
 class InnerMotion:
-    """The wait that a record asks for at each of its states, by what it has shown of its inner motion up to there.
+    """The wait at each state of a record, from the inner motion up to there.
 
-    ``given`` is asked for by the user, ``before`` by the record of flights before [time], ``of_deck`` by the deck.
+    ``given`` is the wait of the user, ``of_deck`` the one of the deck, ``before`` that of earlier flights [time].
     """
 
     def __init__(
@@ -206,28 +228,26 @@ class InnerMotion:
         of_deck: Wait | None = None,
         before: float = 0.0,
     ) -> None:
-        self._given, self._floor = given, of_deck
-        self._springs = of_deck.time if of_deck else np.inf
+        self._given, self._least = given, of_deck
+        self._half_of_springs = of_deck.time if of_deck else np.inf
         if before > (of_deck.time if of_deck else 0.0):
-            self._floor = Wait(before, "record", "as in the flight before")
+            self._least = Wait(before, "record", "as in the flight before")
         self._evidence = Evidence()
-        self._motions: list[_Motion] = []  # of parts along axes
-        self._going_on: dict[
-            tuple[int, int], _Motion
-        ] = {}  # of these, as long as the same parts move
-        self._energy = _Motion("the internal energy", times=2.0)
+        self._part_motions: list[_Motion] = []
+        # Those of parts that still move, by the number of the part and of the axis.
+        self._going_on: dict[tuple[int, int], _Motion] = {}
+        self._energy = _Motion("the internal energy", halves_per_swing=2.0)
         self._heavy: tuple[int, ...] = ()
-        self._largest = self._highest = 0.0  # speed of the centre of mass, and energy
-        self._known: dict[bool, list[_Known]] = {
-            True: [],
-            False: [],
-        }  # by motions of parts; by the energy
+        self._largest_speed = self._largest_energy = 0.0
+        # What was known in the course of the record, ascending.
+        self._longest_of_parts: list[_Longest] = []
+        self._longest_of_energy: list[_Longest] = []
 
     @classmethod
     def of(
         cls, history: History, given: float | None = None, of_deck: Wait | None = None
     ) -> InnerMotion:
-        """Give that of a whole record."""
+        """Return the inner motion of a finished record."""
         evidence, motion = Evidence(), cls(given, of_deck)
         evidence.take(history)
         motion.take(history, evidence)
@@ -236,104 +256,111 @@ class InnerMotion:
     def take(self, states: History, evidence: Evidence) -> None:
         """Append states, which the ``evidence`` has taken already."""
         self._evidence = evidence
-        momenta = next(
-            (
-                one
-                for one in states.momenta
-                if one.parts is not None and one.masses is not None
-            ),
-            None,
-        )
-        for swing, motion in sorted(
-            self._of_parts(momenta) if momenta else (), key=lambda pair: pair[0].known
-        ):
-            self._learn(swing, motion)
-        for swing in self._of_energy(states):
+        for momenta in states.momenta:
+            if momenta.parts is not None and momenta.masses is not None:
+                swings = sorted(
+                    self._follow_parts(momenta), key=lambda pair: pair[0].seen_at
+                )
+                for swing, motion in swings:
+                    self._learn(swing, motion)
+                break
+        for swing in self._follow_energy(states):
             self._learn(swing, self._energy)
 
-    def _of_parts(self, momenta: Momenta) -> Iterator[tuple[_HalfPeriod, _Motion]]:
-        """Follow the momenta of heavy parts against the centre of mass of all that move."""
+    def _follow_parts(self, momenta: Momenta) -> Iterator[tuple[_HalfPeriod, _Motion]]:
+        """Follow the momenta of heavy parts against the centre of mass of all parts that move."""
         masses = momenta.masses
         assert masses is not None
-        assert momenta.parts is not None
-        for states, moving, believed in self._evidence.alike(momenta.time.size):
-            members = [i for i in moving if masses[i] > 0]
+        for states, moving, complete in self._evidence.alike(momenta.time.size):
+            members = [number for number in moving if masses[number] > 0]
             whole = float(masses[members].sum())
-            heavy = tuple(i for i in members if _HEAVY < masses[i] / whole < 1 - _HEAVY)
-            if heavy != self._heavy or not believed:
+            heavy = tuple(
+                number
+                for number in members
+                if _HEAVY < masses[number] / whole < 1 - _HEAVY
+            )
+            if heavy != self._heavy or not complete:
                 self._going_on.clear()
             self._heavy = heavy
-            if not heavy or not believed:
+            if not heavy or not complete:
                 continue
-            centre = momenta.values[states][:, members].sum(axis=1) / whole
-            fastest = np.maximum(
-                np.maximum.accumulate(np.abs(centre).max(axis=1)), self._largest
-            )
-            self._largest = float(fastest[-1])
-            for i in heavy:
-                against = momenta.values[states, i] - masses[i] * centre
-                for axis, values in enumerate(against.T):
-                    if (i, axis) not in self._going_on:
-                        self._going_on[i, axis] = _Motion(momenta.parts[i].name)
-                        self._motions.append(self._going_on[i, axis])
-                    motion = self._going_on[i, axis]
-                    for swing in motion.add(
-                        momenta.time[states], values, masses[i] * _SLOWEST * fastest
-                    ):
+            velocity = momenta.values[states][:, members].sum(axis=1) / whole
+            speeds = np.maximum.accumulate(np.abs(velocity).max(axis=1))
+            largest_speeds = np.maximum(speeds, self._largest_speed)
+            self._largest_speed = float(largest_speeds[-1])
+            for number in heavy:
+                relative = momenta.values[states, number] - masses[number] * velocity
+                least_swing = masses[number] * _AT_REST * largest_speeds
+                for axis, values in enumerate(relative.T):
+                    motion = self._get_motion(momenta, number, axis)
+                    for swing in motion.add(momenta.time[states], values, least_swing):
                         yield swing, motion
 
-    def _of_energy(self, states: History) -> Iterator[_HalfPeriod]:
+    def _get_motion(self, momenta: Momenta, number: int, axis: int) -> _Motion:
+        """Return the motion of a part along an axis; a new one if it has begun to move or to deform again."""
+        assert momenta.parts is not None
+        if (number, axis) not in self._going_on:
+            motion = _Motion(momenta.parts[number].name)
+            self._going_on[number, axis] = motion
+            self._part_motions.append(motion)
+        return self._going_on[number, axis]
+
+    def _follow_energy(self, states: History) -> Iterator[_HalfPeriod]:
         """Follow the internal energy, which swings twice as often as what deforms."""
         if not states.time.size:
             return
-        highest = np.maximum(
-            np.maximum.accumulate(np.abs(states.energy)), self._highest
-        )
-        self._highest = float(highest[-1])
-        yield from self._energy.add(states.time, states.energy, _SLOWEST * highest)
+        energies = np.maximum.accumulate(np.abs(states.energy))
+        largest = np.maximum(energies, self._largest_energy)
+        self._largest_energy = float(largest[-1])
+        yield from self._energy.add(states.time, states.energy, _AT_REST * largest)
 
     def _learn(self, swing: _HalfPeriod, motion: _Motion) -> None:
-        """Let a swing that is over make the wait longer: not that of a body that turns, nor one that was pushed.
+        """Lengthen the wait by a swing that is over, unless it was a rotation or a push disturbed it.
 
-        Where no deck tells anything, and this motion has not shown a swing without a push before, pushed ones count.
+        A pushed swing counts if there is no deck and this motion has not swung without a push before.
         """
         if swing.strength <= 0:
             return
-        so_far = self._known[motion is not self._energy]
+        of_energy = motion is self._energy
+        so_far = self._longest_of_energy if of_energy else self._longest_of_parts
         longest = (
             so_far[-1]
             if so_far
-            else _Known(swing.known, 0.0, 0.0, motion.name, swing.known, 0.0)
+            else _Longest(swing.seen_at, 0.0, 0.0, motion.name, swing.seen_at, 0.0)
         )
         strongest = max(longest.strength, swing.strength)
-        own = self._evidence.free_since(swing.end) <= swing.begin
-        motion.has_own |= own
-        inner = swing.strength >= _SLOW * strongest and not (
-            own and swing.half > _TURNS * self._springs
+        free = self._evidence.free_since(swing.end) <= swing.begin
+        motion.has_free_swing |= free
+        too_long = free and swing.half > _LONGEST_FREE * self._half_of_springs
+        is_vibration = swing.strength >= _ROTATION * strongest and not too_long
+        counts = is_vibration and (free or not (motion.has_free_swing or self._least))
+        swing_half = longest.swing
+        if is_vibration:
+            cut = min(swing.half, _LONGEST_PUSHED * self._half_of_springs)
+            swing_half = max(swing_half, cut)
+        longest = longest._replace(
+            since=swing.seen_at, strength=strongest, swing=swing_half
         )
-        counts = inner and (own or not (motion.has_own or self._floor))
-        half, who = (
-            (swing.half, motion.name)
-            if counts and swing.half > longest.half
-            else (longest.half, longest.name)
-        )
-        over = swing.known if half > longest.half else longest.over
-        longest_swing = max(
-            longest.swing, min(swing.half, _BEYOND * self._springs) if inner else 0.0
-        )
-        so_far.append(_Known(swing.known, half, strongest, who, over, longest_swing))
+        if counts and swing.half > longest.half:
+            longest = longest._replace(
+                half=swing.half, name=motion.name, over=swing.seen_at
+            )
+        so_far.append(longest)
 
     def needed(self, start: float, now: float) -> float | None:
-        """Wait [time], where nothing has acted from ``start`` to ``now``; None where it is not known yet.
+        """Return the wait for a flight since ``start``, by the states up to ``now`` [time]; None while it is unknown.
 
-        RangeError where the one that was given is over, and shorter than half of a known period.
+        Raises
+        ------
+        RangeError
+            If a given wait is over and is shorter than half of a known period.
         """
         wait = self.wait(start, now)
-        return wait and wait.time
+        return wait.time if wait else None
 
     def wait(self, start: float, now: float) -> Wait | None:
-        """Give the same with its reason."""
-        at_rest = self._at_rest(start, now)
+        """Return the wait as `needed`, with its reason."""
+        at_rest = self._is_at_rest(start, now)
         if self._given is None and at_rest:
             time = self._evidence.history.time
             return Wait(
@@ -341,88 +368,93 @@ class InnerMotion:
                 "at-rest",
                 f"nothing vibrates: {FEWEST} states are enough",
             )
-        known = self.longest(now)
+        longest = self.longest(now)
         if self._given is None:
-            return None if self._floor is None and self._swings_on(now) else known
+            unknown = self._least is None and self._has_long_ongoing_swing(now)
+            return None if unknown else longest
         if now - start >= self._given and not at_rest:
-            check_wait(self._given, known, ", ".join(self._evidence.history.source))
+            names = ", ".join(self._evidence.history.source)
+            check_wait(self._given, longest, names)
         return Wait(self._given, "given", "as given")
 
     def longest(self, now: float) -> Wait | None:
-        """Give half of the longest period that is known ``now``, by the deck or the record so far."""
-        known = self._so_far(now)
-        if known is None or known.half <= (self._floor.time if self._floor else 0.0):
-            return self._floor
-        reason = f"{known.name} took {known.half:.3g} for half a period that was over at {known.over:.6g}"
-        return Wait(known.half, "record", reason)
+        """Return half of the longest period that is known ``now``, from the deck or the record so far."""
+        longest = self._get_longest(now)
+        if longest is None or longest.half <= (
+            self._least.time if self._least else 0.0
+        ):
+            return self._least
+        reason = f"{longest.name} took {longest.half:.3g} for half a period that was over at {longest.over:.6g}"
+        return Wait(longest.half, "record", reason)
 
     def longest_swing(self, now: float) -> float:
-        """Longest half of a swing that is known ``now``, though a push may have made it longer [time]."""
-        known = self._so_far(now)
-        return max(
-            known.swing if known else 0.0, self._floor.time if self._floor else 0.0
-        )
+        """Return half of the longest swing that is known ``now``, even if a push lengthened it [time]."""
+        longest = self._get_longest(now)
+        of_record = longest.swing if longest else 0.0
+        return max(of_record, self._least.time if self._least else 0.0)
 
-    def _so_far(self, now: float) -> _Known | None:
-        known = self._known[any(one.begins <= now for one in self._motions)]
-        place = bisect_right(known, now, key=lambda one: one.since)
-        return known[place - 1] if place else None
+    def _get_longest(self, now: float) -> _Longest | None:
+        """Return what was known at a time: from the parts, or from the energy as long as no part moves."""
+        has_parts = any(motion.begins <= now for motion in self._part_motions)
+        so_far = self._longest_of_parts if has_parts else self._longest_of_energy
+        count = bisect_right(so_far, now, key=lambda longest: longest.since)
+        return so_far[count - 1] if count else None
 
-    def _at_rest(self, start: float, now: float) -> bool:
-        """Whether nothing has acted since the record began, and nothing vibrates."""
+    def _is_at_rest(self, start: float, now: float) -> bool:
+        """Whether no force has acted since the record began, and nothing vibrates."""
         history = self._evidence.history
         if history.time.size < FEWEST or start > history.time[FEWEST - 1]:
             return False
-        balance = history.balance
-        terms = (
-            (balance.internal, balance.kinetic, balance.external_work)
-            if balance
-            else ()
-        )
+        energies = [history.energy]
+        if balance := history.balance:
+            terms = (balance.internal, balance.kinetic, balance.external_work)
+            energies += [term for term in terms if term is not None]
         inside = window(history.time, start, now)
-        energies = [
-            float(np.abs(one[inside]).max())
-            for one in (history.energy, *terms)
-            if one is not None
-        ]
-        return energies[0] <= _ROUND_OFF * max(energies)
+        largest = [float(np.abs(energy[inside]).max()) for energy in energies]
+        return largest[0] <= _ROUND_OFF * max(largest)
 
-    def _swings_on(self, now: float) -> bool:
-        """Whether something swings that has taken much longer already than all of its swings before."""
-        known = self._so_far(now)
-        strongest = known.strength if known else 0.0
-        of_parts = [one for one in self._motions if one.begins <= now <= one.ends]
-        going = (one.going_on(now) for one in of_parts or [self._energy])
-        return any(
-            s >= _SLOW * strongest and took > _LONGER * before
-            for s, took, before in filter(None, going)
-        )
+    def _has_long_ongoing_swing(self, now: float) -> bool:
+        """Whether a swing goes on that has taken much longer already than all swings before it."""
+        longest = self._get_longest(now)
+        strongest = longest.strength if longest else 0.0
+        motions = [
+            motion
+            for motion in self._part_motions
+            if motion.begins <= now <= motion.ends
+        ]
+        for motion in motions or [self._energy]:
+            swing = motion.find_ongoing(now)
+            if (
+                swing is not None
+                and swing.strength >= _ROTATION * strongest
+                and swing.duration > _MUCH_LONGER * swing.longest_half_before
+            ):
+                return True
+        return False
 
 
 def wait_of_deck(inventory: Inventory) -> Wait | None:
-    """Give half of the longest period of the springs of a deck; None where these are not known."""
-    found = inner_period(inventory)
-    if found is None:
+    """Return half of the longest period of the springs of a deck; None if the deck does not define it."""
+    period = inner_period(inventory)
+    if period is None:
         return None
-    return Wait(
-        found.time / 2,
-        "deck",
-        f"half of the period {found.time:.3g} of {found.reason}",
-        found.least / 2,
-    )
+    reason = f"half of the period {period.time:.3g} of {period.reason}"
+    return Wait(period.time / 2, "deck", reason, period.least / 2)
 
 
-def check_wait(given: float, known: Wait | None, name: str) -> None:
-    """RangeError where a wait that was given is below half of what a known period cannot be below."""
-    least = known and (known.time if known.least is None else known.least)
-    if known and least and given < _EXACT * least:
+def check_wait(given: float, longest: Wait | None, name: str) -> None:
+    """Raise RangeError if a given wait is shorter than half of a known period."""
+    if longest is None:
+        return
+    shortest = longest.time if longest.least is None else longest.least
+    if shortest and given < _EXACT * shortest:
         raise RangeError(
-            f"{name}: `wait` {given:g} is below {least:.3g}, half of a period that is known: {known.reason}; "
+            f"{name}: `wait` {given:g} is below {shortest:.3g}, half of a period that is known: {longest.reason}; "
             "a gap in the load would pass for flight"
         )
 
 
-def _last_extreme(values: Samples) -> int:
-    """Last state at which values (n,) are as far from the last of them as they ever are."""
-    away = np.abs(values - values[-1])
-    return int(np.flatnonzero(away == away.max())[-1])
+def _find_last_extreme(values: Samples) -> int:
+    """Return the last state at which values (n,) are farthest from their last one."""
+    distance = np.abs(values - values[-1])
+    return int(np.flatnonzero(distance == distance.max())[-1])

@@ -1,4 +1,4 @@
-"""The record of a run that is being computed, joined from the states that each look at it has added."""
+"""The record of a run that is being computed: every look appends states to it."""
 
 from __future__ import annotations
 
@@ -11,99 +11,145 @@ from d2rpick.base.errors import HistoryError
 from d2rpick.histories.history import Given
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from d2rpick.histories.history import Balance, History, Momenta
 
     Table = History | Momenta | Balance
 
+# Rows for which a column has room from the start.
 _FEWEST_ROWS: Final = 64
 
 
 class Column:
-    """An array that grows by rows without being copied each time."""
+    """An array that grows by rows and is copied only when its room doubles."""
 
     def __init__(self) -> None:
-        self._held: NDArray[Any] = np.empty(0)
+        self._room: NDArray[Any] = np.empty(0)
         self.size = 0
 
     def add(self, rows: NDArray[Any]) -> None:
         """Append ``rows`` of shape (k, ...)."""
         size = self.size + len(rows)
-        if size > len(self._held):
-            longer = np.empty(
-                (max(2 * size, _FEWEST_ROWS), *rows.shape[1:]), rows.dtype
-            )
+        if size > len(self._room):
+            row_count = max(2 * size, _FEWEST_ROWS)
+            longer = np.empty((row_count, *rows.shape[1:]), rows.dtype)
             longer[: self.size] = self.rows if self.size else 0
-            self._held = longer
-        self._held[self.size : size] = rows
+            self._room = longer
+        self._room[self.size : size] = rows
         self.size = size
 
     @property
     def rows(self) -> NDArray[Any]:
-        """All rows so far, a view."""
-        return self._held[: self.size]
+        """All rows so far, as a view."""
+        return self._room[: self.size]
 
 
 class GrowingRecord:
-    """All states of a run so far: energy, momenta and balance, each a table of which every look has added some rows."""
+    """All states of a run so far, as columns of three kinds of tables: the history, its momenta and its balance."""
 
     def __init__(self) -> None:
-        self._latest: list[Table] = []
+        self._latest_tables: list[Table] = []
         self._columns: list[dict[str, Column]] = []
         self._history: History | None = None
 
     def add(self, states: History) -> None:
-        """Append states that follow those so far; HistoryError where they hold other quantities."""
-        bare = replace(
-            states, part_energies=None, part_names=()
-        )  # many numbers, of which none is needed
-        self._latest = [
-            bare,
-            *states.momenta,
-            *([states.balance] if states.balance else []),
-        ]
-        arrays = [_arrays(table) for table in self._latest]
+        """Append states; HistoryError if they have other quantities than the states so far."""
+        tables = list_tables(states)
+        self._latest_tables = tables
+        arrays = [_get_arrays(table) for table in tables]
         if not self._columns:
-            self._columns = [{name: Column() for name in one} for one in arrays]
-        if [one.keys() for one in arrays] != [one.keys() for one in self._columns]:
+            self._columns = [{name: Column() for name in table} for table in arrays]
+        if [table.keys() for table in arrays] != [
+            table.keys() for table in self._columns
+        ]:
             raise HistoryError(
                 "the states that were added hold other quantities than those before them"
             )
-        for columns, one in zip(self._columns, arrays, strict=True):
-            for name, rows in one.items():
+        for columns, table in zip(self._columns, arrays, strict=True):
+            for name, rows in table.items():
                 columns[name].add(rows)
         self._history = None
 
     @property
     def history(self) -> History:
-        """All states as one history; there are some."""
+        """All states as one history; there must be some."""
         if self._history is None:
             tables: list[Any] = []
-            for table, columns in zip(self._latest, self._columns, strict=True):
+            for table, columns in zip(self._latest_tables, self._columns, strict=True):
                 rows: dict[str, Any] = {
                     name: column.rows for name, column in columns.items()
                 }
                 tables.append(replace(table, **rows))
-            history, *others = tables
-            count = len(history.momenta)
-            given = Given(
-                tuple(others[:count]), next(iter(others[count:]), None), history.masses
-            )
-            self._history = replace(history, evidence=given)
+            self._history = _join_tables(tables)
         return self._history
 
 
-def _arrays(table: Table) -> dict[str, NDArray[Any]]:
-    """Give those arrays of a table that have a row for each of its times."""
-    values = {
-        one.name: getattr(table, one.name)
-        for one in fields(table)
-        if one.init and one.name != "masses"
-    }
+def list_tables(history: History) -> list[Table]:
+    """Return the history itself, each of its momenta, and its balance if there is one.
+
+    The energies of single parts, many numbers that are not needed here, are left out.
+    """
+    tables: list[Table] = [replace(history, part_energies=None, part_names=())]
+    tables += history.momenta
+    if history.balance:
+        tables.append(history.balance)
+    return tables
+
+
+def _join_tables(tables: Sequence[Any]) -> History:
+    """Return the history of which these are the tables, in the order of `list_tables`."""
+    history, *evidence = tables
+    momenta_count = len(history.momenta)
+    momenta, balances = evidence[:momenta_count], evidence[momenta_count:]
+    balance = balances[0] if balances else None
+    written = Given(tuple(momenta), balance, history.masses)
+    joined: History = replace(history, evidence=written)
+    return joined
+
+
+def skip_states(history: History, known: Sequence[Table]) -> History | None:
+    """Return the states of a history after those of ``known`` tables; None if it does not begin with these.
+
+    The times of all states are compared, and all values of the last known one.
+    """
+    tables = list_tables(history)
+    if len(tables) != len(known):
+        return None
+    new_tables: list[Any] = []
+    for table, known_table in zip(tables, known, strict=True):
+        arrays, known_arrays = _get_arrays(table), _get_arrays(known_table)
+        count = known_table.time.size
+        if not count or arrays.keys() != known_arrays.keys():
+            return None
+        if not np.array_equal(table.time[:count], known_table.time):
+            return None
+        for name, rows in arrays.items():
+            last, known_last = rows[count - 1], known_arrays[name][-1]
+            if not np.array_equal(last, known_last, equal_nan=True):
+                return None
+        new_rows: dict[str, Any] = {name: rows[count:] for name, rows in arrays.items()}
+        new_tables.append(replace(table, **new_rows))
+    return _join_tables(new_tables)
+
+
+def find_momenta(history: History, *, of_parts: bool) -> Momenta | None:
+    """Return the momenta of the parts, or of the whole model; None if they are not written."""
+    for momenta in history.momenta:
+        if (momenta.parts is not None) is of_parts:
+            return momenta
+    return None
+
+
+def _get_arrays(table: Table) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a table with one row for each of its times, by name."""
+    names = [field.name for field in fields(table) if field.init]
+    values = {name: getattr(table, name) for name in names if name != "masses"}
     size = table.time.size
     return {
-        name: one
-        for name, one in values.items()
-        if isinstance(one, np.ndarray) and len(one) == size
+        name: value
+        for name, value in values.items()
+        if isinstance(value, np.ndarray) and len(value) == size
     }

@@ -1,7 +1,7 @@
-"""Which leg comes next in a first run that is switched while it runs: from what the legs so far have shown.
+"""Choose the next leg of a first run that switches itself, from what the legs so far have shown.
 
-A leg ends at a time that was fixed before it began, so that the same command computes the same legs, however fast the
-machine is.  One that is thrown away has the number of the leg that takes its place.
+The end of a leg is fixed before the leg begins.  The same command therefore computes the same legs, however fast the
+machine is.  A leg that replaces a discarded one gets its number.
 """
 
 from __future__ import annotations
@@ -15,34 +15,36 @@ from d2rpick.flight.window import FEWEST
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+# Kinds of legs: deformable; rigid, and the flight may end in it; rigid again up to the td that is known by now.
 LOAD, PROBE, RIGID = "load", "probe", "rigid"
 RIGID_KINDS: Final = (PROBE, RIGID)
-# Where a leg ends, its history does so up to one state earlier; times within it are the same.
+# Two times are the same if they differ by less than so many states: the history of a leg may end one state early.
 _STATES: Final = 1.5
-# The solver numbers so many legs; flights are looked for as long as so many are left, which takes the run to its end.
+# The solver numbers legs from 1 to 99.  With 10 left, no further flight is switched: the run must reach its end.
 _MOST_LEGS, _KEPT_BACK = 99, 10
-# A leg while nothing acts is at least this share of the wait: at one of its ends the energy is higher.
+# Shortest deformable leg in a flight, as a share of the wait: one of its two ends has the higher energy.
 _LEAST: Final = 0.25
-# A leg where nothing tells how long to wait, of the run.
+# Length of a deformable leg while no wait is known, as a share of the run.
 _UNKNOWN: Final = 0.02
-# A leg of a probe lasts for the wait, this share of what it has flown, or of the run: what it computes too much costs
-# some hundredths of a deformable run of the flight, and so does a leg more.
+# Length of a probe: at least these shares of its rigid time so far and of the run.  A longer probe computes more after
+# the contact, a shorter one needs more restarts; each costs a few percent of a deformable flight.
 _OF_FLOWN, _OF_RUN = 0.4, 0.02
-# The restart of a leg, written and read, costs as much as so many deformable cycles (some five, measured).
+# Cost of writing and reading a restart, in deformable cycles (about 5 were measured).
 _RESTART: Final = 10
-# A flight of fewer half swings is too short to be switched: what still swings touches the ground at another time than
-# the body that is frozen does.  Two soft boxes that bounced low landed 33 and 55 ms late when rigid, after 2.4 and 2.8
-# of them; of cars and boxes that flew for 3.2 of them and more the landing moved by 3.4 ms at most.
+# Shortest flight that is switched, in half swings of its slowest vibration.  A vibrating body touches the ground at
+# another time than a frozen one.  Rigid after flights of 2.4 and 2.8 half swings, two soft boxes landed 33 and 55 ms
+# late; after 3.2 and more, cars and boxes landed within 3.4 ms.
 _SWINGS: Final = 3.0
-# A window moves the landing behind it by up to 2 ms, the one after that by up to 37 ms (two computed boxes): one that
-# saves less than this share of a deformable run is not worth that.
+# Least share of a deformable run that a window must save.  A window moves its own landing by up to 2 ms and the landing
+# after that by up to 37 ms (two computed boxes), which a smaller saving is not worth.
 _WORTH: Final = 0.04
 
 
 class Limits(NamedTuple):
-    """What the legs keep to [time]: ``shortest`` is the least margin.
+    """Limits that all legs keep [time].
 
-    ``interval`` is that of the history.  ``rigid_cycle`` is what a cycle of rigid parts costs, of a deformable one [-].
+    ``interval`` is the interval of the history, ``shortest`` the least margin, ``margin`` the one the user gave.
+    ``rigid_cycle`` is the cost of a cycle with rigid parts over the cost of a deformable cycle [-].
     """
 
     end: float
@@ -52,49 +54,72 @@ class Limits(NamedTuple):
     rigid_cycle: float = 0.5
 
     def margin_of(self, flight: float, *, idle: bool = False) -> float:
-        """Margin before the contact at the end of a flight of this length [time]; ``idle``: nothing vibrates in it."""
+        """Return the margin before the contact that ends a flight of this length [time].
+
+        If nothing vibrates (``idle``), a rigid body flies like the deformable one, and the least margin is enough.
+        Otherwise the margin is at least a share of the flight that was enough in 8 windows of two structures.
+        """
         if self.margin is not None:
             return self.margin
-        # the share held in eight windows of two structures; where nothing vibrates the rigid body flies as the
-        # deformable one would, and the least margin is enough
-        return (
-            self.shortest
-            if idle and self.shortest
-            else max(self.shortest, SHARE * flight)
-        )
+        if idle and self.shortest:
+            return self.shortest
+        return max(self.shortest, SHARE * flight)
 
     @property
     def same(self) -> float:
-        """By less than this times differ that are the same."""
+        """Two times that differ by less are the same [time]."""
         return _STATES * self.interval
+
+    def until_end(self, until: float) -> float:
+        """Return ``until``, or the end of the run if that is as near as makes no difference [time]."""
+        return until if until < self.end - self.same else self.end
 
 
 class Order(NamedTuple):
     """A leg to be computed, from the end of the leg before it to ``until`` [time].
 
-    Flights that began before ``after`` are not switched any more [time].
+    Flights that began before ``switch_after`` are no longer switched [time].
     """
 
     kind: str
     number: int
     start: float
     until: float
-    after: float = 0.0
+    switch_after: float = 0.0
 
     @property
     def rigid(self) -> bool:
-        """Whether the parts are rigid in it."""
+        """Whether the parts are rigid in this leg."""
         return self.kind in RIGID_KINDS
 
+    def following(self, kind: str, until: float) -> Order:
+        """Return the order of a leg that goes on from the end of this one."""
+        return Order(kind, self.number + 1, self.until, until, self.switch_after)
 
-class Seen(NamedTuple):
+
+class Findings(NamedTuple):
     """What the record shows up to the end of a leg.
 
-    ``free``: since when no force acts [time]; ``wait``: how long that is asked for [time], None where it is not known,
-    and ``why``; ``flies``: whether it has lasted for so long; ``tr``: the end of the leg with the higher energy [time];
-    ``idle``: no energy was ever stored; ``short``: begin and end of flights in the leg that did not last for the wait;
-    ``contact``: the first one of the rigid body [time]; ``swing``: the longest half of a swing so far, pushed or not
-    [time].
+    Attributes
+    ----------
+    free : float
+        Time since which no force has acted [time].
+    wait : float or None
+        How long no force must act to count as flight [time]; None while nothing determines it.
+    why : str
+        Reason of the wait.
+    flies : bool
+        Whether no force has acted for the wait.
+    tr : float
+        End of the leg, its first or last, with the higher internal energy [time].
+    idle : bool
+        Whether the parts have never stored internal energy.
+    short : tuple of (float, float)
+        Start and end of each flight in the leg that was shorter than the wait [time].
+    contact : float or None
+        First contact of the rigid body [time].
+    swing : float
+        Half of the longest swing so far, even if a push lengthened it [time].
     """
 
     free: float = 0.0
@@ -109,28 +134,28 @@ class Seen(NamedTuple):
 
 
 class Leg(NamedTuple):
-    """A leg that is over; ``cycles`` and processor time ``cpu`` [s] are None where unknown."""
+    """A computed leg, with its ``cycles`` and processor time ``cpu`` [s], None if its listing does not contain them."""
 
     order: Order
-    seen: Seen
+    findings: Findings
     cycles: int | None = None
     cpu: float | None = None
 
     @property
     def kind(self) -> str:
-        """What it was ordered for."""
+        """Kind of the leg: load, probe or rigid."""
         return self.order.kind
 
     @property
     def length(self) -> float:
-        """How long it was [time]."""
+        """How long the leg is [time]."""
         return self.order.until - self.order.start
 
 
 class Window(NamedTuple):
-    """A flight that was switched, or left out with a ``reason``; ``free`` since when, ``contact`` when seen rigid.
+    """A flight that was switched at ``tr`` and ``td``, or was left deformable for a ``reason``.
 
-    One that is left out is deformable from ``tr`` to ``td`` all the same.
+    ``free`` is the start of the flight, ``contact`` the first contact of the rigid body, None if the run ended before.
     """
 
     free: float
@@ -141,28 +166,30 @@ class Window(NamedTuple):
     reason: str | None = None
 
 
-def next_order(legs: Sequence[Leg], limits: Limits) -> Order | None:
-    """Say which leg comes next; None when the run is over.
+def choose_next_leg(legs: Sequence[Leg], limits: Limits) -> Order | None:
+    """Choose the next leg; None when the run is over.
 
-    D2RPickError where the solver has no number for one more.
+    Raises
+    ------
+    D2RPickError
+        If the solver has no number for one more leg.
     """
-    if not legs:  # as many states as show a fall of parts that are at rest
+    if not legs:  # so many states show that parts at rest fall
         return Order(LOAD, 1, 0.0, min((FEWEST + 2) * limits.interval, limits.end))
     last = legs[-1].order
-    if last.rigid and legs[-1].seen.contact is not None:
-        order: Order | None = _before_contact(legs, limits)
+    if last.rigid and legs[-1].findings.contact is not None:
+        order: Order | None = _return_before_contact(legs, limits)
     elif last.until >= limits.end:
         order = None
     elif last.kind == PROBE:
-        order = _following(
-            last, PROBE, _probed(legs, _became_rigid(legs).start, limits)
+        tr = _get_first_rigid_leg(legs).start
+        order = last.following(
+            PROBE, _determine_probe_end(legs, tr, last.until, limits)
         )
     elif last.kind == RIGID:
-        order = _following(last, LOAD, _loaded(legs[-1], limits))._replace(
-            after=last.until
-        )
+        order = _follow_window(last, legs[-1], limits)
     else:
-        order = _after_load(legs, limits)
+        order = _follow_load(legs, limits)
     if order and order.number > _MOST_LEGS:
         raise D2RPickError(
             f"the run needs more than {_MOST_LEGS} legs, which the solver cannot number; raise `wait`"
@@ -170,151 +197,172 @@ def next_order(legs: Sequence[Leg], limits: Limits) -> Order | None:
     return order
 
 
-def _following(last: Order, kind: str, until: float) -> Order:
-    return Order(kind, last.number + 1, last.until, until, last.after)
+def _follow_window(last: Order, leg: Leg, limits: Limits) -> Order:
+    """Order a deformable leg after td; the flight in which the window ends is not switched again."""
+    load = last.following(LOAD, _determine_load_end(leg, limits))
+    return load._replace(switch_after=last.until)
 
 
-def _after_load(legs: Sequence[Leg], limits: Limits) -> Order:
-    last, seen = legs[-1].order, legs[-1].seen
+def _follow_load(legs: Sequence[Leg], limits: Limits) -> Order:
+    """Order a probe if a flight was seen and can still pay, else one more deformable leg."""
+    last, findings = legs[-1].order, legs[-1].findings
     switches = (
-        seen.flies
-        and seen.free >= last.after
+        findings.flies
+        and findings.free >= last.switch_after
         and limits.end - last.until > _WORTH * limits.end
+        and last.number <= _MOST_LEGS - _KEPT_BACK
     )
-    if not switches or last.number > _MOST_LEGS - _KEPT_BACK:
-        return _following(last, LOAD, _loaded(legs[-1], limits))
-    if seen.idle or seen.tr > last.start:
-        return _following(last, PROBE, _probed(legs, last.until, limits))
-    return last._replace(
-        kind=PROBE, until=_probed(legs, last.start, limits, now=last.start)
-    )
+    if not switches:
+        return last.following(LOAD, _determine_load_end(legs[-1], limits))
+    if findings.idle or findings.tr > last.start:
+        return last.following(
+            PROBE, _determine_probe_end(legs, last.until, last.until, limits)
+        )
+    # The energy was higher where the leg began: the probe replaces the leg.
+    until = _determine_probe_end(legs, last.start, last.start, limits)
+    return last._replace(kind=PROBE, until=until)
 
 
-def _loaded(leg: Leg, limits: Limits) -> float:
-    """When a deformable leg after this one ends: when a flight that has begun, or may begin now, lasts for the wait."""
-    now, seen, numbers = (
-        leg.order.until,
-        leg.seen,
-        _MOST_LEGS - _KEPT_BACK - leg.order.number,
-    )
-    if numbers <= 0:
+def _determine_load_end(leg: Leg, limits: Limits) -> float:
+    """Return when a deformable leg after this one ends: when a flight of now, or of before, has lasted for the wait."""
+    now, findings = leg.order.until, leg.findings
+    legs_left = _MOST_LEGS - _KEPT_BACK - leg.order.number
+    if legs_left <= 0:
         return limits.end
-    free = (
-        seen.free
-        if not leg.order.rigid and seen.free >= leg.order.after and not seen.flies
-        else now
+    in_flight = (
+        not leg.order.rigid
+        and findings.free >= leg.order.switch_after
+        and not findings.flies
     )
-    wait = seen.wait or _UNKNOWN * limits.end
-    until = max(free + wait, now + _LEAST * wait, now + (limits.end - now) / numbers)
-    return until if until < limits.end - limits.same else limits.end
+    flight_start = findings.free if in_flight else now
+    wait = findings.wait or _UNKNOWN * limits.end
+    until = max(
+        flight_start + wait,
+        now + _LEAST * wait,
+        now + (limits.end - now) / legs_left,
+    )
+    return limits.until_end(until)
 
 
-def _probed(
-    legs: Sequence[Leg], tr: float, limits: Limits, now: float | None = None
+def _determine_probe_end(
+    legs: Sequence[Leg], tr: float, now: float, limits: Limits
 ) -> float:
-    """When the next leg of a probe that began at ``tr`` ends."""
-    now = legs[-1].order.until if now is None else now
-    until = now + max(
-        _flown(legs).wait or 0.0,
+    """Return when a leg ends that begins ``now`` in a probe that began at ``tr``."""
+    length = max(
+        _get_flight_findings(legs).wait or 0.0,
         _OF_FLOWN * (now - tr),
         _OF_RUN * limits.end,
         FEWEST * limits.interval,
     )
-    return until if until < limits.end - limits.same else limits.end
+    return limits.until_end(now + length)
 
 
-def _before_contact(legs: Sequence[Leg], limits: Limits) -> Order:
-    """Go on from the last leg of a probe that ended before td, or deformable where the window does not pay."""
-    window, first = window_of(legs, limits), _became_rigid(legs)
+def _return_before_contact(legs: Sequence[Leg], limits: Limits) -> Order:
+    """Order the leg that ends the window at its td; if the window does not pay, a deformable leg in its place."""
+    window, first = find_window(legs, limits), _get_first_rigid_leg(legs)
+    findings = _get_flight_findings(legs)
     if window.reason:
         number, now = first.number, first.start
-        until = _loaded(Leg(Order(RIGID, number - 1, now, now), _flown(legs)), limits)
-        return Order(LOAD, number, now, until, after=now + limits.same)
-    before = [one for one in together(legs[-1].order, legs) if one.until <= window.td]
-    last = before[-1] if before else None
-    if last is None:
-        return first._replace(kind=RIGID, until=window.td)
-    if last.until == window.td:
-        until = _loaded(Leg(last, _flown(legs)), limits)
-        return _following(last, LOAD, until)._replace(after=last.until)
-    return _following(last, RIGID, window.td)
-
-
-def window_of(legs: Sequence[Leg], limits: Limits) -> Window:
-    """Give the window before the contact that the last of these legs has shown, or the end of the run without one."""
-    tr, before, contact = _became_rigid(legs).start, _flown(legs), legs[-1].seen.contact
-    wait = before.wait or 0.0
-    if contact is None:
-        return Window(before.free, tr, legs[-1].order.until, None, wait)
-    flight = contact - before.free
-    td = contact - limits.margin_of(flight, idle=before.idle)
-    ends = [
-        one.until
-        for one in together(legs[-1].order, legs)
-        if 0 <= td - one.until <= limits.same
+        until = _determine_load_end(
+            Leg(Order(RIGID, number - 1, now, now), findings), limits
+        )
+        return Order(LOAD, number, now, until, switch_after=now + limits.same)
+    kept_legs = [
+        order
+        for order in collect_joined_legs(legs[-1].order, legs)
+        if order.until <= window.td
     ]
-    td = max(ends, default=td)  # a leg that ended there need not go on by a state
-    reason = _why_left_out(legs, td - tr, limits)
-    if not before.idle and flight < _SWINGS * before.swing:
-        reason = f"shorter than {_SWINGS:g} half swings of {before.swing:.3g}: its landing is not known"
-    return Window(before.free, tr, td, contact, wait, reason)
+    if not kept_legs:
+        return first._replace(kind=RIGID, until=window.td)
+    last = kept_legs[-1]
+    if last.until == window.td:
+        return _follow_window(last, Leg(last, findings), limits)
+    return last.following(RIGID, window.td)
 
 
-def _why_left_out(legs: Sequence[Leg], rigid_time: float, limits: Limits) -> str | None:
-    """Say why a window is not worth its probe and restarts, by the cycles so far: processor times differ each time."""
+def find_window(legs: Sequence[Leg], limits: Limits) -> Window:
+    """Return the window before the contact that the last leg has shown; without a contact, up to the end of the run."""
+    tr, findings, contact = (
+        _get_first_rigid_leg(legs).start,
+        _get_flight_findings(legs),
+        legs[-1].findings.contact,
+    )
+    wait = findings.wait or 0.0
+    if contact is None:
+        return Window(findings.free, tr, legs[-1].order.until, None, wait)
+    flight = contact - findings.free
+    td = contact - limits.margin_of(flight, idle=findings.idle)
+    leg_ends = [
+        order.until
+        for order in collect_joined_legs(legs[-1].order, legs)
+        if 0 <= td - order.until <= limits.same
+    ]
+    td = max(leg_ends, default=td)  # no leg for less than two states
+    reason = _explain_too_little_saved(legs, td - tr, limits)
+    if not findings.idle and flight < _SWINGS * findings.swing:
+        reason = f"shorter than {_SWINGS:g} half swings of {findings.swing:.3g}: its landing is not known"
+    return Window(findings.free, tr, td, contact, wait, reason)
+
+
+def _explain_too_little_saved(
+    legs: Sequence[Leg], rigid_time: float, limits: Limits
+) -> str | None:
+    """Say why a window does not pay for its probe and restarts; None if it does.
+
+    Cycles decide, since processor times differ each time and the same command must compute the same run.
+    """
     if rigid_time <= 0:
         return "its margin begins before tr"
-    frozen = _became_rigid(legs)
-    probed = [
-        leg for leg in legs if leg.order.rigid and leg.order.start >= frozen.start
-    ]
-    took = sum((leg.cycles or 0) * limits.rigid_cycle + _RESTART for leg in probed)
-    saved = (rigid_time - took / _cycles(legs)) / limits.end
-    return (
-        None
-        if saved >= _WORTH
-        else f"saves {max(saved, 0.0):.1%} of the run, less than {_WORTH:.0%}"
+    tr = _get_first_rigid_leg(legs).start
+    rigid_legs = [leg for leg in legs if leg.order.rigid and leg.order.start >= tr]
+    cost = sum((leg.cycles or 0) * limits.rigid_cycle + _RESTART for leg in rigid_legs)
+    saved = (rigid_time - cost / _count_deformable_cycles(legs)) / limits.end
+    if saved >= _WORTH:
+        return None
+    return f"saves {max(saved, 0.0):.1%} of the run, less than {_WORTH:.0%}"
+
+
+def _count_deformable_cycles(legs: Sequence[Leg]) -> float:
+    """Return the deformable cycles per time, over all legs so far [1/time]; infinity if there are none."""
+    deformable = [leg for leg in legs if not leg.order.rigid and leg.cycles]
+    if not deformable:
+        return float("inf")
+    return sum(leg.cycles or 0 for leg in deformable) / sum(
+        leg.length for leg in deformable
     )
 
 
-def _cycles(legs: Sequence[Leg]) -> float:
-    """Deformable cycles by time, so far [1/time]."""
-    loaded = [leg for leg in legs if not leg.order.rigid and leg.cycles]
-    return (
-        sum(leg.cycles or 0 for leg in loaded) / sum(leg.length for leg in loaded)
-        if loaded
-        else float("inf")
-    )
+def collect_joined_legs(order: Order, legs: Sequence[Leg]) -> list[Order]:
+    """Return the legs that lead up to a leg, and the leg, since the parts last became rigid or deformable."""
+    latest = {leg.order.number: leg.order for leg in legs}
+    joined = [order]
+    while (previous := latest.get(joined[0].number - 1)) and (
+        previous.rigid is order.rigid
+    ):
+        joined.insert(0, previous)
+    return joined
 
 
-def together(order: Order, legs: Sequence[Leg]) -> list[Order]:
-    """Give the legs before a leg, and it, as far back as the parts were rigid as they are in it, or deformable."""
-    latest, found = {leg.order.number: leg.order for leg in legs}, [order]
-    while (before := latest.get(found[0].number - 1)) and before.rigid is order.rigid:
-        found.insert(0, before)
-    return found
+def _get_first_rigid_leg(legs: Sequence[Leg]) -> Order:
+    """Return the leg in which the parts became rigid, if they are rigid in the last one."""
+    return collect_joined_legs(legs[-1].order, legs)[0]
 
 
-def _became_rigid(legs: Sequence[Leg]) -> Order:
-    """Order of the leg in which the parts became rigid, of those that the last leg goes on with."""
-    return together(legs[-1].order, legs)[0]
-
-
-def _flown(legs: Sequence[Leg]) -> Seen:
-    """What was seen of the flight when it was decided to switch."""
-    return next(leg.seen for leg in reversed(legs) if leg.order.kind == LOAD)
+def _get_flight_findings(legs: Sequence[Leg]) -> Findings:
+    """Return what was seen of the flight when it was switched: at the end of the last deformable leg."""
+    return next(leg.findings for leg in reversed(legs) if leg.order.kind == LOAD)
 
 
 def windows(legs: Sequence[Leg], limits: Limits) -> list[Window]:
-    """Give all flights so far that were switched or left out, in their order."""
-    found: dict[float, Window] = {}
+    """List all flights so far, switched or left out, in the order of their starts."""
+    by_start: dict[float, Window] = {}
     for count, leg in enumerate(legs, start=1):
-        for start, end in leg.seen.short:
-            told = "over before the wait"
-            found[start] = Window(start, start, end, end, leg.seen.wait or 0.0, told)
-        if leg.order.rigid and (
-            leg.seen.contact is not None or leg.order.until >= limits.end
-        ):
-            window = window_of(legs[:count], limits)
-            found[window.free] = window
-    return [found[start] for start in sorted(found)]
+        for start, end in leg.findings.short:
+            wait = leg.findings.wait or 0.0
+            reason = "over before the wait"
+            by_start[start] = Window(start, start, end, end, wait, reason)
+        ends_flight = leg.findings.contact is not None or leg.order.until >= limits.end
+        if leg.order.rigid and ends_flight:
+            window = find_window(legs[:count], limits)
+            by_start[window.free] = window
+    return [by_start[start] for start in sorted(by_start)]

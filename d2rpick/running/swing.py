@@ -1,4 +1,4 @@
-"""How far a body may be out of place whose parts still swing when it becomes rigid, by the flight so far."""
+"""Warn, before td is known, of parts that swing too much for their body to become rigid."""
 
 from __future__ import annotations
 
@@ -9,16 +9,17 @@ import numpy as np
 from d2rpick.flight.flight import Flight
 from d2rpick.flight.position_error import MOST_OF_PATH, drift_in_flight
 from d2rpick.histories.samples import integral, window
+from d2rpick.running.record import find_momenta
 
 if TYPE_CHECKING:
     from d2rpick.histories.history import History, Momenta
 
 
 class Swing(NamedTuple):
-    """A part that swings against the others: its ``name``, and how far the body may be out of place [length].
+    """A part that swings against the others: its ``name``, and by how much that may displace the body [length].
 
-    In a flight that is shorter than ``flight`` [time] that is more than 1 % of the path, beyond which a body is out of
-    place.  ``at_most``: two parts alone may turn instead, which puts nothing out of place.
+    In a flight shorter than ``flight`` [time] the ``error`` is more than 1 % of the path, which is too much.
+    ``at_most``: both parts may turn instead, which displaces nothing.
     """
 
     name: str
@@ -28,63 +29,61 @@ class Swing(NamedTuple):
 
     @property
     def told(self) -> str:
-        """What is to be known before the body becomes rigid."""
-        what, limit = ("still swings against the others", "about")
+        """What the user should know before the body becomes rigid."""
+        motion, limit = "still swings against the others", "about"
         if self.at_most:
-            what, limit = "swings against the other, or both turn", "at most"
+            motion, limit = "swings against the other, or both turn", "at most"
         return (
-            f"{self.name} {what}: at td the body may be off by {limit} {self.error:.3g},"
+            f"{self.name} {motion}: at td the body may be off by {limit} {self.error:.3g},"
             f" more than {MOST_OF_PATH:.0%} of its path in a flight shorter than {self.flight:.3g}"
         )
 
 
-def swing_in(history: History, start: float, tr: float) -> Swing | None:
-    """Find how far the body that becomes rigid at ``tr`` may be out of place, in a flight since ``start`` [time].
+def find_swing(history: History, start: float, tr: float) -> Swing | None:
+    """Find by how much a swinging part may displace the body that becomes rigid at ``tr``, in a flight since ``start``.
 
-    td is not known: it is taken for the state so far at which the parts stand farthest from where they are at tr.  None
-    where the momenta of the parts do not tell.
+    td is unknown.  It is assumed at the state before tr at which the parts are farthest from their places at tr.  None
+    if the momenta of parts are not enough to tell.
     """
-    momenta = next((one for one in history.momenta if one.parts is not None), None)
+    momenta = find_momenta(history, of_parts=True)
     if momenta is None or momenta.parts is None:
         return None
-    flying = tuple(momenta.parts[i] for i in momenta.moving)
-    drift = drift_in_flight(history, Flight(start, tr, "momentum", flying))
+    moving_parts = tuple(momenta.parts[number] for number in momenta.moving)
+    drift = drift_in_flight(history, Flight(start, tr, "momentum", moving_parts))
     if drift is None:
-        name, error, path = _of_two(momenta, start, tr)
-    else:
-        name, error, path = (
-            drift.part.name,
-            np.max(drift.errors(drift.time, float(drift.time[-1]))),
-            drift.path[-1],
-        )
-    return (
-        Swing(
-            name,
-            float(error),
-            float(error / path) / MOST_OF_PATH * (tr - start),
-            drift is None,
-        )
-        if path > 0
-        else None
-    )
+        return _find_swing_of_two(momenta, start, tr)
+    error = float(np.max(drift.errors(drift.time, float(drift.time[-1]))))
+    path = float(drift.path[-1])
+    return _make_swing(drift.part.name, error, path, tr - start)
 
 
-def _of_two(momenta: Momenta, start: float, tr: float) -> tuple[str, float, float]:
-    """Name the lighter of two parts, how far off the other is at most, and the path; 0 for others."""
+def _find_swing_of_two(momenta: Momenta, start: float, tr: float) -> Swing | None:
+    """Return the upper limit that follows from the momenta of two parts alone; None if other parts move too."""
     inside = window(momenta.time, start, tr)
     time, masses = momenta.time[inside], momenta.masses
-    pair = (
-        []
-        if masses is None
-        else [i for i in momenta.moving if i in momenta.chosen and masses[i] > 0]
-    )
-    if momenta.parts is None or masses is None or len(pair) != 2 or time.size < 2:
-        return "", 0.0, 0.0
-    light, heavy = sorted(pair, key=lambda i: float(masses[i]))
-    centre = momenta.values[inside][:, pair].sum(axis=1) / masses[pair].sum()
-    away = integral(time, momenta.values[inside][:, heavy] / masses[heavy] - centre)
-    off, path = (
-        np.linalg.norm(away - away[-1], axis=1).max(),
-        integral(time, np.linalg.norm(centre, axis=1))[-1],
-    )
-    return momenta.parts[light].name, float(off), float(path)
+    if momenta.parts is None or masses is None or time.size < 2:
+        return None
+    pair = [
+        number
+        for number in momenta.moving
+        if number in momenta.chosen and masses[number] > 0
+    ]
+    if len(pair) != 2:
+        return None
+    light, heavy = sorted(pair, key=lambda number: float(masses[number]))
+    velocity = momenta.values[inside][:, pair].sum(axis=1) / masses[pair].sum()
+    relative = momenta.values[inside][:, heavy] / masses[heavy] - velocity
+    displacement = integral(time, relative)
+    error = np.linalg.norm(displacement - displacement[-1], axis=1).max()
+    path = integral(time, np.linalg.norm(velocity, axis=1))[-1]
+    name = momenta.parts[light].name
+    return _make_swing(name, float(error), float(path), tr - start, at_most=True)
+
+
+def _make_swing(
+    name: str, error: float, path: float, duration: float, *, at_most: bool = False
+) -> Swing | None:
+    """Return the swing of a part, by the path of the body in a flight so far [length, time]; None without a path."""
+    if path <= 0:
+        return None
+    return Swing(name, error, error / path / MOST_OF_PATH * duration, at_most)

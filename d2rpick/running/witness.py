@@ -1,11 +1,11 @@
-"""Since when has nothing acted on some parts, or on the whole model?  Answered at each state, by the states up to it.
+"""Tell for each state since when no force has acted on some parts, or on the whole model, by the states up to it.
 
-From the time that is the answer on, the momentum less gravity and damping is constant within 1e-4 of its largest value
-so far; where none is written, the energy of the contacts is.  It is a flight when that has lasted for a wait: a force
-that ends may come back, in a car that hit a block twice after 14 ms (docs/reference/first-run.md).
+From that time on the momentum less gravity and damping is constant within 1e-4 of its largest value so far.  If no
+momentum is written, the energy of the contacts is constant instead.  A flight is seen once that has lasted for a wait,
+since a force that ends may come back: a car hit a block twice, 14 ms apart (docs/reference/first-run.md).
 
-What is left of a push that dies away makes the answer a little later as the flight goes on.  A contact makes it later
-than the middle of what the flight was.
+The end of a push that dies away moves the start of the flight a little later as the flight goes on.  A contact moves it
+past the middle of the flight.
 """
 
 from __future__ import annotations
@@ -27,24 +27,41 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Precision, Samples
     from d2rpick.histories.names import Part
 
-    # Wait [time] by what was written up to now, without force since a start: (start, now); None: not known yet.
+    # Returns the wait for a flight from ``start``, by the states up to ``now``: (start, now) [time]; None if unknown.
     Needed = Callable[[float, float], float | None]
 
-# Of the largest momentum, or contact energy, so far: single precision adds up to a tenth of it.
+# Tolerance of a constant momentum or contact energy, as a share of its largest value so far: single precision adds up
+# to a tenth of it.
 CONSTANT: Final = 1e-4
-# A state at which a force was taken for another one than gravity is tried again after so much of the time before it.
-_AGAIN: Final = 0.25
-# States of a long stretch that are held against the law: what acts changes the momentum for good.
-_HELD: Final = 128
+# After a force that was not gravity, the next test waits for this share of the time without force so far.
+_TEST_AGAIN: Final = 0.25
+# Of a longer stretch, so many states are compared with the law: a force changes the momentum for good.
+_MOST_COMPARED: Final = 128
 
 
 class Quiet(NamedTuple):
-    """Time without force: ``start``, ``seen`` when the ``wait`` was over, ``end``: the first state with a force [time].
+    """A flight: a time without force that lasted for its wait.
 
-    ``start`` is what was known at ``seen``.  ``end`` is None where the record ends before.  ``source`` is "momentum" or
-    "contact-energy"; ``left`` what changes from ``start`` to ``seen``, as a share of the largest value so far;
-    ``gravity`` as of `FreeFlight`; ``parts`` are those that fly together, None for the whole model; ``level``: when the
-    centre of mass is as high again as at ``start`` [time], None where that was over when the flight was seen.
+    Attributes
+    ----------
+    start : float
+        Since when no force acted, as known at ``seen`` [time].
+    seen : float
+        State at which the wait was over [time].
+    end : float or None
+        First state at which a force acts [time]; None if the record ends before.
+    wait : float
+        How long no force must act to count as flight [time].
+    source : str
+        "momentum" or "contact-energy".
+    left : float
+        What changes from ``start`` to ``seen``, as a share of the largest value so far [-].
+    gravity : float
+        Acceleration, as in `FreeFlight`.
+    parts : tuple of Part or None
+        Parts that fly together; None for the whole model.
+    level : float or None
+        When the centre of mass is as high again as at ``start`` [time]; None if that was before ``seen``.
     """
 
     start: float
@@ -58,44 +75,46 @@ class Quiet(NamedTuple):
     level: float | None = None
 
 
-class _Fall(FreeFall):
-    """The law of free fall, held against some of the states of a long window."""
+class _SampledFall(FreeFall):
+    """The law of free fall, compared with only some states of a long window."""
 
     def _fitted(self, first: int, last: int) -> tuple[Samples, Samples, float]:
-        if last - first <= _HELD:
+        if last - first <= _MOST_COMPARED:
             return super()._fitted(first, last)
-        states = np.linspace(first, last, _HELD).round().astype(np.intp)
-        thinned = FreeFall.__new__(FreeFall)
-        thinned.time, thinned.momentum, thinned._both = (
-            self.time[states],
-            self.momentum[states],
-            self._both[states],
-        )
-        return thinned._fitted(0, _HELD - 1)
+        states = np.linspace(first, last, _MOST_COMPARED).round().astype(np.intp)
+        sampled = FreeFall.__new__(FreeFall)
+        sampled.time = self.time[states]
+        sampled.momentum = self.momentum[states]
+        sampled._both = self._both[states]
+        return sampled._fitted(0, _MOST_COMPARED - 1)
 
 
 class Witness:
-    """What shows a force on some parts, or on the whole model, in neighbouring states of a record.
+    """Tells at each of its states since when no force has acted on some parts, or on the whole model.
 
-    ``members`` of the momenta fly together; none where the energy of the contacts is all that tells.  ``origin`` is the
-    place of its first state among those of the record.
+    Attributes
+    ----------
+    members : tuple of int
+        Numbers in the momenta of the parts that fly together; empty if only the energy of the contacts is written.
+    origin : int
+        Number of its first state in the record.
+    free : list of int
+        For each state, the first state from which on no force shows up to it.
+    flights : list of Quiet
+        Flights so far.
     """
 
     def __init__(
         self, members: tuple[int, ...], parts: tuple[Part, ...] | None, origin: int
     ) -> None:
         self.members, self.parts, self.origin = members, parts, origin
-        self.free: list[
-            int
-        ] = []  # by state: the first of those from which on no force shows up to it
+        self.free: list[int] = []
         self.flights: list[Quiet] = []
-        self.tells = np.empty(
-            0, np.bool_
-        )  # whether digits let a momentum, or contact energy, show a force
-        self._columns = {
-            name: Column() for name in ("time", "momentum", "contact", "alone")
-        }
-        self._looked = self._again = 0
+        # For each state, whether the written digits are enough to show a force.
+        self._shows_forces: NDArray[np.bool_] = np.empty(0, np.bool_)
+        names = ("time", "momentum", "contact", "alone")
+        self._columns = {name: Column() for name in names}
+        self._tested_count = self._test_again_at = 0
 
     @property
     def time(self) -> Samples:
@@ -103,118 +122,138 @@ class Witness:
         return self._columns["time"].rows
 
     def add(self, **rows: NDArray[Any] | None) -> None:
-        """Append states: time, momentum (k, 3), energy of all contacts (k,), and whether nothing else has moved."""
+        """Append states: time, momentum (k, 3), contact energy (k,); ``alone``: whether all other parts are at rest."""
         for name, values in rows.items():
             if values is not None:
                 self._columns[name].add(values)
 
-    def follow(self, of_momentum: Precision, of_contact: Precision) -> None:
-        """Ask of each new state since when nothing has acted, with the precisions of what is written."""
+    def follow(
+        self, momentum_precision: Precision, contact_precision: Precision
+    ) -> None:
+        """Find for each new state since when no force has acted, with the precisions of what is written."""
         self._laws: list[tuple[Law, Samples]] = []
-        contact, momentum = (
-            self._columns["contact"].rows,
-            self._columns["momentum"].rows,
-        )
+        contact = self._columns["contact"].rows
+        momentum = self._columns["momentum"].rows
         if contact.size == self.time.size:
-            room, self.tells = _room(np.abs(contact), of_contact)
-            # two bodies that hit each other keep their momentum; what is not among the members may do as it likes
+            tolerance, self._shows_forces = _set_tolerance(
+                np.abs(contact), contact_precision
+            )
+            # Contact energy shows bodies that hit each other, which keep their momentum.  Once other parts move, it
+            # shows their contacts too and is no longer used.
             alone = self._columns["alone"].rows
-            self._laws.append(
-                (
-                    Constant(self.time, contact[:, np.newaxis]),
-                    np.where(alone, room, np.inf),
-                )
-            )
+            law = Constant(self.time, contact[:, np.newaxis])
+            self._laws.append((law, np.where(alone, tolerance, np.inf)))
         if self.members:
-            room, self.tells = _room(
-                np.abs(momentum).max(axis=1), of_momentum, len(self.members)
+            largest = np.abs(momentum).max(axis=1)
+            tolerance, self._shows_forces = _set_tolerance(
+                largest, momentum_precision, len(self.members)
             )
-            self._laws.append((_Fall(self.time, momentum), room))
+            self._laws.append((_SampledFall(self.time, momentum), tolerance))
         first = self.free[-1] if self.free else 0
         for state in range(len(self.free), self.time.size):
-            first = self._first_without(state, first)
+            first = self._find_first_without_force(state, first)
             self.free.append(first)
 
-    def left(self, first: int, last: int) -> float:
-        """What is left between two states, as a share of what may be."""
+    def misfit(self, first: int, last: int) -> float:
+        """Return the change between two states that no law explains over its tolerance; above 1 a force acts [-]."""
         return max(
-            law.misfit(first, last) / float(room[last]) for law, room in self._laws
+            law.misfit(first, last) / float(tolerance[last])
+            for law, tolerance in self._laws
         )
 
     def last_without(self, first: int) -> int:
-        """Last state up to which, from ``first`` on, no force shows."""
+        """Return the last state up to which no force shows from ``first`` on."""
         return farthest(
-            first, self.time.size - 1, lambda last: self.left(first, last) <= 1
+            first, self.time.size - 1, lambda last: self.misfit(first, last) <= 1
         )
 
-    def _first_without(self, last: int, first: int) -> int:
-        """First state from ``first`` on from which no force shows up to ``last``: near by, then farther and farther."""
-        if self.left(first, last) <= 1:
+    def _find_first_without_force(self, last: int, first: int) -> int:
+        """Return the first state, ``first`` or later, from which no force shows up to ``last``.
+
+        Steps double, so that the search takes few tests whether the state is near or far; a bisection ends it.
+        """
+        if self.misfit(first, last) <= 1:
             return first
-        acts, step = first, 1
-        while self.left(min(acts + step, last), last) > 1:
-            acts, step = acts + step, 2 * step
-        good = min(acts + step, last)
-        while good - acts > 1:
-            middle = (acts + good) // 2
-            if self.left(middle, last) <= 1:
-                good = middle
+        with_force, step = first, 1
+        while self.misfit(min(with_force + step, last), last) > 1:
+            with_force += step
+            step *= 2
+        without_force = min(with_force + step, last)
+        while without_force - with_force > 1:
+            middle = (with_force + without_force) // 2
+            if self.misfit(middle, last) <= 1:
+                without_force = middle
             else:
-                acts = middle
-        return good
+                with_force = middle
+        return without_force
 
     def look(
-        self, needed: Needed, flies: Callable[[Witness, int, int], float | None]
+        self,
+        needed: Needed,
+        find_gravity: Callable[[Witness, int, int], float | None],
     ) -> None:
-        """Find what flights began and ended in the states that are new.
+        """Add the flights that begin in the new states, and the ends of those that end in them.
 
-        ``flies`` gives the gravity between two states, None where what acts there is no gravity or something holds.
+        ``find_gravity`` returns the gravity between two states; None if another force acts, or a support holds parts.
         """
-        for state in range(self._looked, len(self.free)):
+        for state in range(self._tested_count, len(self.free)):
             first, now = self.free[state], float(self.time[state])
             start = float(self.time[first])
-            last = self.flights[-1] if self.flights else None
-            if last is not None and last.end is None:
-                if now - start < max(last.wait, now - last.start) / 2:
-                    self.flights[-1] = last._replace(end=now)
-                    self._again = state
+            flight = self.flights[-1] if self.flights else None
+            if flight is not None and flight.end is None:
+                if now - start < max(flight.wait, now - flight.start) / 2:
+                    self.flights[-1] = flight._replace(end=now)
+                    self._test_again_at = state
             elif (
                 first + FEWEST <= state + 1
-                and self._again <= state
-                and self.tells[state]
+                and self._test_again_at <= state
+                and self._shows_forces[state]
             ):
                 wait = needed(start, now)
                 if wait is not None and now - start >= wait:
-                    self._see(first, state, wait, flies(self, first, state))
-        self._looked = len(self.free)
+                    gravity = find_gravity(self, first, state)
+                    self._see(first, state, wait, gravity)
+        self._tested_count = len(self.free)
 
     def _see(self, first: int, state: int, wait: float, gravity: float | None) -> None:
+        """Add a flight since ``first`` that is seen at a state; without ``gravity``, set when to test again."""
         if gravity is None:
-            self._again = state + 1 + int(_AGAIN * (state - first))
+            self._test_again_at = state + 1 + int(_TEST_AGAIN * (state - first))
             return
-        start, now = float(self.time[first]), float(self.time[state])
-        source = "momentum" if self.members else "contact-energy"
-        level = self._level(first, state) if gravity else None
-        left = CONSTANT * self.left(first, state)
         self.flights.append(
-            Quiet(start, now, None, wait, source, left, gravity, self.parts, level)
+            Quiet(
+                start=float(self.time[first]),
+                seen=float(self.time[state]),
+                end=None,
+                wait=wait,
+                source="momentum" if self.members else "contact-energy",
+                left=CONSTANT * self.misfit(first, state),
+                gravity=gravity,
+                parts=self.parts,
+                level=self._find_level(first, state) if gravity else None,
+            )
         )
 
-    def _level(self, first: int, last: int) -> float | None:
-        """When the centre of mass is as high again as at the first of two states [time]; None where it was before."""
+    def _find_level(self, first: int, last: int) -> float | None:
+        """Return when the centre of mass is as high as at ``first`` again [time]; None if that was before ``last``."""
         begin, end = self._columns["momentum"].rows[[first, last]]
-        pulled, lasted = end - begin, float(self.time[last] - self.time[first])
-        risen = -2 * lasted * float(begin @ pulled) / float(pulled @ pulled)
-        return float(self.time[first]) + risen if risen > lasted else None
+        gained = end - begin
+        duration = float(self.time[last] - self.time[first])
+        time_to_level = -2 * duration * float(begin @ gained) / float(gained @ gained)
+        if time_to_level <= duration:
+            return None
+        return float(self.time[first]) + time_to_level
 
 
-def _room(
-    sizes: Samples, precision: Precision, number: int = 1
+def _set_tolerance(
+    sizes: Samples, precision: Precision, count: int = 1
 ) -> tuple[Samples, NDArray[np.bool_]]:
-    """What may be left at each state of a sum of so many values of some ``sizes`` (n,), and whether that tells any."""
+    """Return the tolerance at each state of a sum of ``count`` values, and whether it is small enough to show forces.
+
+    ``sizes`` (n,) are the absolute values of the sum.
+    """
     largest = np.maximum.accumulate(sizes)
-    noise = number * precision.quanta(largest) / 2
-    return (
-        np.maximum(CONSTANT * largest + noise, np.finfo(float).tiny),
-        (noise <= TOLERANCE * largest) & (largest > 0),
-    )
+    noise = count * precision.quanta(largest) / 2
+    tolerance = np.maximum(CONSTANT * largest + noise, np.finfo(float).tiny)
+    shows_forces = (noise <= TOLERANCE * largest) & (largest > 0)
+    return tolerance, shows_forces

@@ -1,9 +1,29 @@
-"""What vibrates, and how?  The models, best first, and how those that tell a sign are looked for beside an oscillator.
+"""Find what vibrates, and how: the models of the vibration, best first.
 
-A further one is a class in a module of its own, and here its name in `SignedModel`, what finds it in a record, and its
-line in `MODELS`.  It has what `SignedParts` and `Swings` have alike: the methods of a `Deformation`, ``time`` (n,),
-whether enough of the energy is ``signed``, what is known at a td, and words: what a choice rests on (``told``), that
-the kinetic share "is what ..." (``kinetic``), and why a tr has no measures (``undescribed``).
+Every measure of a pair (tr, td) needs the deformations at both times and how they lie to each other (`measures`).  The
+energy does not show the sign of a deformation, so a model must.  `find_models` looks for them in this order, and
+`model.model_at` decides which one can be relied on at a td:
+
+1. parts (`part_signs`, `waves`): the deformation of each part with its sign, from the zeros of its own energy,
+   confirmed by a few damped waves; E = q^2 for each part.
+2. oscillator (`identify`, `fitting`, `modes`, `span`): E = E_pl + (q_0 + q)^2 with q = exp(-alpha t/2) (a cos omega t
+   + b sin omega t), the published floating oscillator (`oscillator`), fitted by least squares in the longest window
+   around td in which it describes the record.  Systematic structure in the rest refuses it.
+3. modal (`lines`, `midpoint`, `modal`, `modal_span`, `locked_lines`): any number of modes.  The energy halfway
+   between tr and td gives the product of both deformations, X = V(m) - H(m)/2 + C(m, tau)/2, and with it
+   R^2 = 1 + [V(tr) - 2 X]/U(td); H and C follow from the lines of the energy.  Doubts refuse a record or widen
+   the band of R.
+4. swings (`swings`): the energy comes down to its floor in each swing; each minimum is a zero of the deformation,
+   whatever the law of the spring.
+5. energy: no sign is known; times at which the energy has the level of td remain (`moments`).
+
+Lines of the kinetic energy (`flight.vibrating`) confirm those of the internal energy, or replace them where plastic
+flow or a damper's work hides these.
+
+A further model is a class in a module of its own, its name in `SignedModel`, its finder, and its line in `MODELS`.  It
+has the methods of a `Deformation`, ``time`` (n,), ``signed`` (True if it covers enough of the energy), what is known at
+a td, and words: what a choice rests on (``told``), what the kinetic share is (``kinetic``), and why a tr has no
+measures (``undescribed``).
 """
 
 from __future__ import annotations
@@ -27,11 +47,11 @@ class Together(Protocol):
 
     @property
     def complete(self) -> bool:
-        """Whether the energy is that of all that vibrates together."""
+        """Return True if the energy is that of all parts that vibrate together."""
 
     @property
     def kinetic(self) -> tuple[Samples, Samples] | None:
-        """Its kinetic energy at times in the flight, without that of its fall, both (n,); None if not written."""
+        """Return its kinetic energy in the flight less that of the fall: times and energies (n,), None if unknown."""
 
 
 if TYPE_CHECKING:
@@ -40,7 +60,7 @@ if TYPE_CHECKING:
 
 
 def _parts(history: History, within: Span, _: Together) -> SignedModel | None:
-    """Read the signs of single parts, where their energies are written."""
+    """Read the signs of single parts if their energies are written."""
     time = history.between(*within)[0]
     if history.part_energies is None or time.size < 3:
         return None
@@ -65,13 +85,13 @@ def _modal(history: History, within: Span, together: Together) -> SignedModel | 
 
 
 def _swings(history: History, within: Span, _: Together) -> SignedModel | None:
-    """Count the swings of the energy, where they come down to a floor."""
+    """Count the swings of the energy if they come down to a floor."""
     from d2rpick.vibration.swings import count_swings
 
     return count_swings(*history.between(*within))
 
 
-# By what a choice is said to rest on; an oscillator, and the energy alone, are known of each td in another way.
+# Models by name, with the function that finds each; None for those that are found for each td in another way.
 MODELS: Final[dict[str, Finder | None]] = {
     "parts": _parts,
     "oscillator": None,
@@ -90,10 +110,10 @@ def find_models(
     memory: Memory,
     together: Together,
 ) -> dict[str, SignedModel]:
-    """Look for models, best first, until one tells the sign; those behind the oscillator where that is ``doubtful``.
+    """Look for models, best first, until one tells the sign; those after the oscillator only if that is ``doubtful``.
 
-    They are looked for ``around`` td, those behind the oscillator in the ``flight``, if one is known, and swings also
-    before it, from when the energy has ``settled``.
+    The window ``around`` td is used, for models after the oscillator the ``flight`` if one is known, and for swings
+    also the time before it, from when the energy has ``settled``.
     """
     found: dict[str, SignedModel] = {}
     within = around
@@ -116,14 +136,14 @@ def find_models(
 
 
 def _is_vague(model: SignedModel) -> bool:
-    """Return whether modes leave so much open that counted swings, if there are any, say more."""
+    """Return True if modes leave so much open that counted swings, if there are any, say more."""
     from d2rpick.vibration.modal import ModalVibration
 
     return isinstance(model, ModalVibration) and model.is_vague
 
 
 def _of_vague(found: dict[str, SignedModel]) -> dict[str, SignedModel]:
-    """Rely on modes that are vague, or with a wide band on doubtful ones, if no other model tells the sign."""
+    """Rely on vague or doubtful modes, with a wide band, only if no other model tells the sign."""
     modal = cast("ModalVibration | None", found.get("modal"))
     if modal is None:
         return found

@@ -1,4 +1,4 @@
-"""Deformations with signs: what follows from the amplitudes of modes or parts alone."""
+"""Compute what follows from the signed amplitudes of modes or parts alone."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ if TYPE_CHECKING:
 
 
 class SignedAmplitudes:
-    """A deformation that is known by the signed ``amplitudes`` of its modes or parts."""
+    """A deformation known by the signed ``amplitudes`` of its modes or parts."""
 
     def amplitudes(self, t: Samples | float) -> Samples:
-        """Signed deformations, of the shape of ``t`` with an axis for modes or parts before it [sqrt(energy)]."""
+        """Return signed deformations, shape of ``t`` with an axis for modes or parts before it [sqrt(energy)]."""
         raise NotImplementedError
 
     def elastic_energy(self, t: Samples | float) -> Samples:
-        """Sum of the squared deformations, of the shape of ``t`` [energy]."""
+        """Return the sum of the squared deformations, of the shape of ``t`` [energy]."""
         return np.asarray(np.sum(self.amplitudes(t) ** 2, axis=0))
 
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Sum over q(tr) q(td), of the shape of ``tr``; ``td`` is one for all, or one for each [energy]."""
+        """Return the sum over q(tr) q(td), of the shape of ``tr``; ``td`` is one for all, or one for each [energy]."""
         return np.asarray(
             np.einsum("k...,k...->...", self.amplitudes(td), self.amplitudes(tr))
         )
 
     def separation(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Sum over the squares of q(tr) - q(td), of the shape of ``tr`` [energy]."""
+        """Return the sum of the squares of q(tr) - q(td), of the shape of ``tr`` [energy]."""
         return np.asarray(np.sum(self.differences(tr, td) ** 2, axis=0))
 
     def differences(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """q(tr) - q(td), of the shape of ``tr`` with an axis for modes or parts before it [sqrt(energy)]."""
+        """Return q(tr) - q(td), of the shape of ``tr`` with an axis for modes or parts before it [sqrt(energy)]."""
         return np.asarray((self.amplitudes(tr).T - self.amplitudes(td).T).T)

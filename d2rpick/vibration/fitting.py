@@ -1,4 +1,4 @@
-"""Fit the energy of one vibration mode to samples by least squares, without being given a first guess.
+"""Fit the energy of one vibration mode to samples by least squares, without a given first guess.
 
 Everything here is scaled: s in [0, 1] over the record, energies in units of the record's range.  A parameter
 vector is (omega, alpha, cosine, sine, energy_plastic, preload) of
@@ -26,40 +26,44 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-    # Energies (n,) at n times and their derivatives (p, n) by the first p parameters.
+    # Energies (n,) at n times, and their derivatives (p, n) with respect to the first p parameters.
     Model = Callable[[Samples, Samples], tuple[Samples, Samples]]
 
 
 VIBRATION, WITH_PLASTIC, WITH_PRELOAD = 4, 5, 6  # free parameters of the three models
 
-# Of the matrix pencil:
+# Matrix pencil: numbers of exponentials in q**2, the lags, cells and rates that are tried.
 _ORDERS: Final = (
     3,
     4,
     6,
 )  # exponentials in q**2: of a vibration, with plastic work, and with a preload
-_LAGS: Final = 64  # a third of the fewest cells, its optimum against noise
+_LAGS: Final = 64  # 1/3 of the fewest cells, the optimum against noise
 _MIN_CELLS: Final = 192
-_MAX_CELLS: Final = 8192  # bounds memory at 5 MB; enough for 1000 periods of the energy
-_CELLS_PER_PERIOD: Final = (
-    24  # of the strongest vibration in E, which a preload makes the slower of two
-)
+_MAX_CELLS: Final = 8192  # limits memory to 5 MB; enough for 1000 periods of the energy
+_CELLS_PER_PERIOD: Final = 24  # fewest cells per period of the strongest vibration in E; a preload adds a slower one
 
-# Of the least squares:
+# Limits of the least-squares fit.
 COARSE: Final = 400  # samples on which starts are compared and first refined
-_MEDIUM: Final = 2048  # samples on which a fit is refused before it is refined on more
-_NEAR: Final = 1e-6  # of the sum of squares still to be gained where a fit is refused: nothing beside the structure
-MAX_MISFIT: Final = 0.4  # beyond, more than 16 % of the variance is unexplained and can hide another mode
+_MEDIUM: Final = (
+    2048  # samples on which a fit may be refused before it is refined on more
+)
+_NEAR: Final = (
+    1e-6  # relative gain at which a refusal is decided: negligible beside the structure
+)
+MAX_MISFIT: Final = (
+    0.4  # largest rest over std(E): 16 % of the variance or more can hide another mode
+)
 _FAR_TOO_MUCH: Final = (
-    1.2  # times that: the variance of two thousand samples is known to a thirtieth
+    1.2  # safety factor: the variance of 2,000 samples is known to 3 %
 )
-STARTS: Final = (
-    3  # refined at most: with noise the first in rank may not be the one that ends best
+STARTS: Final = 3  # most starts refined: with noise the first in rank may not end best
+CERTAIN: Final = (
+    0.01  # unexplained share of the variance below which no second start is tried
 )
-CERTAIN: Final = 0.01  # of the variance unexplained: no second start need be tried
 _MAX_STEPS: Final = 40
-_USUAL: Final = 10  # a good start needs 4 to 8
-# A rate over the record, of a fiftieth of a period: of 2000 fits stopped at five times that none came to a whole one.
+_USUAL: Final = 10  # usual number of steps; a good start needs 4 to 8
+# Rate over the record that counts as a drift, 1/50 period: of 2,000 fits stopped at 5 times that none reached a period.
 _DRIFT: Final = 0.02 * 2 * np.pi
 
 
@@ -68,7 +72,7 @@ def fit_few(
 ) -> Samples | None:
     """Return the least-squares parameters for a few of the samples, the first ``size`` of them free, the others zero.
 
-    None where the fit leaves more than ``worst`` of their variance.
+    None if the fit leaves more than ``worst`` of the variance.
     """
     few = _few(s, e)
     return refine(
@@ -82,11 +86,11 @@ def fit_few(
 def fit(
     few: Samples | None, s: Samples, e: Samples, size: int, worst: float = np.inf
 ) -> Samples | None:
-    """Return the parameters for all samples from those of `fit_few`; None without, and as for `fit_all`."""
+    """Return the parameters for all samples from those of `fit_few`; None under the conditions of `fit_all`."""
     best = fit_all(few, partial(energy_and_jacobian, size=size), s, e, worst, slice(1))
     if best is None:
         return None
-    if best[5] < 0:  # q and -q make the same energy; the preload is taken positive
+    if best[5] < 0:  # q and -q have the same energy; the preload is made positive
         best[[2, 3, 5]] *= -1
     if best[0] < 0:
         best[[0, 3]] *= -1
@@ -101,11 +105,11 @@ def fit_all(
     worst: float,
     rates: slice,
 ) -> Samples | None:
-    """Return the best fit to all samples from the ``best`` one to a few of them; ``rates`` are where it has those.
+    """Return the best fit to all samples, starting from the ``best`` one to a few of them.
 
-    None without that, or where ``worst`` is finite and these or some more of the samples are left with a structure that
-    is too large.  A fit that leaves far too much of some of the samples is not brought to its best for all of them: it
-    is refused, and would crawl.  So would a drift that follows the samples, which is refused too.
+    ``rates`` are the indices of the rates among the parameters.  None without a start, or if ``worst`` is finite and
+    some of the samples are left with too much structure.  A fit that leaves far too much is not refined for all
+    samples, since it will be refused and would converge slowly; so would a drift that follows the samples.
     """
     quick, few = np.isfinite(worst), _few(s, e)
     if best is None or (quick and _structured(best, model, *few)):
@@ -121,6 +125,7 @@ def fit_all(
             return best
 
     def doomed(found: Samples) -> bool:
+        """Return True if these parameters will be refused."""
         if not quick or np.abs(found[rates]).min() > _DRIFT:
             return False
         rest = e - evaluated(found, model, s)[0]
@@ -130,7 +135,7 @@ def fit_all(
 
 
 def _few(s: Samples, e: Samples, most: int = COARSE) -> tuple[Samples, Samples]:
-    """Give ``most`` of the samples, evenly chosen; by default those on which starts are compared."""
+    """Return ``most`` of the samples, evenly spaced; by default those on which starts are compared."""
     stride = -(-s.size // most)
     return s[::stride], e[::stride]
 
@@ -138,7 +143,7 @@ def _few(s: Samples, e: Samples, most: int = COARSE) -> tuple[Samples, Samples]:
 def refine(
     starts: Sequence[Samples], model: Model, s: Samples, e: Samples, worst: float
 ) -> Samples | None:
-    """Return the best end of the starts; None without one that leaves no more than ``worst`` of the variance."""
+    """Return the best of the refined starts; None if all leave more than ``worst`` of the variance."""
     variance = float(np.sum((e - np.mean(e)) ** 2))
     best, least = None, worst * variance
     for start in starts:
@@ -151,17 +156,16 @@ def refine(
 
 
 def _structured(parameters: Samples, model: Model, s: Samples, e: Samples) -> bool:
-    """Whether what the best fit to some of the samples, evenly chosen, leaves there refuses the fit to all of them."""
+    """Return True if the rest of the best fit to evenly spaced samples refuses the fit to all of them."""
     return surely_structured(e - model(parameters, s)[0], float(np.std(e)))
 
 
 class Pencil(NamedTuple):
-    """What the exponentials that E may consist of span, over so many cells: ``vectors`` of shape (lags, lags).
+    """Signal subspace of the exponentials in E: singular vectors of its Hankel matrix, shape (lags, lags).
 
-    Matrix pencil (Hua and Sarkar, IEEE Trans. ASSP 38, 1990): the leading right singular vectors of the
-    Hankel matrix of equidistant values span the exponentials, and shifting them by one cell multiplies
-    each by exp(p h).  Means over cells of an exponential are the same exponential, so cells also serve
-    dense records.
+    Matrix pencil (Hua and Sarkar, IEEE Trans.  ASSP 38, 1990): the leading right singular vectors of the Hankel matrix
+    of equidistant values span the exponentials, and a shift by one cell multiplies each by exp(p h).  Means of an
+    exponential over cells are the same exponential, so that cells also serve dense records.
     """
 
     vectors: Samples
@@ -169,13 +173,13 @@ class Pencil(NamedTuple):
 
     @classmethod
     def of(cls, s: Samples, e: Samples) -> Pencil:
-        """Find the vectors, those that hold most of E first."""
+        """Compute the vectors, those with the largest share of E first."""
         running = integral(s, e)
         fine = cell_means(s, running, min(s.size - 1, _MAX_CELLS))
         power = np.abs(np.fft.rfft(fine - np.mean(fine))) ** 2
         periods = int(
             np.argmax(power * np.arange(power.size))
-        )  # per octave: decay alone must not win
+        )  # per octave, so that decay alone does not win
         count = min(
             max(_CELLS_PER_PERIOD * periods, _MIN_CELLS), s.size - 1, _MAX_CELLS
         )
@@ -186,25 +190,25 @@ class Pencil(NamedTuple):
         return cls(np.linalg.eigh(hankel.T @ hankel)[1][:, ::-1], count)
 
     def rates(self, orders: tuple[int, ...] = _ORDERS) -> NDArray[np.complex128]:
-        """Read the complex rates p = -damping + i frequency of exp(p s) that E may consist of, frequency > 0.
+        """Return the complex rates p = -damping + i frequency of exp(p s) that E may contain, frequency > 0.
 
-        ``orders`` are the numbers of exponentials that are tried.
+        ``orders`` are the numbers of exponentials to try.
         """
         z = np.concatenate([factors_of(self.vectors[:, :order]) for order in orders])
         return np.asarray(np.log(z[z.imag > 0]) * self.cells)
 
 
 def factors_of(vectors: Samples) -> NDArray[np.complex128]:
-    """Factors z of the exponentials z**k whose windows over k these ``vectors``, shape (n, order), span.
+    """Return the factors z of exponentials z**k from ``vectors`` that span their windows over k, shape (n, order).
 
-    A shift by one turns the space of the windows into itself, with the factors for its eigenvalues.
+    A shift by one maps the space of the windows to itself; the factors are the eigenvalues.
     """
     shift = np.linalg.lstsq(vectors[:-1], vectors[1:], rcond=None)[0]
     return np.linalg.eigvals(shift).astype(np.complex128)
 
 
 def cell_means(s: Samples, running: Samples, count: int) -> Samples:
-    """Means over equal cells of [0, 1] of what has this ``running`` integral over s."""
+    """Return means over equal cells of [0, 1], from the ``running`` integral over s."""
     return np.asarray(
         np.diff(np.interp(np.linspace(0, 1, count + 1), s, running)) * count
     )
@@ -215,9 +219,9 @@ def _starts(
 ) -> list[Samples]:
     """Return the best parameter vectors to start from, for a model with ``size`` free parameters.
 
-    A rate p is that of q**2 (alpha = -Re p, omega = Im p / 2) or, with a preload, that of q (alpha = -2 Re p,
-    omega = Im p).  For known rates E is linear in products of the other parameters, and their fit ranks the
-    rates and gives the parameters.
+    A rate p is that of q**2 (alpha = -Re p, omega = Im p / 2) or, with a preload, that of q (alpha = -2 Re p, omega =
+    Im p).  For given rates E is linear in products of the other parameters, and their fit ranks the rates and gives the
+    parameters.
     """
     omega, alpha = poles.imag / 2, -poles.real
     if size == WITH_PRELOAD:
@@ -227,7 +231,7 @@ def _starts(
         )
     alpha = np.maximum(
         alpha, -1.0
-    )  # growth is refused anyway; keep exp from overflowing
+    )  # growth is refused later; this keeps exp from overflowing
     vibration = np.exp(s * (1j * omega - alpha / 2)[:, None])
     square = vibration * vibration
     rows = [
@@ -256,7 +260,7 @@ def _starts(
     table = np.stack((omega, alpha, phasor.real, phasor.imag, plastic, preload), axis=1)
     best: list[Samples] = []
     for start in table[np.argsort(misfit)]:
-        # within half a radian over the record two starts lie in the same valley
+        # two starts within half a radian over the record lie in the same valley
         if all(
             abs(start[0] - other[0]) > 0.5 or abs(start[1] - other[1]) > 0.5
             for other in best
@@ -265,7 +269,7 @@ def _starts(
     return best[:STARTS]
 
 
-@np.errstate(over="ignore", invalid="ignore")  # a trial step too far; it is rejected
+@np.errstate(over="ignore", invalid="ignore")  # a trial step too far is rejected
 def minimise(
     parameters: Samples,
     model: Model,
@@ -275,11 +279,11 @@ def minimise(
     near: float = 1e-12,
     doomed: Callable[[Samples], bool] = lambda _: False,
 ) -> tuple[Samples, float]:
-    """Refine parameters by Levenberg-Marquardt; return them and the sum of squares.
+    """Refine parameters by the Levenberg-Marquardt method; return them and the sum of squares.
 
-    Parameters that the model gives no derivatives by stay.  It ends where a step gains no more than ``near`` of the
-    sum of squares, and early where steps like the last would not bring the sum of squares down to ``hopeless``, or
-    where it takes more steps than usual to an end that is ``doomed``.
+    Parameters without derivatives are kept.  The iteration ends if a step gains less than ``near`` of the sum of
+    squares; it ends early if such steps cannot reach ``hopeless``, or after more steps than usual if the end is
+    ``doomed``.
     """
     damping = 1e-4  # of the unit diagonal: starts are close, so steps may be long
     cost, normal, gradient = _normal_equations(parameters, model, s, e)
@@ -310,7 +314,7 @@ def minimise(
 def _normal_equations(
     parameters: Samples, model: Model, s: Samples, e: Samples
 ) -> tuple[float, Samples, Samples]:
-    """Sum of squares of the rest, J J^T and J rest, block by block."""
+    """Return the sum of squares of the rest, J J^T and J rest, computed block by block."""
     cost, normal, gradient = 0.0, np.zeros(()), np.zeros(())
     for first in range(0, s.size, BLOCK):
         block = slice(first, first + BLOCK)
@@ -325,7 +329,7 @@ def _normal_equations(
 
 
 def evaluated(parameters: Samples, model: Model, s: Samples) -> tuple[Samples, Samples]:
-    """Energies (n,) and J J^T (p, p) of their derivatives, block by block: all derivatives take p times the record."""
+    """Return energies (n,) and J J^T (p, p) of their derivatives, block by block to save memory."""
     energy, normal = np.empty(s.size), np.zeros(())
     for first in range(0, s.size, BLOCK):
         block = slice(first, first + BLOCK)
@@ -334,12 +338,12 @@ def evaluated(parameters: Samples, model: Model, s: Samples) -> tuple[Samples, S
     return energy, normal
 
 
-# A parameter with no larger derivatives, of energies of the size of 1, changes nothing; squares below it underflow.
+# A parameter whose derivatives are smaller, for energies of about 1, has no effect; squares below it underflow.
 _NO_EFFECT: Final = 1e-100
 
 
 def covariance(normal: Samples, rest: Samples) -> Samples:
-    """s**2 (J J^T)^-1, by the pseudo-inverse of the matrix scaled to a unit diagonal."""
+    """Return s**2 (J J^T)^-1, by the pseudo-inverse of the matrix scaled to a unit diagonal."""
     norm = np.sqrt(normal.diagonal())
     norm[norm < _NO_EFFECT] = 1.0
     scale = norm * norm[:, None]
@@ -348,24 +352,24 @@ def covariance(normal: Samples, rest: Samples) -> Samples:
 
 
 MAX_STRUCTURE: Final = (
-    0.02  # of std(E): thirty times what one real solver leaves with one mode
+    0.02  # share of std(E), 30 times what one real solver leaves with one mode
 )
 
-# Of the covariance of white noise's neighbours: what exceeds three standard deviations is taken for structure; six
-# are beyond all doubt.
+# Standard deviations of white noise's covariance beyond which a rest has structure, and is surely structured.
 _DEVIATIONS: Final = 3.0
 _BEYOND_DOUBT: Final = 6.0
-# Samples that are farther apart may share more of a slow structure than neighbours, at most twice its variance.
+# Samples farther apart may share more of a slow structure than neighbours, at most twice its variance.
 _BEYOND_STRUCTURE: Final = 2.0
 
 
 def structure_of(rest: Samples, deviations: float = _DEVIATIONS) -> float:
-    """Root of the covariance of neighbours in ``rest`` beyond so many standard deviations of white noise's.
+    """Return the root of the neighbours' covariance in ``rest`` beyond ``deviations`` of white noise.
 
-    The larger of lags 1 and 2: a vibration sampled four times per period shows at the second only.
+    The larger value of lags 1 and 2: a vibration sampled four times per period shows only at lag 2.
     """
 
     def excess(products: Samples) -> float:
+        """Return how far the mean of products exceeds what white noise allows."""
         return abs(float(np.sum(products))) - deviations * float(
             np.linalg.norm(products)
         )
@@ -375,7 +379,7 @@ def structure_of(rest: Samples, deviations: float = _DEVIATIONS) -> float:
 
 
 def surely_structured(rest: Samples, spread: float) -> bool:
-    """Whether what is left on some of the samples, evenly chosen, shows that all of them leave too much structure.
+    """Return True if the rest on evenly spaced samples shows that all samples leave too much structure.
 
     ``spread`` is the standard deviation of the energy there.
     """

@@ -1,4 +1,4 @@
-"""Identify the one vibration mode behind an internal energy history, or say why there is none."""
+"""Identify the one vibration mode behind an internal energy history, or give the reason why there is none."""
 
 from __future__ import annotations
 
@@ -18,31 +18,33 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import Samples
 
-# Thresholds of acceptance.  White noise may be large; what a true model must not leave over is structure, the
-# part of the misfit that neighbouring samples share.
+# Thresholds of acceptance. White noise may be large, but a true model leaves no structure: the part of the misfit that
+# neighbouring samples share.
 HOPELESS: Final = (
     0.5**2
-)  # of the variance, unexplained on 400 samples: six standard deviations beyond MAX_MISFIT
+)  # unexplained share of the variance of 400 samples: six standard deviations beyond MAX_MISFIT
 MAX_LOCAL_STRUCTURE: Final = (
-    0.1  # of the fit's energy at that time: a second mode that outlives the first
+    0.1  # share of the fit's energy at that time: a second mode that outlives the first
 )
 MIN_SAMPLES: Final = 24  # four for each parameter of the richest model
-MIN_SAMPLES_PER_PERIOD: Final = (
-    10  # of the energy, pi / omega: below, an aliased fast mode passes for a slow one
+MIN_SAMPLES_PER_PERIOD: Final = 10  # samples per energy period pi / omega: with fewer, an aliased fast mode looks slow
+MAX_GROWTH: Final = (
+    0.3  # -alpha x record length: noise hides no more growth of a free vibration
 )
-MAX_GROWTH: Final = 0.3  # -alpha x record length: a free vibration only decays, noise hides no more than this
 MIN_PLASTIC: Final = (
     -0.05
-)  # of the energy range: plastic work is positive but for the scatter of its fit
+)  # share of the energy range: plastic work is positive within the scatter of its fit
 MAX_OF_SPRING: Final = (
-    0.1  # misfit that a spring which stiffens leaves to a vibration through zero
+    0.1  # misfit that a stiffening spring leaves to a vibration through zero
 )
-_OF_A_PRELOAD: Final = 0.03  # of the vibration energy: lifts a residual of 0.2, near the limit of a good one, to 0.4
+_OF_A_PRELOAD: Final = (
+    0.03  # share of the vibration energy that raises a residual of 0.2 to 0.4
+)
 
-# The energy below which a rest is not held against a mode: a solver errs by 1e-5 of the maximum anywhere.
+# The rest is not compared with less vibration energy than this: a solver errs by 1e-5 of the maximum at any time.
 _FLOOR: Final = 1e-4  # of the highest vibration energy
 
-# Free parameters of the models, simplest first, and the vibration periods it takes to tell them apart.
+# Free parameters of the models, the simplest first, and the vibration periods needed to distinguish them.
 _MODELS: Final = (
     (fitting.VIBRATION, 1.25),
     (fitting.WITH_PLASTIC, 1.5),
@@ -51,7 +53,7 @@ _MODELS: Final = (
 
 
 class Identification(NamedTuple):
-    """The mode that was fitted to an energy history, and whether it describes it.
+    """A mode fitted to an energy history, and whether it describes the history.
 
     Parameters
     ----------
@@ -173,9 +175,9 @@ def identify(
 def _first_to_follow(
     attempts: Iterable[tuple[_Attempt, float]], record: _Record
 ) -> Identification:
-    """Judge fits with the least periods for each, the simplest first; else give the refused one that is nearest.
+    """Judge fits with their least number of periods, the simplest first; else return the refused fit that is nearest.
 
-    Where one follows the samples, a richer one would follow as well, and be no more plausible.
+    If a fit follows the samples, a richer one would follow them as well and be no more plausible.
     """
     refused: list[Identification] = []
     for attempt, least_periods in attempts:
@@ -271,23 +273,26 @@ class _Record(NamedTuple):
     @classmethod
     def scaled(cls, time: Samples, energy: Samples) -> _Record:
         start, end, scale = float(time[0]), float(time[-1]), float(np.ptp(energy))
-        return cls((time - start) / (end - start), energy / scale, start, end, scale)
+        # older versions of numpy report an overflow where they divide numbers this small, and divide rightly
+        with np.errstate(over="ignore"):
+            scaled = energy / scale
+        return cls((time - start) / (end - start), scaled, start, end, scale)
 
     def pencil(self, memory: Memory | None) -> fitting.Pencil:
-        """What exponentials E may consist of, found once for all fits that share a memory."""
+        """Return the signal subspace of E, computed once for all fits that share a memory."""
         return (memory or Memory()).once(
             ("pencil", self.start, self.end), lambda: fitting.Pencil.of(self.s, self.e)
         )
 
     @property
     def units(self) -> Samples:
-        """Units of the parameters of a fit in those of the record."""
+        """Return the units of the fit's parameters in those of the record."""
         rate, root = 1 / (self.end - self.start), self.scale**0.5
         return np.array([rate, rate, root, root, self.scale, root])
 
 
 def _lacking(time: Samples, energy: Samples) -> Identification | None:
-    """Refuse a record that lacks what any judgement needs."""
+    """Return a refusal of a record that has too little for any judgement, else None."""
     if time.size < MIN_SAMPLES:
         found = "1 state" if time.size == 1 else f"{time.size} states"
         return _nothing(
@@ -295,7 +300,7 @@ def _lacking(time: Samples, energy: Samples) -> Identification | None:
         )
     if float(np.ptp(energy)) <= 1e-12 * float(
         np.max(np.abs(energy))
-    ):  # the rounding of a constant
+    ):  # rounding of a constant
         return _nothing(
             time, f"the energy is constant, {energy[0]:g}: nothing vibrates"
         )
@@ -303,7 +308,7 @@ def _lacking(time: Samples, energy: Samples) -> Identification | None:
 
 
 class _Attempt(NamedTuple):
-    """A fit: scaled and in units of the record, with scaled energies (n,) and J J^T (p, p) of their derivatives."""
+    """A fit, scaled and in units of the record, with scaled energies (n,) and J J^T (p, p) of their derivatives."""
 
     scaled: Mode
     mode: Mode
@@ -313,7 +318,7 @@ class _Attempt(NamedTuple):
 
 
 def _attempt(parameters: Samples, size: int, record: _Record) -> _Attempt:
-    """Give the fit of one mode with its first ``size`` parameters free."""
+    """Evaluate the fit of one mode with its first ``size`` parameters free."""
     fitted, normal = fitting.evaluated(
         parameters, partial(energy_and_jacobian, size=size), record.s
     )
@@ -329,7 +334,7 @@ def _judged(attempt: _Attempt, least_periods: float, record: _Record) -> Identif
     s, e = record.s, record.e
     density = samples_per_period(
         s, attempt.scaled
-    )  # first: it takes as much memory as all that follows
+    )  # first, since it needs as much memory as everything after it
     rest = e - attempt.energy
     rms, spread, structure = (
         float(np.sqrt(np.mean(rest**2))),
@@ -338,7 +343,7 @@ def _judged(attempt: _Attempt, least_periods: float, record: _Record) -> Identif
     )
     local = attempt.scaled.vibration_energy(s)
     vibration = float(np.hypot.reduce(local) / np.sqrt(s.size))  # squares may overflow
-    # where noise exceeds the vibration, a rest says nothing about a further mode
+    # if noise exceeds the vibration, a rest does not show a further mode
     np.maximum(local, max(rms, _FLOOR * np.max(local)), out=local)
     local_structure = fitting.structure_of(np.divide(rest, local, out=local))
     loose = _loose(rms / spread, structure / spread, local_structure)
@@ -365,7 +370,7 @@ def _judged(attempt: _Attempt, least_periods: float, record: _Record) -> Identif
 
 
 def _loose(misfit: float, structure: float, local_structure: float) -> str | None:
-    """Say how the fit fails to follow the samples."""
+    """Return the reason why the fit does not follow the samples, None if it does."""
     if misfit > MAX_MISFIT:
         return f"one oscillator misses the energy by {misfit:.0%} of its standard deviation, more than {MAX_MISFIT:.0%}"
     if structure > fitting.MAX_STRUCTURE:
@@ -383,7 +388,7 @@ def samples_per_period(time: Samples, mode: Mode) -> float:
     The energy has two periods per vibration period.  A record is often written with a round number of states per
     period: rounding of its times, as in single precision, must not decide whether they are enough.
     """
-    # the interval that a moment of the record lies in, on average: gaps count by their length
+    # mean interval that contains a moment of the record: gaps count by their length
     interval = float(np.sum(np.diff(time) ** 2)) / float(time[-1] - time[0])
     return float(f"{np.pi / mode.omega / interval:.4g}")
 
@@ -391,7 +396,7 @@ def samples_per_period(time: Samples, mode: Mode) -> float:
 def _implausible(
     mode: Mode, density: float, least_periods: float, span: float
 ) -> str | None:
-    """Say why a scaled fit that follows the samples is still no evidence of one free vibration."""
+    """Return the reason why a scaled fit that follows the samples is no evidence of one free vibration, else None."""
     periods = mode.omega / (2 * np.pi)
     if periods < least_periods:
         found = f"the record shows {periods:.3g} vibration periods"
@@ -403,7 +408,7 @@ def _implausible(
         share = mode.energy_plastic
         return f"the plastic energy would be {share:.2g} of the energy's range, below {MIN_PLASTIC}"
     if density < MIN_SAMPLES_PER_PERIOD:
-        # a tenth finer than the limit, so that rounding to two digits stays on its safe side
+        # 10 % finer than the limit, so that rounding to two digits stays on the safe side
         finer = np.pi * span / mode.omega / (1.1 * MIN_SAMPLES_PER_PERIOD)
         found = f"the energy has {density:.2f} samples per period, fewer than {MIN_SAMPLES_PER_PERIOD}"
         return f"{found}, and this mode may be aliased: write the output at intervals of {finer:.2g} or less"
@@ -411,6 +416,7 @@ def _implausible(
 
 
 def _mode(parameters: Samples, origin: float) -> Mode:
+    """Return the mode of some parameters."""
     omega, alpha, cosine, sine, plastic, preload = parameters.tolist()
     return Mode(omega, alpha, cosine, sine, origin, plastic, preload)
 

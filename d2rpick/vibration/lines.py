@@ -1,4 +1,4 @@
-"""The lines of an energy: which decaying exponentials it consists of, found without a first guess.
+"""Find the lines of an energy: the decaying exponentials that it consists of, without a first guess.
 
 The internal energy of a linear structure in free flight has one line for each mode, at twice the rate and twice the
 decay of the mode, above a mean that falls slowly.  The rates come from the shift invariance of the signal space
@@ -23,37 +23,36 @@ if TYPE_CHECKING:
 
     Complex = NDArray[np.complex128]
 
-# Numbers of exponentials that are tried: a line takes two of them, the mean one or a few.
+# Numbers of exponentials that are tried: a line needs two of them, the mean one or a few.
 _ORDERS: Final = (3, 5, 7, 9, 11, 13, 17, 21, 27, 35, 45, 57, 71)
-# A further order must predict better by this factor to be taken, and below this error none is sought.
+# A higher order must reduce the prediction error by this factor, and below the second value none is tried.
 _CLEARLY_BETTER, _PERFECT = 0.8, 2e-4
 # Share of the record that is fitted to predict the rest.
 FIRST_PART: Final = 0.7
-# Windows of the signal space have half the record, at most so many states: the work grows with its square.
+# Longest window of the signal space [states], else half of the record: the cost grows with its square.
 _MOST_LAGS: Final = 340
-# The even grid has so many states in a period of the fastest line that matters, and at most so many in all.
+# States of the even grid in a period of the fastest relevant line, and the fewest and most states in all.
 _STATES_PER_PERIOD, _FEWEST_STATES, _MOST_STATES = 6.4, 64, 2000
-# Times are even if they are off by less than this share of a step, as single precision and printed digits leave it.
+# Times are even if they deviate by less than this share of a step, as single precision and printed digits do.
 _EVEN: Final = 1e-3
-# So many times its median, the power of white noise hardly exceeds.
+# The power of white noise hardly exceeds this many times its median.
 _ABOVE_NOISE: Final = 10.0
-# Shares of the power of an energy about its trend: below the rate of the first lies all that matters, below that of the
-# second all that is strong.
+# Shares of the power of an energy about its trend: rates up to the first share are relevant, up to the second strong.
 _ALL_POWER, _STRONG_POWER = 0.999, 0.95
-# A line swings once in the record at least, and decays by less than this share of its rate and within the record by
-# fewer than so many powers of e.
+# A line swings at least once in the record, and decays by less than this share of its rate and by fewer powers of e
+# within the record than the third value.
 _LEAST_TURNS, _MOST_DAMPED, _MOST_DECAY = 1.0, 0.35, 25.0
-# A free vibration does not grow; noise hides a growth of at most this over the record.
+# A free vibration does not grow; noise hides a growth up to this over the record.
 _MOST_GROWTH: Final = 0.2
-# The mean is a constant and at most so many decays, which differ by this much over the record.
+# The mean is a constant and at most this many decays, which differ by this much over the record.
 _MOST_DECAYS, _SAME_DECAY = 4, 0.05
 
 
 class Grid(NamedTuple):
     """Means of an energy over blocks of equidistant states: ``time`` and ``energy`` of shape (m,) [time], [energy].
 
-    A block has ``size`` states, ``spacing`` apart [time].  ``strong``: states of the grid in a period of the fastest
-    line that is strong [-].
+    A block has ``size`` states at a distance of ``spacing`` [time].  ``strong`` is the number of grid points in a
+    period of the fastest strong line [-].
     """
 
     time: Samples
@@ -64,20 +63,20 @@ class Grid(NamedTuple):
 
     @property
     def step(self) -> float:
-        """Distance of two blocks [time]."""
+        """Return the distance between two blocks [time]."""
         return self.spacing * self.size
 
     @property
     def span(self) -> float:
-        """Time from the first block to the last [time]."""
+        """Return the time from the first block to the last [time]."""
         return float(self.time[-1] - self.time[0])
 
     def first(self, count: int) -> Grid:
-        """Give the first so many blocks."""
+        """Return a grid of the first ``count`` blocks."""
         return self._replace(time=self.time[:count], energy=self.energy[:count])
 
     def gain(self, poles: Complex) -> Complex:
-        """Mean of ``exp(p t)`` over a block, over its value in the middle of the block, of the shape of ``poles``."""
+        """Return the mean of ``exp(p t)`` over a block relative to its middle value, of the shape of ``poles``."""
         half = poles * self.spacing / 2
         with np.errstate(invalid="ignore", divide="ignore"):
             gain = np.sinh(half * self.size) / (self.size * np.sinh(half))
@@ -95,13 +94,15 @@ def even_grid(time: Samples, energy: Samples) -> Grid:
     even = np.linspace(time[0], time[-1], time.size)
     values = energy
     if np.abs(time - even).max() > _EVEN * (even[1] - even[0]):
-        from scipy.interpolate import CubicSpline  # not above: it costs start-up
+        from scipy.interpolate import (
+            CubicSpline,
+        )  # not at the top: scipy costs start-up
 
         values = CubicSpline(time, energy)(even)
     reach = even - even[0]
     trend = np.polyval(np.polyfit(reach, values, 2), reach)
     power = np.abs(np.fft.rfft((values - trend) * np.hanning(time.size))) ** 2
-    # white noise holds as much at the highest rates as anywhere
+    # white noise has as much power at the highest rates as anywhere
     noise = _ABOVE_NOISE * float(median(power[power.size // 2 :]))
     running = np.cumsum(np.maximum(power - noise, 0.0))
     fastest, strongest = np.searchsorted(
@@ -137,22 +138,22 @@ class Exponentials(NamedTuple):
     origin: float
 
     def at(self, t: Samples | float) -> Samples:
-        """Value at each time, of the shape of ``t`` [energy]."""
+        """Return the value at each time, of the shape of ``t`` [energy]."""
         return np.asarray((self.waves(t) @ self.weights).real)
 
     def waves(self, t: Samples | float) -> Complex:
-        """Each wave without its weight, of the shape of ``t`` with an axis for waves behind it [-]."""
+        """Return each wave without its weight, of the shape of ``t`` with an axis for waves after it [-]."""
         return np.exp(
             np.multiply.outer(np.asarray(t, dtype=np.float64) - self.origin, self.poles)
         )
 
     def some(self, which: NDArray[np.bool_]) -> Exponentials:
-        """Give the waves where a mask holds."""
+        """Return the waves that a mask selects."""
         return Exponentials(self.poles[which], self.weights[which], self.origin)
 
 
 class Spectrum(NamedTuple):
-    """An energy as ``lines`` above a ``mean``, fitted to a grid; ``rest`` (m,) is what they leave over [energy]."""
+    """An energy as ``lines`` above a ``mean``, fitted to a grid; ``rest`` (m,) is the deviation [energy]."""
 
     lines: Exponentials
     mean: Exponentials
@@ -160,13 +161,13 @@ class Spectrum(NamedTuple):
 
     @property
     def error(self) -> float:
-        """Root mean square of the rest [energy]."""
+        """Return the root mean square of the rest [energy]."""
         return float(np.sqrt(np.mean(self.rest**2)))
 
     def turned(self) -> Spectrum:
-        """Give the lines of the internal energy from those of the kinetic energy.
+        """Return the lines of the internal energy that correspond to these lines of the kinetic energy.
 
-        With the damping ratio z and s = sqrt(1 - z^2) the weight of a line of T is -(s + i z)^2 times that of V.
+        With the damping ratio z and s = sqrt(1 - z^2), the weight of a line of T is -(s + i z)^2 times that of V.
         """
         damping = -self.lines.poles.real / np.abs(self.lines.poles)
         turn = (np.sqrt(1 - damping**2) + 1j * damping) ** 2
@@ -177,15 +178,15 @@ class Spectrum(NamedTuple):
         )
 
     def at(self, t: Samples | float) -> Samples:
-        """Energy at each time, of the shape of ``t`` [energy]."""
+        """Return the energy at each time, of the shape of ``t`` [energy]."""
         return self.lines.at(t) + self.mean.at(t)
 
 
 class Prediction(NamedTuple):
-    """The ``spectrum`` of a whole grid, that of its first part, and how well this one predicts the rest.
+    """The ``spectrum`` of a whole grid, that of its first part, and how well the first part predicts the rest.
 
-    ``missed``: root mean square of what the spectrum of the first part misses, in it and behind it, over the standard
-    deviation of the energy about its trend, ``swing`` [-], [energy].
+    ``missed`` is the root mean square deviation from the first part's spectrum, over the whole grid, relative to
+    ``swing`` [-]; ``swing`` is the standard deviation of the energy about its trend [energy].
     """
 
     spectrum: Spectrum
@@ -194,13 +195,13 @@ class Prediction(NamedTuple):
     swing: float
 
     def turned(self) -> Prediction:
-        """Give what the lines of the kinetic energy say of those of the internal energy."""
+        """Return the prediction of the internal energy that corresponds to this one of the kinetic energy."""
         spectra = (self.spectrum.turned(), self.of_first_part.turned())
         return Prediction(*spectra, self.missed, self.swing)
 
 
 def predict(grid: Grid) -> Prediction | None:
-    """Find the lines of an energy, as many as predict it best; None where it is too short or has no swing."""
+    """Find the lines of an energy, as many as predict it best; None if it is too short or has no swing."""
     reach = grid.time - grid.time[0]
     if grid.time.size < _FEWEST_STATES // 2:
         return None
@@ -232,24 +233,25 @@ def predict(grid: Grid) -> Prediction | None:
 
 
 class _SignalSpace:
-    """The space that windows of a record span, the directions with most of it first."""
+    """The space spanned by the windows of a record, directions with the largest share first."""
 
     def __init__(self, vectors: Samples, step: float) -> None:
         self.vectors, self.step = vectors, step
 
     @classmethod
     def of(cls, grid: Grid) -> _SignalSpace:
+        """Compute the signal space of a grid."""
         lags = min(grid.time.size // 2, _MOST_LAGS)
         windows = np.lib.stride_tricks.sliding_window_view(grid.energy, lags)
         return cls(np.linalg.eigh(windows.T @ windows)[1][:, ::-1], grid.step)
 
     @property
     def size(self) -> int:
-        """How many directions there are."""
+        """Return the number of directions."""
         return int(self.vectors.shape[1])
 
     def poles(self, order: int) -> Complex:
-        """Poles of so many exponentials [1/time]: shifting a window by a state multiplies each by exp(p step)."""
+        """Return the poles of ``order`` exponentials [1/time]: a shift by one state multiplies each by exp(p step)."""
         leading = self.vectors[:, :order]
         factors = np.linalg.eigvals(
             np.linalg.lstsq(leading[:-1], leading[1:], rcond=None)[0]
@@ -259,7 +261,7 @@ class _SignalSpace:
 
 
 def fit_spectrum(grid: Grid, poles: Complex, span: float) -> Spectrum:
-    """Fit lines and mean with these poles to a grid; poles are told apart by what they do within ``span`` [time]."""
+    """Fit lines and mean with given poles to a grid; the time ``span`` decides which poles can be separated [time]."""
     lines, mean = _split(poles, span)
     every = np.concatenate([lines, mean])
     waves = np.exp(np.multiply.outer(grid.time - grid.time[0], every)) * grid.gain(
@@ -280,7 +282,7 @@ def fit_spectrum(grid: Grid, poles: Complex, span: float) -> Spectrum:
 
 
 def _block_means(spectrum: Spectrum, time: Samples, grid: Grid) -> Samples:
-    """Means of a spectrum over blocks with their middles at some times [energy]."""
+    """Return the means of a spectrum over blocks centred at some times [energy]."""
     both = (spectrum.lines, spectrum.mean)
     means = [
         (one.waves(time) @ (one.weights * grid.gain(one.poles))).real for one in both
@@ -289,7 +291,7 @@ def _block_means(spectrum: Spectrum, time: Samples, grid: Grid) -> Samples:
 
 
 def _split(poles: Complex, span: float) -> tuple[Complex, Complex]:
-    """Tell the poles of lines from those of the mean: a constant, a few decays, and swings slower than the record."""
+    """Separate the poles of lines from those of the mean: a constant, a few decays, and very slow swings."""
     decay = np.maximum(-poles.real, -_MOST_GROWTH / span)
     rate = poles.imag
     turns = rate * span / (2 * np.pi)

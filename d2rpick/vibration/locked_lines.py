@@ -1,4 +1,4 @@
-"""Lines of an energy that are locked to others: those of a stretch, and of a spring that is not linear."""
+"""Find lines of an energy that are locked to other lines: lines of a stretch, and harmonics of a nonlinear spring."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
     from d2rpick.vibration.lines import Exponentials
 
-# A line counts beside the strongest one from this share of it on, and from so many times its own scatter.
+# Least size of a line relative to the strongest one, of its partner, and in multiples of its own scatter.
 NOTABLE, _NOTABLE_PARTNER, _ABOVE_SCATTER = 3e-3, 3e-4, 4.0
-# Two rates are one if they differ by less than this share of a turn over the record.
+# Two rates are equal if they differ by less than this share of a turn over the record.
 _SAME_RATE: Final = 0.1
-# Two phases are one if they differ by less [rad]: of the line of a stretch, and of the harmonics of a spring.
+# Two phases are equal within these angles [rad]: of the line of a stretch, and of the harmonics of a spring.
 _SAME_PHASE, _SAME_PHASE_OF_HARMONICS = 0.15, 0.25
-# The strongest lines that harmonics are looked for of, and how many harmonics.
+# Number of strongest lines whose harmonics are searched, and their orders.
 _STRONGEST, _HARMONICS = 3, (2, 3, 4, 5)
 
 
 class Stretch(NamedTuple):
-    """A ``line`` of the stretch of a mode whose own line is ``of_mode``; ``energy`` of that stretch [energy]."""
+    """The ``line`` of a stretch about which the mode of the line ``of_mode`` vibrates, and its ``energy`` [energy]."""
 
     line: int
     of_mode: int
@@ -33,10 +33,10 @@ class Stretch(NamedTuple):
 def find_stretches(
     lines: Exponentials, span: float, scatter: float
 ) -> tuple[Stretch, ...]:
-    """Find the lines of modes that vibrate about a stretch, as in a body that spins.
+    """Find the lines of modes that vibrate about a stretch, as in a spinning body.
 
-    A mode q about q0 has the energy q0^2 + 2 q0 q + q^2: a further line at half the rate and phase of its own.  In free
-    flight without spin the energy is stationary at rest, whatever residual stress there is, and has no such line.
+    A mode q about q0 has the energy q0^2 + 2 q0 q + q^2: a further line at half the rate and half the phase of its own.
+    In free flight without spin the energy is stationary at rest, whatever the residual stress, and has no such line.
     """
     size, rate = np.abs(lines.weights), lines.poles.imag
     phase = _find_phases_in_middle(lines, span)
@@ -66,9 +66,9 @@ def find_stretches(
 
 
 def measure_harmonics(lines: Exponentials, span: float, scatter: float) -> float:
-    """Measure the lines at three and more times a first one whose phases are locked to it, over it [-].
+    """Return the size of lines at 3 and more times the rate of a line, with locked phases, relative to it [-].
 
-    A spring that is not linear has them; the modes of a linear structure are not locked to one another.
+    A nonlinear spring has such lines; the modes of a linear structure are not locked to each other.
     """
     size, rate = np.abs(lines.weights), lines.poles.imag
     phase = _find_phases_in_middle(lines, span)
@@ -88,14 +88,14 @@ def _measure_locked_to(
     span: float,
     scatter: float,
 ) -> float:
-    """Size of the harmonics of a line beyond its second, over it [-]; the row ends at the first that is not locked."""
+    """Return the size of a line's harmonics beyond the second, up to the first one not locked, relative to it [-]."""
     total = 0.0
     for times in _HARMONICS:
         line = int(np.argmin(np.abs(rate - times * rate[first])))
         apart = abs(rate[line] - times * rate[first]) * span > 2 * np.pi * _SAME_RATE
         if line == first or apart or size[line] < _ABOVE_SCATTER * scatter:
             break
-        # a spring that stiffens and one that softens have them with opposite signs
+        # stiffening and softening springs have harmonics of opposite signs
         if (
             abs(_wrap(phase[line] - times * phase[first], np.pi))
             > _SAME_PHASE_OF_HARMONICS
@@ -104,17 +104,17 @@ def _measure_locked_to(
         if times > 2:
             if (
                 size[line] > size[first]
-            ):  # no harmonic is stronger than what it belongs to: these are modes
+            ):  # a harmonic is never stronger than its line: these are modes
                 return 0.0
             total += float(size[line] / size[first])
     return total
 
 
 def _find_phases_in_middle(lines: Exponentials, span: float) -> Samples:
-    """Phase of each line in the middle of the window, where it is known best [rad]."""
+    """Return the phase of each line in the middle of the window, where it is known best [rad]."""
     return np.asarray(np.angle(lines.weights) + lines.poles.imag * span / 2)
 
 
 def _wrap(angle: float, turn: float) -> float:
-    """Give an angle within half a turn of zero [rad]."""
+    """Return an angle within half a turn of zero [rad]."""
     return (angle + turn / 2) % turn - turn / 2

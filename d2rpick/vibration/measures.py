@@ -1,4 +1,4 @@
-"""What a pair (tr, td) costs: one function for each measure of the output.
+"""Compute what a pair (tr, td) costs: one function for each measure of the output.
 
 A switched run keeps of the vibration only the deformation it had at tr, and starts at td with that deformation
 and no vibration velocity.  With q the deformation in units of the square root of energy (q^2 is the elastic
@@ -25,36 +25,36 @@ if TYPE_CHECKING:
     from d2rpick.vibration.amplitudes import SignedAmplitudes
     from d2rpick.vibration.modes import Mode
 
-    # Measures of n times by their names, in arrays of shape (n,); NaN where unknown.
+    # Measures of n times by name, arrays of shape (n,); NaN if unknown.
     Columns = Mapping[str, Samples]
-    # Residual of each tr as it is stated, the lowest and the highest that the record allows, from the residual that
-    # follows from the deformations, tr and td [-].
+    # Function that returns the stated, lowest and highest residual of each tr, from the residual of the deformations,
+    # tr and td [-].
     Band = Callable[[Samples, Samples, Any], tuple[Samples, Samples, Samples]]
 
 
 class Deformation(Protocol):
-    """What the measures need to know: how deformations lie to each other, and the energy of the vibration."""
+    """What the measures need: products of deformations at different times, and the energy of the vibration."""
 
     def elastic_energy(self, t: Samples | float) -> Samples:
-        """Elastic energy of the deformation, of the shape of ``t`` [energy]."""
+        """Return the elastic energy of the deformation, of the shape of ``t`` [energy]."""
 
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Product of the deformations at tr and td, of the shape of ``tr`` [energy]."""
+        """Return the product of the deformations at tr and td, of the shape of ``tr`` [energy]."""
 
     def separation(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Elastic energy of the difference of the deformations at tr and td, of the shape of ``tr`` [energy]."""
+        """Return the elastic energy of the deformation at tr less that at td, of the shape of ``tr`` [energy]."""
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
-        """T [energy]."""
+        """Return T [energy]."""
 
     def vibration_energy(self, t: Samples | float) -> Samples:
-        """V [energy]."""
+        """Return V [energy]."""
 
 
 class Measured(Record):
-    """Measures of one tr that only known deformations give, each None where it is unknown.
+    """Measures of one tr that need known deformations, each None if it is unknown.
 
-    ``residual_low`` and ``residual_high``: the band of the residual, with what the model may have missed.
+    ``residual_low`` and ``residual_high`` bound the residual, including what the model may have missed.
     """
 
     sign_match: bool | None = None
@@ -75,9 +75,9 @@ def measured(
     *,
     of_parts: bool,
 ) -> Columns:
-    """Give a column for each field of `Measured` of each tr (n,), for one ``td`` or each for its own.
+    """Return a column for each field of `Measured` for each tr (n,), for one ``td`` or one for each.
 
-    ``of_parts``: the deformations are those of parts, whose energy at td the mismatch is held against.
+    If ``of_parts`` is True the deformations are those of parts, and the mismatch is relative to their energy at td.
     """
     lock_in = lock_in_error(vibration, tr, td)
     error, lowest, highest = band(
@@ -97,8 +97,8 @@ def measured(
 
 
 def spread(size: int, found: Sequence[tuple[NDArray[np.intp], Columns]]) -> Columns:
-    """Put columns of `Measured` at their rows among ``size`` times; NaN at the others."""
-    nothing = np.broadcast_to(np.nan, size)  # which takes no memory
+    """Place columns of `Measured` at their rows among ``size`` times, with NaN at the others."""
+    nothing = np.broadcast_to(np.nan, size)  # a broadcast array needs no memory
     spread = {name: nothing.copy() if found else nothing for name in Measured._fields}
     for rows, columns in found:
         for name, column in columns.items():
@@ -107,11 +107,11 @@ def spread(size: int, found: Sequence[tuple[NDArray[np.intp], Columns]]) -> Colu
 
 
 def compared(columns: Columns) -> NDArray[np.bool_]:
-    """Of which times the deformation can be compared with that at td."""
+    """Return for each time whether its deformation can be compared with that at td."""
     return ~np.isnan(columns["sign_match"])
 
 
-# The growth of the lock-in error that ``timing_tolerance`` allows.
+# Growth of the lock-in error that ``timing_tolerance`` allows.
 TOLERATED_GROWTH = 0.05
 
 
@@ -129,7 +129,7 @@ def level_error(energy: Samples | float, level: Samples | float) -> Samples:
     comparable = (energy >= 0) & (level > 0)
     with np.errstate(
         over="ignore"
-    ):  # a level next to nothing: any other energy is infinitely far off
+    ):  # beside a level of almost nothing any other energy is infinitely far off
         square = np.divide(
             energy, level, out=np.full(energy.shape, np.nan), where=comparable
         )
@@ -137,7 +137,7 @@ def level_error(energy: Samples | float, level: Samples | float) -> Samples:
 
 
 def kinetic_share(vibration: Deformation, td: Samples | float) -> Samples:
-    """K = T(td)/V(td) [-]: the share of the vibration energy that is kinetic at td, which no tr can save.
+    """Return K = T(td)/V(td) [-]: the kinetic share of the vibration energy at td, which no tr can save.
 
     Of the shape of ``td``.
 
@@ -149,7 +149,7 @@ def kinetic_share(vibration: Deformation, td: Samples | float) -> Samples:
 def lock_in_error(
     vibration: Deformation, tr: Samples | float, td: Samples | float
 ) -> Samples:
-    """L = |q(tr) - q(td)|/sqrt(V(td)) [-]: the error of the deformation that is locked in, of the shape of ``tr``.
+    """Return L = |q(tr) - q(td)|/sqrt(V(td)) [-]: the error of the locked-in deformation, of the shape of ``tr``.
 
     The same as |sqrt(E(tr)) - s sqrt(E(td))|/sqrt(V(td)) with s = 1 for equal signs of the deformation, else -1; for
     several modes or parts the root of the sum of squares over them, since their energies add up.  ``td`` is one for all
@@ -163,14 +163,14 @@ def lock_in_error(
 def part_mismatch(
     vibration: Deformation, tr: Samples | float, td: Samples | float
 ) -> Samples:
-    """D = L/sqrt(1 - K) [-]: the same error against the internal energy at td alone, of the shape of ``tr``."""
+    """Return D = L/sqrt(1 - K) [-]: the same error relative to the internal energy at td, shape of ``tr``."""
     return np.asarray(
         np.sqrt(vibration.separation(tr, td)) / np.sqrt(vibration.elastic_energy(td))
     )
 
 
 def mismatch_shares(vibration: SignedAmplitudes, tr: float, td: float) -> Samples:
-    """Give the share of each mode or part in D^2, shape (k,) [-]; zero where nothing is off."""
+    """Return the share of each mode or part in D^2, shape (k,) [-]; zero if there is no mismatch."""
     square = vibration.differences(tr, td) ** 2
     total = square.sum()
     return square / total if total > 0 else square
@@ -179,10 +179,10 @@ def mismatch_shares(vibration: SignedAmplitudes, tr: float, td: float) -> Sample
 def sign_match(
     vibration: Deformation, tr: Samples | float, td: Samples | float
 ) -> NDArray[np.bool_]:
-    """Whether the deformations at tr and td point the same way, of the shape of ``tr``.
+    """Return for each tr whether the deformations at tr and td point the same way, of the shape of ``tr``.
 
-    For one mode or part: equal signs.  For several: the sum over q(tr) q(td) is not negative, so that a part which is
-    hardly deformed does not decide.
+    For one mode or part: equal signs.  For several: the sum over q(tr) q(td) is not negative, so that a part with
+    almost no deformation does not decide.
     """
     return np.asarray(vibration.overlap(tr, td) >= 0)
 
@@ -193,12 +193,12 @@ def band_up_to(
     tr: Samples,
     td: Samples | float,
 ) -> tuple[Samples, Samples, Samples]:
-    """Give the band of a model whose stated residual is the least one, from what gives the ``highest``."""
+    """Return the band of a model whose stated residual is its lower bound, from a function of the ``highest``."""
     return stated, stated, highest(stated, tr, td)
 
 
 def residual(lock_in: Samples | float, kinetic: Samples | float) -> Samples:
-    """R = sqrt(L^2 + K) [-]: the vibration error after td relative to the reference vibration.
+    """Return R = sqrt(L^2 + K) [-]: the vibration error after td relative to the reference vibration.
 
     Examples
     --------
@@ -209,7 +209,7 @@ def residual(lock_in: Samples | float, kinetic: Samples | float) -> Samples:
 
 
 def wrong_sign(kinetic: float) -> float:
-    """R = sqrt(4 - 3 K) [-]: the residual where the level of td is locked in with the opposite sign, L^2 = 4 (1 - K).
+    """Return R = sqrt(4 - 3 K) [-]: the residual of the level of td with the opposite sign, L^2 = 4 (1 - K).
 
     Examples
     --------
@@ -222,10 +222,10 @@ def wrong_sign(kinetic: float) -> float:
 def run_time_share(
     rigid_fraction: float, cost_share: float, step_ratio: float
 ) -> float:
-    """Expected run time of the switched run over that of the reference, 1 - f (1 - (1 - c)/n) [-].
+    """Return the expected run time of the switched run over that of the reference, 1 - f (1 - (1 - c)/n) [-].
 
-    In the rigid window, a fraction f of the run, the share c of the cost of a step that the switched parts' elements
-    take is saved, and there are n times fewer steps.
+    In the rigid window, a fraction f of the run, the share c of a step's cost that the switched parts' elements need is
+    saved, and there are n times fewer steps.
 
     Parameters
     ----------
@@ -245,17 +245,17 @@ def run_time_share(
 
 
 def timing_tolerance(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
-    """How far each tr of shape (n,) may be off, to either side, before L grows by 0.05 [time]; td as for L.
+    """Return how far each tr of shape (n,) may be off, to either side, before L grows by 0.05 [time]; td as for L.
 
-    That is the nearest time where q leaves the band about q(td) that is wider than the deviation at tr by the
-    tolerated growth; a period where q stays inside, since all it does it has done then.
+    That is the nearest time at which q leaves the band about q(td) that is wider than the deviation at tr by the
+    tolerated growth; one period if q stays inside, since q has then passed all its values.
     """
     wanted = np.broadcast_to(mode.deformation(td), tr.shape)
     room = (lock_in_error(mode, tr, td) + TOLERATED_GROWTH) * np.sqrt(
         mode.vibration_energy(td)
     )
     half, still = np.pi / mode.omega, mode.standstill_after(tr)
-    # on both sides of tr, in columns side by side, the standstills between which q is monotone
+    # standstills between which q is monotone, on both sides of tr, in columns side by side
     steps = np.repeat([[0.0, 1.0, 2.0], [-1.0, -2.0, -3.0]], tr.size, axis=0).T * half
     edges = np.vstack([np.tile(tr, 2), np.tile(still, 2) + steps])
     distances = _leaving(mode, edges, np.tile(wanted, 2), np.tile(room, 2))
@@ -263,12 +263,12 @@ def timing_tolerance(mode: Mode, tr: Samples, td: Samples | float) -> Samples:
 
 
 def _leaving(mode: Mode, edges: Samples, wanted: Samples, room: Samples) -> Samples:
-    """Distance from the first of some ``edges`` to where |q - wanted| exceeds ``room``; infinite if nowhere.
+    """Return the distance from the first of some ``edges`` to where |q - wanted| exceeds ``room``; infinite if nowhere.
 
-    Between neighbouring edges q is monotone, so the first one outside has the place just before it.
+    Between neighbouring edges q is monotone, so the place lies just before the first edge outside.
     """
     outside = np.abs(mode.deformation(edges) - wanted) > room
-    outside[0] = False  # tr itself, whatever rounding says
+    outside[0] = False  # tr itself is inside, whatever rounding gives
     first = np.argmax(outside, axis=0)
     column = np.flatnonzero(first > 0)
     inner, outer = edges[first[column] - 1, column], edges[first[column], column]
@@ -289,7 +289,7 @@ def _leaving(mode: Mode, edges: Samples, wanted: Samples, room: Samples) -> Samp
 def vertices(
     time: Samples, values: Samples, at: NDArray[np.intp]
 ) -> tuple[Samples, Samples]:
-    """Times and values of the vertices of the parabolas through the samples ``at`` and their neighbours."""
+    """Return times and values of the vertices of the parabolas through the samples ``at`` and their neighbours."""
     before, after = time[at] - time[at - 1], time[at + 1] - time[at]
     fall, rise = (
         (values[at] - values[at - 1]) / before,
@@ -297,7 +297,7 @@ def vertices(
     )
     bend = (rise - fall) / (before + after)
     slope = (fall * after + rise * before) / (before + after)
-    # beside a value without bound a sample is its own vertex, as where nothing bends
+    # beside an unbounded value a sample is its own vertex, like on a straight line
     bent = np.isfinite(bend) & (bend != 0)
     step = np.divide(-slope, 2 * bend, out=np.zeros(at.shape), where=bent)
     return time[at] + step, values[at] + np.multiply(
@@ -306,21 +306,21 @@ def vertices(
 
 
 class Profile(NamedTuple):
-    """Lock-in errors ``error`` at ascending times ``time``, both of shape (n,), for one td [time], [-]."""
+    """Lock-in errors ``error`` at ascending times ``time``, both of shape (n,), for one td [-], [time]."""
 
     time: Samples
     error: Samples
 
     @classmethod
     def of(cls, vibration: Deformation, time: Samples, td: float) -> Profile:
-        """Profile at the times before ``td``."""
+        """Compute the profile at the times before ``td``."""
         before = time[
             : np.searchsorted(time, td)
-        ]  # a copy for each td would fill the memory
+        ]  # views: a copy for each td would fill the memory
         return cls(before, lock_in_error(vibration, before, td))
 
     def minima(self) -> tuple[float, ...]:
-        """Times of the local minima: the vertex of the parabola through three squares, for L^2 is smooth [time]."""
+        """Return the times of the local minima, from parabolas through three squares, since L^2 is smooth [time]."""
         t, square = self.time, self.error**2
         if t.size < 3:
             return ()
@@ -331,12 +331,12 @@ class Profile(NamedTuple):
         return tuple(vertices(t, square, at)[0].tolist())
 
     def cell(self, at: Samples) -> Samples:
-        """Interval between the two times around each of ``at`` [time]."""
+        """Return the interval between the two times around each of ``at`` [time]."""
         after = np.clip(np.searchsorted(self.time, at), 1, self.time.size - 1)
         return np.asarray(self.time[after] - self.time[after - 1])
 
     def tolerances(self, tr: Samples, errors: Samples) -> Samples:
-        """How far each tr (n,) may be off before its error grows by 0.05; at most over all times [time].
+        """Return how far each tr (n,) may be off before its error grows by 0.05; at most the profile's length [time].
 
         ``errors`` are those at each tr; between its times the profile is linear.
         """
@@ -359,11 +359,11 @@ class Profile(NamedTuple):
     def _leaving(
         self, outside: NDArray[np.intp], inwards: int, tr: Samples, limit: Samples
     ) -> Samples:
-        """Distance from each ``tr`` to where the error passes ``limit``, linear from the time ``outside`` inwards."""
+        """Return the distance from each ``tr`` to where the error passes ``limit``, linear from ``outside`` inwards."""
         inside = np.clip(outside + inwards, 0, self.time.size - 1)
         (t0, e0), (t1, e1) = (
             (self.time[at], self.error[at]) for at in (inside, outside)
         )
         share = np.divide(limit - e0, e1 - e0, out=np.zeros(tr.shape), where=e1 != e0)
-        # where no time lies between tr and the outside, that counts
+        # if no time lies between tr and the outside, the outside counts
         return np.asarray(np.abs(np.where(e0 > limit, t1, t0 + share * (t1 - t0)) - tr))

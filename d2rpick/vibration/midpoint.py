@@ -1,4 +1,4 @@
-r"""The error of any pair of times from the energy alone, for any number of modes: the value halfway between the two.
+r"""Compute the error of any pair of times from the energy alone, for any number of modes, by the value halfway between.
 
 A linear structure in free flight has modes :math:`q_k = a_k e^{-g_k t} \cos(w_k t + p_k)`, scaled so that the elastic
 energy of the vibration is :math:`V = \sum q_k^2`.  With m halfway between tr and td and :math:`\tau` from tr to td,
@@ -35,11 +35,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Reading:
-    """What a spectrum of an energy says of the vibration, once it is decided which lines are modes.
+    """An interpretation of a spectrum, in which it is decided which lines are modes.
 
-    ``is_mode`` (k,): the other lines are those of a stretch, which is no vibration.  ``no_static``: all of the mean is
-    vibration; else half of what the modes hold is, and the rest is static.  ``rest`` is what of the record beside the
-    spectrum is believed, at ``times`` [energy], [time].
+    ``is_mode`` (k,) marks modes; other lines are those of a stretch, which does not vibrate.  If ``no_static`` is True
+    all of the mean is vibration, else the modes have half of it and the rest is static.  ``rest`` is the part of the
+    record beside the spectrum that is kept, at ``times`` [energy], [time].
     """
 
     spectrum: Spectrum
@@ -51,16 +51,16 @@ class Reading:
 
     @cached_property
     def modes(self) -> Exponentials:
-        """The lines that modes have."""
+        """Return the lines of the modes."""
         return self.spectrum.lines.some(self.is_mode)
 
     @cached_property
     def _peak_energies(self) -> Samples:
-        """The energy h of each mode at the origin [energy]."""
+        """Return the energy h of each mode at the origin [energy]."""
         return 2 * np.abs(self.modes.weights)
 
     def elastic_energy(self, t: Samples | float) -> Samples:
-        """V, the elastic energy of the vibration, of the shape of ``t``; noise makes it negative at times [energy]."""
+        """Return V, the elastic energy of the vibration, of the shape of ``t``; noise may make it negative [energy]."""
         t = np.asarray(t, dtype=np.float64)
         energy = self.modes.at(t) + np.interp(t, self.times, self.rest)
         if self.no_static:
@@ -72,7 +72,7 @@ class Reading:
         return np.asarray(energy + self.level_of_modes(t) / 2)
 
     def level_of_modes(self, t: Samples | float) -> Samples:
-        """Sum of the energies that the lines of the modes tell, of the shape of ``t`` [energy]."""
+        """Return the sum of the mode energies according to their lines, of the shape of ``t`` [energy]."""
         decays = self.modes._replace(
             poles=self.modes.poles.real.astype(np.complex128),
             weights=self._peak_energies.astype(np.complex128),
@@ -80,19 +80,19 @@ class Reading:
         return decays.at(t)
 
     def level(self, t: Samples | float) -> Samples:
-        """H, the energy of all modes but for its changes within a period, of the shape of ``t`` [energy]."""
+        """Return H, the energy of all modes without its changes within a period, of the shape of ``t`` [energy]."""
         level = (
             2 * self.spectrum.mean.at(t) if self.no_static else self.level_of_modes(t)
         )
         return np.maximum(level, self.tiny)
 
     def vibration_energy(self, t: Samples | float) -> Samples:
-        """U = V + T, the elastic and kinetic energy of the vibration, of the shape of ``t`` [energy]."""
+        """Return U = V + T, the elastic and kinetic energy of the vibration, of the shape of ``t`` [energy]."""
         return np.maximum(self.level(t) + self._within_period.at(t), self.tiny)
 
     @cached_property
     def _within_period(self) -> Exponentials:
-        """How the vibration energy of each mode changes within a period, since damping takes none at standstills."""
+        """Return how each mode's vibration energy changes within a period, since damping takes none at standstills."""
         poles = self.modes.poles
         damping = -poles.real / np.abs(poles)
         # z (z cos 2 theta + sqrt(1 - z^2) sin 2 theta), as the real part of a weight on each line
@@ -100,7 +100,7 @@ class Reading:
         return self.modes._replace(weights=2 * self.modes.weights * turned)
 
     def energies_of_modes(self, t: float) -> Samples:
-        """Vibration energy of each mode at a time, shape (k,), not negative [energy]."""
+        """Return the vibration energy of each mode at a time, shape (k,), not negative [energy]."""
         decayed = self._peak_energies * np.abs(self.modes.waves(t))
         within_period = self._within_period
         return np.maximum(
@@ -108,27 +108,27 @@ class Reading:
         )
 
     def coherence(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """C, how far the modes are in step after td - tr, for pairs of times whose shapes go together [energy]."""
+        """Return C, how far the modes are in step after td - tr, for broadcastable times [energy]."""
         return np.asarray(
             np.einsum("...k,...k->...", self.earlier(tr), self.later(td)).real
         )
 
     def earlier(self, tr: Samples | float) -> Complex:
-        """What tr has in the coherence, of its shape with an axis for modes behind it [energy]."""
+        """Return the factor of tr in the coherence, of its shape with an axis for modes after it [energy]."""
         half = self.modes._replace(poles=self.modes.poles.conj() / 2)
         return half.waves(tr) * self._peak_energies
 
     def later(self, td: Samples | float) -> Complex:
-        """What td has in the coherence, of its shape with an axis for modes behind it [-]."""
+        """Return the factor of td in the coherence, of its shape with an axis for modes after it [-]."""
         return self.modes._replace(poles=self.modes.poles / 2).waves(td)
 
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """X, the product of the deformations at tr and td, within its bounds [energy]."""
+        """Return X, the product of the deformations at tr and td, within its bounds [energy]."""
         bound = self.bound(tr, td)
         return np.clip(self.free_overlap(tr, td), -bound, bound)
 
     def free_overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """The same as it comes out, which noise and a wrong model may drive beyond the bounds [energy]."""
+        """Return X without bounds, which noise and a wrong model may exceed [energy]."""
         middle = (np.asarray(tr) + td) / 2
         return (
             self.elastic_energy(middle)
@@ -137,12 +137,12 @@ class Reading:
         )
 
     def bound(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Largest product that deformations with these energies have [energy]."""
+        """Return the largest product that deformations with these energies can have [energy]."""
         energies = (np.maximum(self.elastic_energy(t), 0.0) for t in (tr, td))
         at_tr, at_td = energies
         return np.asarray(np.sqrt(at_tr * at_td))
 
     def residual_squared(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """R^2 of pairs of times [-]."""
+        """Return R^2 of pairs of times [-]."""
         lost = self.elastic_energy(tr) - 2 * self.overlap(tr, td)
         return np.maximum(1 + lost / self.vibration_energy(td), 0.0)

@@ -1,8 +1,8 @@
-"""A vibration of any number of modes, identified from the lines of the energy, with what may be wrong with it.
+"""Identify a vibration of any number of modes from the lines of the energy, with the doubts about it.
 
-The lines can be read in more than one way: what of the mean is static, and which lines belong to a stretch instead of
-a mode.  The reading that fits is taken; what the others would say, and what the first part of the record says, widen
-the band of its residuals.  Where the record is none of a linear structure in free flight, the reason is given.
+Lines can be interpreted in more than one way: how much of the mean is static, and which lines belong to a stretch
+rather than a mode.  The best interpretation is used; other ones, and the lines of the record's first part, widen the
+band of its residuals.  If the record is not that of a linear structure in free flight, the reason is given.
 """
 
 from __future__ import annotations
@@ -34,64 +34,65 @@ if TYPE_CHECKING:
 
     Mask = NDArray[np.bool_]
 
-# Fewest states of a record that lines are looked for in.
+# Fewest states of a record in which lines are searched.
 _FEWEST_STATES: Final = 32
-# Of the mean vibration energy: a static energy below this share is none, it is the scatter of the fit.
+# A static energy below this share of the mean vibration energy is scatter of the fit.
 _NO_STATIC: Final = 0.12
-# Nothing vibrates if the energy swings by less than this share of its highest value: single precision resolves less.
+# Nothing vibrates if the energy swings by less than this share of its highest value: single precision resolves no less.
 _RESOLVED: Final = 2e-7
-# Least energy that anything is divided by, over the swing of the record.
+# Smallest divisor, as a share of the swing of the record.
 _TINY: Final = 1e-12
-# Pairs of times in which the overlap of the deformations is held against its bounds, in each direction.
+# Number of times, in each direction, for pairs in which the overlap is compared with its bounds.
 _CHECKED: Final = 90
 
-# A stretch that leaves the static energy within this share of the mean may be another mode at half of the rate.
+# A stretch that leaves the static energy within this share of the mean may instead be a mode at half the rate.
 _AMBIGUOUS: Final = 0.08
 
-# What refuses a record, each a share of what its name says.
-_MOST_MISSED: Final = 0.5  # prediction error over the swing of the energy
-_MOST_MISFIT: Final = 0.3  # rest over the swing of the energy
+# Limits above which a record is refused.
+_MOST_MISSED: Final = 0.5  # prediction error relative to the swing of the energy
+_MOST_MISFIT: Final = 0.3  # rest relative to the swing of the energy
 _MOST_NEGATIVE, _MOST_NEGATIVE_AT_ALL = (
     0.07,
     0.5,
-)  # negative static energy over the mean vibration energy, beyond what noise makes
-_MOST_DRIFT: Final = 0.6  # change of the static energy over the mean vibration energy
-_MOST_BEYOND: Final = (
-    0.12  # overlap beyond its bounds over the vibration energy, rms over all pairs
+)  # negative static energy relative to the mean vibration energy, beyond the effect of noise
+_MOST_DRIFT: Final = (
+    0.6  # change of the static energy relative to the mean vibration energy
 )
-_MOST_HARMONIC: Final = 0.05  # lines locked to a first one over it
+_MOST_BEYOND: Final = 0.12  # overlap beyond its bounds relative to the vibration energy, rms over all pairs
+_MOST_HARMONIC: Final = 0.05  # lines locked to a first one, relative to it
 _MOST_UNSTRETCHED, _MOST_UNSTRETCHED_AT_ALL = (
     0.15,
     0.6,
-)  # energy of a stretch that the static energy does not hold
+)  # energy of a stretch that the static energy does not contain
 _FEWEST_PER_PERIOD: Final = 2.4  # states per period of the fastest strong line
 
-# Times in a period of the fastest notable line at which a deformation is looked at.
+# Times per period of the fastest notable line at which deformations are evaluated.
 _TIMES_PER_PERIOD: Final = 16
 
-# So many times as near to one another are times between which the energy is a straight line.
+# Refinement of these times at which the energy is linear between neighbours.
 _FINER: Final = 4
 
-# Of the swing of the energy: modes that leave less, and predict the rest within so much, show a flight.
+# Modes show a flight if they leave less than this share of the energy's swing and predict the rest within the second
+# share.
 _LITTLE_LEFT, _LITTLE_MISSED = 0.05, 0.2
 
-# The half-width of R^2, before anything is known to be wrong.
+# Half-width of R^2 without any known error.
 _LEAST_HALF: Final = 0.01
 _VAGUE_HALF: Final = (
-    0.2  # half-width of the band of R^2; that of well-read modes is 0.02 to 0.1
+    0.2  # half-width of R^2 of vague modes; well-identified ones have 0.02 to 0.1
 )
-_SOME_TIMES: Final = 64  # at which the band is looked at as a whole
+_SOME_TIMES: Final = 64  # number of times at which the band is evaluated as a whole
 _DRIFT_COUNTS, _NEGATIVE_COUNTS, _NOISE_COUNTS = 0.35, 1.2, 2.5
 _DRIFT_OF_NOISE: Final = 0.08
-_HIDDEN_LINES: Final = 12  # as many lines as may hide in what the fit leaves over
+_HIDDEN_LINES: Final = 12  # number of lines that may hide in the rest of the fit
 
 
 class Doubts(NamedTuple):
-    """What speaks against a record as one of a linear structure in free flight, each zero if nothing does [-].
+    """What contradicts that a record is that of a linear structure in free flight, each 0 without a doubt [-].
 
-    ``missed`` and ``misfit`` are over the swing of the energy, ``negative``, ``drift`` and ``unstretched`` over the
-    mean vibration energy, ``beyond`` over the vibration energy; ``harmonic`` is the size of lines that are locked to a
-    first one, over it; ``coarse``: states per period of the fastest strong line.
+    ``missed`` and ``misfit`` are relative to the swing of the energy, ``negative``, ``drift`` and ``unstretched`` to
+    the mean vibration energy, ``beyond`` to the vibration energy; ``harmonic`` is the size of lines locked to a first
+    one, relative to it; ``coarse`` is the number of states per period of the fastest strong line.
     """
 
     missed: float
@@ -105,15 +106,16 @@ class Doubts(NamedTuple):
 
     @property
     def refusal(self) -> str | None:
-        """Say what refuses the record; None if nothing does."""
+        """Return the reason for refusing the record, None if there is none."""
         return self._first_of(_MOST_NEGATIVE, _MOST_UNSTRETCHED)
 
     @property
     def refusal_at_all(self) -> str | None:
-        """Say what refuses the record even if nothing better is known; None if nothing does."""
+        """Return the reason for refusing the record even if no better model is known, None if there is none."""
         return self._first_of(_MOST_NEGATIVE_AT_ALL, _MOST_UNSTRETCHED_AT_ALL)
 
     def _first_of(self, most_negative: float, most_unstretched: float) -> str | None:
+        """Return the first reason for a refusal, with the given limits."""
         reasons = (
             (
                 self.coarse < _FEWEST_PER_PERIOD,
@@ -154,7 +156,7 @@ class ModeAtTd(NamedTuple):
 
 
 class _Course(NamedTuple):
-    """Elastic energies at times so near to one another that it is a straight line between them [time], [energy]."""
+    """Elastic energies at times so close that they are linear between them [time], [energy]."""
 
     time: Samples
     energy: Samples
@@ -206,18 +208,18 @@ class ModalVibration:
 
     @property
     def signed(self) -> bool:
-        """Whether nothing refuses the record."""
+        """Return True if nothing refuses the record."""
         return (
             self.doubts.refusal_at_all if self.last_resort else self.doubts.refusal
         ) is None
 
     def as_last_resort(self) -> ModalVibration:
-        """Give the same, to be relied on since nothing better is known."""
+        """Return the same vibration with wider limits of doubt, for use if no better model is known."""
         return replace(self, last_resort=True)
 
     @property
     def convinces(self) -> bool:
-        """Whether the modes go on by themselves so exactly that nothing else can act on them."""
+        """Return True if the modes predict the record so well that nothing else can act on it."""
         white = 1 - self.systematic
         structure = self.doubts.misfit * np.sqrt(self.systematic)
         missed = self.doubts.missed**2 - 2 * white * self.doubts.misfit**2
@@ -225,7 +227,7 @@ class ModalVibration:
 
     @property
     def told(self) -> str:
-        """Name what a choice rests on: the modes, by their rates."""
+        """Return what a choice rests on, in words: the modes by their rates."""
         rates = np.sort(self.reading.modes.poles.imag / 2)
         count = f"{rates.size} mode{'s' * (rates.size != 1)}"
         span = (
@@ -236,17 +238,17 @@ class ModalVibration:
         return f"modal, {count} identified from the lines of the {self.source}, {span}"
 
     def modes_at(self, td: float) -> list[ModeAtTd]:
-        """Give the modes with their energy at ``td``, the slowest first."""
+        """Return the modes with their energy at ``td``, the slowest first."""
         poles, energies = self.reading.modes.poles, self.reading.energies_of_modes(td)
         rows = zip(poles.imag / 2, -poles.real, energies, strict=True)
         return sorted(ModeAtTd(*map(float, row)) for row in rows)
 
     def comparable_since(self, td: float) -> float:
-        """Earliest time whose deformation can be compared with that at ``td`` [time]."""
+        """Return the earliest time whose deformation can be compared with that at ``td`` [time]."""
         return min(float(self.time[0]), td)
 
     def known_at(self, td: float) -> bool:
-        """Whether td lies where the modes were identified, and more than the error of a solver vibrates there."""
+        """Return True if the modes were identified at td and more vibrates there than the solver's error."""
         level = self.reading.level(np.append(self.time[[0, -1]], td))
         return bool(
             self.time[0] <= td <= self.time[-1]
@@ -254,30 +256,30 @@ class ModalVibration:
         )
 
     def elastic_energy(self, t: Samples | float) -> Samples:
-        """V, of the shape of ``t``, not negative [energy]."""
+        """Return V, of the shape of ``t``, not negative [energy]."""
         return np.maximum(self.reading.elastic_energy(t), 0.0)
 
     def vibration_energy(self, t: Samples | float) -> Samples:
-        """U = V + T, of the shape of ``t`` [energy]."""
+        """Return U = V + T, of the shape of ``t`` [energy]."""
         return self.reading.vibration_energy(t)
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
-        """T, of the shape of ``t``, not negative [energy]."""
+        """Return T, of the shape of ``t``, not negative [energy]."""
         return np.maximum(self.vibration_energy(t) - self.elastic_energy(t), 0.0)
 
     def overlap(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """X, the product of the deformations at tr and td, for times of one shape, or one of them [energy]."""
+        """Return X, the product of the deformations at tr and td, for times of one shape, or one of them [energy]."""
         return self.reading.overlap(tr, td)
 
     def separation(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Elastic energy of the difference of the deformations at tr and td [energy]."""
+        """Return the elastic energy of the difference of the deformations at tr and td [energy]."""
         apart = (
             self.elastic_energy(tr) - 2 * self.overlap(tr, td) + self.elastic_energy(td)
         )
         return np.maximum(apart, 0.0)
 
     def profile(self, td: float) -> Profile:
-        """Lock-in errors at those of the ``time`` that come before ``td``, by what is worked out for all td once."""
+        """Return lock-in errors at those of ``time`` before ``td``, from values computed once for all td."""
         last = int(np.searchsorted(self.time, td))
         elastic, finer, earlier = self._at_all_times
         middle = (self.time[:last] + td) / 2
@@ -297,7 +299,7 @@ class ModalVibration:
 
     @cached_property
     def _at_all_times(self) -> tuple[Samples, _Course, Complex]:
-        """Elastic energy at the ``time``, at times between, and what tr has in the coherence."""
+        """Return the elastic energy at ``time``, at finer times, and the factor of tr in the coherence."""
         finer = np.linspace(
             self.time[0], self.time[-1], _FINER * (self.time.size - 1) + 1
         )
@@ -309,7 +311,7 @@ class ModalVibration:
         )
 
     def half_width(self, tr: Samples | float, td: Samples | float) -> Samples:
-        """Half-width of the band of R^2 of pairs of times [-]."""
+        """Return the half-width of the band of R^2 for pairs of times [-]."""
         reading, level = self.reading, self.reading.level(td)
         squared = reading.residual_squared(tr, td)
         lines = (
@@ -332,7 +334,7 @@ class ModalVibration:
 
     @cached_property
     def is_vague(self) -> bool:
-        """Whether the band of most pairs is so wide that it hardly tells one from another."""
+        """Return True if the band of most pairs is so wide that it hardly separates them."""
         some = np.linspace(self.time[0], self.time[-1], _SOME_TIMES)
         widths = [self.half_width(some, td) for td in some[:: _SOME_TIMES // 8]]
         return bool(np.mean(np.array(widths) > _VAGUE_HALF) > 0.5)
@@ -340,24 +342,24 @@ class ModalVibration:
     def residual_band(
         self, stated: Samples, tr: Samples, td: Samples | float
     ) -> tuple[Samples, Samples, Samples]:
-        """Residual of each tr (n,), and the lowest and highest that the record allows [-].
+        """Return the residual of each tr (n,), and the lowest and highest that the record allows [-].
 
-        No square is below zero: where the band reaches there, the middle of the rest is stated instead of ``stated``.
+        Squares are not negative: if the band reaches below zero, the middle of its remainder replaces ``stated``.
         """
         squared, half = np.square(stated), self.half_width(tr, td)
         low, high = np.maximum(squared - half, 0.0), squared + half
         return np.sqrt((low + high) / 2), np.sqrt(low), np.sqrt(high)
 
     def unseen(self, tr: Samples | float, td: float) -> Samples:
-        """Share of the vibration energy at td that the band is worth, from each tr on [-].
+        """Return the share of the vibration energy at td that corresponds to the band, from each tr on [-].
 
-        A hidden mode that stands opposed at tr and td adds four times its share to R^2.
+        A hidden mode in opposite phase at tr and td adds four times its share to R^2.
         """
         return self.half_width(tr, td) / 4
 
     @cached_property
     def _wrong(self) -> float:
-        """What widens the band of all pairs alike [-]."""
+        """Return what widens the band of all pairs equally [-]."""
         doubts = self.doubts
         drifts = not self.reading.no_static or doubts.drift > _DRIFT_OF_NOISE
         negative = max(doubts.negative - self.slack, 0.0)
@@ -370,7 +372,7 @@ class ModalVibration:
     def _of_other_readings(
         self, tr: Samples | float, td: Samples | float, squared: Samples
     ) -> Samples:
-        """How far R^2 may be off because the lines can be read in another way [-]."""
+        """Return how far R^2 may be off because the lines can be interpreted in another way [-]."""
         apart = [
             np.abs(other.residual_squared(tr, td) - squared) for other in self.others
         ]
@@ -378,7 +380,7 @@ class ModalVibration:
             return (
                 np.asarray(np.max(apart, axis=0)) if apart else np.zeros(squared.shape)
             )
-        # lines that hide in the rest hold no more than this beside those that were found
+        # lines hidden in the rest have at most this energy beside the identified ones
         hidden = (
             2
             * np.sqrt(2 * _HIDDEN_LINES)
@@ -390,17 +392,17 @@ class ModalVibration:
 
     @property
     def is_ambiguous(self) -> bool:
-        """Whether lines at half the rate of others are those of a stretch, or of modes."""
+        """Return True if lines at half the rate of others may be those of a stretch or of modes."""
         return not self.reading.is_mode.all() and bool(self.others)
 
 
 def identify_modal(
     time: Samples, energy: Samples, *, kinetic: bool = False
 ) -> ModalVibration | None:
-    """Identify the modes of a structure from its energy in free flight; None if it has no lines.
+    """Identify the modes of a structure from its energy in free flight; return None if it has no lines.
 
-    The kinetic energy has the lines of the internal energy with the opposite sign, and whatever else it holds is slow:
-    elastic and kinetic energy of a mode add up to what falls without a swing.
+    The kinetic energy has the lines of the internal energy with the opposite sign, and everything else in it is slow:
+    the sum of elastic and kinetic energy of a mode falls without a swing.
 
     Parameters
     ----------
@@ -444,7 +446,7 @@ def identify_modal(
 def confirm(
     internal: ModalVibration | None, kinetic: ModalVibration | None
 ) -> ModalVibration | None:
-    """Give what the internal energy says, its band widened to what the kinetic energy says; else that alone."""
+    """Return the result of the internal energy, its band widened to that of the kinetic energy, else the latter."""
     if kinetic is None or not kinetic.signed:
         return internal
     if internal is None:
@@ -455,9 +457,9 @@ def confirm(
 
 
 def _may_decide(internal: ModalVibration, kinetic: ModalVibration) -> bool:
-    """Whether the kinetic energy may decide where the internal one is refused: a damper's work or plastic flow is why.
+    """Return True if the kinetic energy may decide because plastic flow or a damper's work refuses the internal energy.
 
-    The internal energy then holds at least the elastic half of what vibrates, and allows what it says halfway.
+    The internal energy then contains at least the elastic half of the vibration, and its value halfway can be used.
     """
     held = float(np.mean(internal.reading.spectrum.mean.at(internal.time)))
     needed = float(np.mean(kinetic.reading.level_of_modes(internal.time))) / 2
@@ -473,9 +475,9 @@ def _read(
     *,
     kinetic: bool = False,
 ) -> ModalVibration:
-    """Read the lines in the way that fits, and in others; of a ``kinetic`` energy the mean says nothing.
+    """Interpret the lines in the best way, and in others; the mean of a ``kinetic`` energy has no meaning.
 
-    ``window`` is from the first state to the last, which means over the blocks of the grid do not reach [time].
+    ``window`` is the time from the first state to the last, which means over the grid's blocks do not reach [time].
     """
     spectrum, tiny = prediction.spectrum, _TINY * prediction.swing
     noise, rest = spectrum.error, spectrum.rest
@@ -555,14 +557,14 @@ def _read(
 
 
 def _without(lines: Exponentials, stretches: tuple[Stretch, ...]) -> Mask:
-    """Mark the lines that are none of a stretch."""
+    """Return a mask of the lines that do not belong to a stretch."""
     kept = np.ones(lines.poles.size, dtype=bool)
     kept[[stretch.line for stretch in stretches]] = False
     return kept
 
 
 def _close_times(reading: Reading, window: tuple[float, float], fewest: int) -> Samples:
-    """Times over a window, close enough for a parabola through three of them to find a minimum [time]."""
+    """Return times over a window so close that a parabola through three of them finds a minimum [time]."""
     rates, sizes = reading.modes.poles.imag, np.abs(reading.modes.weights)
     notable = rates[sizes > NOTABLE * sizes.max(initial=0.0)]
     start, end = window
@@ -571,7 +573,7 @@ def _close_times(reading: Reading, window: tuple[float, float], fewest: int) -> 
 
 
 def _beyond_bounds(reading: Reading, grid: Grid) -> float:
-    """By how much the overlap is beyond its bounds, over the vibration energy: rms over pairs of times [-]."""
+    """Return how far the overlap exceeds its bounds, relative to the vibration energy: rms over pairs of times [-]."""
     even = np.linspace(grid.time[0], grid.time[-1], _CHECKED)
     pairs = np.array([(tr, td) for tr, td in product(even, even) if tr < td])
     tr, td = pairs.T

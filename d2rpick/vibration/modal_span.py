@@ -1,4 +1,4 @@
-"""Where in a record the modes of one structure go on by themselves, if nothing else tells its flight."""
+"""Find where in a record the modes of one structure continue undisturbed, if nothing else shows its flight."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 
     from d2rpick.histories.history import History, Memory, Samples
 
-# Windows that are tried begin and end at these parts of the record.
+# Windows begin and end at multiples of 1/16 of the record.
 _PARTS: Final = 16
-# Shares of the record at which windows up to its end begin.
+# Shares of the record at which windows that reach its end begin.
 _BEGINNINGS: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75)
-# Beyond its window the record stays with the modes while means over this share of the fastest period are off by less
-# than so much of the vibration energy, or so many times the scatter of such means.
+# Outside its window the record follows the modes while means over 1/8 of the fastest period deviate by less than this
+# share of the vibration energy, or this many times the scatter of such means.
 _MEANS_PER_PERIOD, _MOST_OFF, _SCATTERS_OFF = 8, 0.02, 5.0
-# A window that grows is identified anew so often.
+# Most repetitions of extending and identifying a window.
 _MOST_REFITS: Final = 3
 
 
@@ -64,7 +64,7 @@ def find_described(
 
 
 def inner_window(history: History, guess: Span) -> Span:
-    """Give the whole parts of a record in a window that was guessed: guesses of many td then share few windows."""
+    """Return the whole parts of a record within a guessed window, so that guesses of many td share few windows."""
     first, last = float(history.time[0]), float(history.time[-1])
     part = (last - first) / _PARTS
     start = first + part * np.ceil((guess.start - first) / part)
@@ -137,12 +137,12 @@ def _reach(history: History, found: Described) -> Span:
 def _last_off(
     time: Samples, energy: Samples, vibration: ModalVibration, width: int
 ) -> int:
-    """Number of the states, which come nearer and nearer to the window, up to the last that is off the modes."""
+    """Return the number of states, ordered towards the window, up to the last one that deviates from the modes."""
     if time.size < width:
         return int(time.size)
     with np.errstate(
         over="ignore", invalid="ignore"
-    ):  # far off, damped modes grow beyond all numbers
+    ):  # far away, damped modes grow beyond all numbers
         off = energy - vibration.reading.spectrum.at(time)
         means = np.abs(np.convolve(off, np.full(width, 1 / width), mode="valid"))
         room = np.maximum(

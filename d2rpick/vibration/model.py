@@ -1,7 +1,7 @@
-"""What is known of the vibration at one td, and which of its four models can be relied on there.
+"""Decide which model of the vibration can be relied on at one td, and what is known there.
 
-The signs of parts are worth more than an oscillator that describes the record, that more than swings that were counted
-unless it leaves much over, and these more than the energy alone: in the order of `MODELS`.  What is relied on is a
+The order is that of `MODELS`: the signs of parts before an oscillator that describes the record, this before the modes
+of the structure and counted swings unless it leaves much over, and these before the energy alone.  The result is a
 `Vibration`: the energy of the whole around td, and the deformations that can be compared with those at td, if any are
 known.
 """
@@ -45,22 +45,22 @@ if TYPE_CHECKING:
     from d2rpick.vibration.part_signs import PartMatch, SignedParts
     from d2rpick.vibration.span import Span
 
-# Why no tr can be trusted where the vibration is known but cannot be made out at td.
+# Reason why no tr can be trusted if the vibration is known but lost in noise at td.
 SUNK: Final = "the level at td is below the noise of the record"
 _LEFT_OVER = "the oscillator leaves more over than what is known otherwise"
-# A release without any vibration has this residual: a switch that leaves more keeps nothing [-].
+# Residual of a release without any vibration: a switch that leaves more keeps nothing [-].
 NOTHING_KEPT: Final = 1.0
-# Of the time up to td: a tr in this last part of it saves little, and is like td only because it is near.
+# A tr in this last share of the time up to td saves little, and resembles td only because it is near.
 NEAR_TD: Final = 0.25
-# Parts that a warning names of those that share a reason; the JSON document has all.
+# Number of parts that a warning names for one reason; JSON has all.
 _NAMED = 5
 
 
 class Compared(NamedTuple):
     """Deformations that can be compared with those at td from ``first`` to ``last`` [time].
 
-    ``profile`` gives their lock-in error before a td, and is None of one mode, of which all has a closed form; ``band``
-    is that of a residual.
+    ``profile`` returns their lock-in error before a td; it is None for one mode, which has a closed form.  ``band`` is
+    that of a residual.
     """
 
     deformation: Deformation
@@ -106,17 +106,17 @@ class Vibration:
 
     @property
     def td(self) -> float:
-        """The td from which it is seen [time]."""
+        """Return the td from which the vibration is seen [time]."""
         return self.whole.td
 
     @property
     def signed(self) -> SignedParts | None:
-        """The parts whose signs are relied on; None where they are not."""
+        """Return the parts whose signs are relied on; None if they are not."""
         return self.parts if self.basis == "parts" else None
 
     @property
     def modal(self) -> ModalVibration | None:
-        """The modes of the structure that are relied on; None where they are not."""
+        """Return the modes of the structure that are relied on; None if they are not."""
         return (
             cast("ModalVibration", self.compared.deformation)
             if self.basis == "modal" and self.compared
@@ -125,12 +125,12 @@ class Vibration:
 
     @property
     def reasons(self) -> str | None:
-        """Say why no deformation with its sign is known, of single parts too; None where one is."""
+        """Return the reason why no deformation with its sign is known, including single parts; None if one is known."""
         if self.compared or not self.parts:
             return self.unknown
         names: dict[
             str | None, list[str]
-        ] = {}  # of each reason, since all parts of a structure often share one
+        ] = {}  # by reason, since all parts of a structure often share one
         for part in self.parts.unsigned:
             names.setdefault(part.reason, []).append(part.name)
         of_parts = (
@@ -141,7 +141,7 @@ class Vibration:
 
     @property
     def kinetic_share(self) -> float | None:
-        """K at td, None where it is not known [-]."""
+        """Return K at td, None if it is unknown [-]."""
         return (
             None
             if self.compared is None
@@ -150,14 +150,14 @@ class Vibration:
 
     @cached_property
     def profile(self) -> Profile | None:
-        """Lock-in error before td, whose minima are closest matches; None where there are none."""
+        """Return the lock-in error before td, whose minima are closest matches; None if there are none."""
         if self.compared is None or self.compared.profile is None:
             return None
         return self.compared.profile(self.td)
 
     @cached_property
     def least_residual(self) -> float | None:
-        """Least residual of all tr that save much, of a vibration of many modes; None for any other [-]."""
+        """Return the least residual of all tr that save much, for a vibration of many modes; None for others [-]."""
         if self.basis != "modal" or self.profile is None or self.compared is None:
             return None
         last = self.td - NEAR_TD * (self.td - self.compared.first)
@@ -168,12 +168,12 @@ class Vibration:
 
     @property
     def keeps_nothing(self) -> bool:
-        """Whether no tr that saves much is better than a release without any vibration."""
+        """Return True if no tr that saves much is better than a release without any vibration."""
         return self.least_residual is not None and self.least_residual > NOTHING_KEPT
 
     @property
     def most_lock_in(self) -> float | None:
-        """Largest lock-in error of a tr that is worth having, of a vibration of many modes; None for any other [-]."""
+        """Return the largest useful lock-in error of a tr, for a vibration of many modes; None for others [-]."""
         if self.basis != "modal":
             return None
         least = self.least_residual or 0.0
@@ -183,9 +183,9 @@ class Vibration:
         return float(np.sqrt(max(most**2 - (self.kinetic_share or 0.0), 0.0)))
 
     def moments(self, tolerance: float, since: float = -np.inf) -> Moments:
-        """Times before td that may serve as tr: crossings, standstills within the tolerance, and closest matches.
+        """Return times before td that may serve as tr: crossings, standstills near the level, and closest matches.
 
-        Those before ``since`` [time] may be left out.
+        Times before ``since`` [time] may be left out.
         """
         if self.compared and isinstance(self.whole, OscillatorEnergy):
             turns = self.whole.standstills()
@@ -197,7 +197,7 @@ class Vibration:
         else:
             turns = self.whole.turns_near(tolerance, since)
         matches = self.profile.minima() if self.profile else ()
-        if self.basis == "modal":  # the level of all modes together decides nothing
+        if self.basis == "modal":  # the common level of all modes decides nothing
             return Moments.of("match", [*matches, *self._least_deformed()])
         crossings = self.whole.crossings(since)
         return Moments.of_level(
@@ -205,7 +205,7 @@ class Vibration:
         )
 
     def _least_deformed(self) -> tuple[float, ...]:
-        """Time at which least vibration energy is elastic, if no tr keeps the vibration: that keeps the static part."""
+        """Return the time of least elastic vibration energy if no tr keeps the vibration; it keeps the static part."""
         if not self.keeps_nothing or self.compared is None or self.profile is None:
             return ()
         times = self.profile.time
@@ -222,13 +222,13 @@ class Vibration:
         )
 
     def measured(self, times: Samples) -> Columns:
-        """Measures of each time as tr, as far as its deformation can be compared with that at td."""
+        """Return the measures of each time as tr, as far as its deformation can be compared with that at td."""
         return measured_of([self], times, [0, times.size])[1]
 
     def errors(self, times: Samples) -> Samples:
-        """What a tolerance is held against, of the shape of ``times``; infinite where no tolerance would help [-].
+        """Return the errors that a tolerance limits, of the shape of ``times``; infinite if none would help [-].
 
-        The lock-in error, of few modes if the signs match; the level error if no signs are known.
+        The lock-in error if signs are known (for a few modes only if they match), else the level error.
         """
         if self.compared is None:
             errors = measures.level_error(
@@ -244,13 +244,13 @@ class Vibration:
         )
 
     def knots(self) -> Samples:
-        """Times before td between which the errors run monotone [time]."""
+        """Return the times before td between which the errors are monotone [time]."""
         return np.append(self.whole.edges(), self.profile.time if self.profile else ())
 
     def reach(self, moments: Moments) -> Samples:
-        """How far the true time of each moment may lie away; of a match half a cell of the profile [time]."""
+        """Return how far the true time of each moment may be off; for a match half a cell of the profile [time]."""
         reach = self.whole.reach(moments.tr)
-        # a match lies where the error is least
+        # a match lies at the least error
         return (
             np.where(moments.are("match"), self.profile.cell(moments.tr) / 2, reach)
             if self.profile
@@ -258,23 +258,23 @@ class Vibration:
         )
 
     def part_matches(self, tr: float) -> tuple[PartMatch, ...]:
-        """What each part has of the mismatch; nothing where single parts are not known."""
+        """Return the contribution of each part to the mismatch; nothing if single parts are unknown."""
         if self.signed is None:
             return ()
         from d2rpick.vibration.part_signs import (
             contributions,
-        )  # not above: a table has no parts
+        )  # imported here: a table has no parts
 
         return contributions(self.signed, tr, self.td)
 
     def comparable(self, times: Samples) -> NDArray[np.bool_]:
-        """Which times have a deformation that can be compared with that at td."""
+        """Return for each time whether its deformation can be compared with that at td."""
         if self.compared is None:
             return np.zeros(times.shape, dtype=bool)
         return (times >= self.compared.first) & (times <= self.compared.last)
 
     def measures_of(self, tr: Samples, td: Samples | float) -> Columns:
-        """Columns of measures of comparable times (n,) for one ``td``; of a single mode also for a td each."""
+        """Return columns of measures of comparable times (n,) for one ``td``, for a single mode also for one each."""
         assert self.compared
         deformation = self.compared.deformation
         if isinstance(deformation, Mode):
@@ -293,7 +293,7 @@ class Vibration:
 def moments_of(
     vibrations: Sequence[Vibration], tolerance: float, since: Sequence[float]
 ) -> list[Moments]:
-    """Give the moments of each vibration, as ``Vibration.moments`` does: of one mode in one go.
+    """Return the moments of each vibration, as ``Vibration.moments`` does, for one mode all at once.
 
     Parameters
     ----------
@@ -321,7 +321,7 @@ def moments_of(
 def measured_of(
     vibrations: Sequence[Vibration], tr: Samples, ends: Sequence[int]
 ) -> tuple[Samples, Columns]:
-    """Give the energy of each tr (n,), and its measures as far as its deformation is comparable to that at its td.
+    """Return the energy of each tr (n,), and its measures as far as its deformation is comparable to that at its td.
 
     Those of the i-th vibration lie between the i-th of the ``ends`` and the next one.
     """
@@ -351,7 +351,7 @@ def measured_of(
 
 
 def _alike(vibrations: Sequence[Vibration]) -> Iterable[list[int]]:
-    """Places of the vibrations that a single mode describes in one window, together; of each other one by itself."""
+    """Yield the indices of vibrations that one mode describes in one window together, and all others singly."""
     groups: dict[object, list[int]] = {}
     for place, one in enumerate(vibrations):
         whole, single = (
@@ -370,9 +370,9 @@ def _alike(vibrations: Sequence[Vibration]) -> Iterable[list[int]]:
 class Evidence(NamedTuple):
     """What was found in a record, whatever it is worth at one td.
 
-    ``fit`` is None only where no oscillator was looked for; ``span`` is the window in which it describes the record.
-    ``given``: the oscillator was given; ``prescribed``: it, or the window to identify it in.  ``models`` are those that
-    were found beside it, by their names; one at most tells the sign.
+    ``fit`` is None only if no oscillator was searched; ``span`` is the window that it describes.  ``given`` is True for
+    a given oscillator, ``prescribed`` also for a given window.  ``models`` are the other models by name; at most one
+    tells the sign.
     """
 
     fit: Identification | None = None
@@ -383,34 +383,34 @@ class Evidence(NamedTuple):
 
     @property
     def parts(self) -> SignedParts | None:
-        """The deformations of single parts, also where too few have a sign."""
+        """Return the deformations of single parts, also if too few have a sign."""
         return cast("SignedParts | None", self.models.get("parts"))
 
     @property
     def signed(self) -> str | None:
-        """Name of the model that tells the sign, where one does."""
+        """Return the name of the model that tells the sign, None if none does."""
         return next((name for name, model in self.models.items() if model.signed), None)
 
     @property
     def refusal(self) -> str | None:
-        """Why the modes of the structure could not be identified; None if they were, or were not looked for."""
+        """Return the reason why modes could not be identified; None if they were, or were not searched."""
         modal = cast("ModalVibration | None", self.models.get("modal"))
         return modal.doubts.refusal if modal and not modal.signed else None
 
     @property
     def states_per_period(self) -> float | None:
-        """States per period of the fastest strong line of the energy [-]; None if no lines were looked for."""
+        """Return the states per period of the energy's fastest strong line [-]; None if no lines were searched."""
         modal = cast("ModalVibration | None", self.models.get("modal"))
         return modal.doubts.coarse if modal else None
 
     @property
     def has_model(self) -> bool:
-        """Whether at some td more than the samples of the energy may be relied on."""
+        """Return True if at some td more than the samples of the energy may be relied on."""
         fit = self.fit
         return bool(self.signed or (fit and fit.mode and self.span and not fit.reason))
 
     def is_that_of(self, other: Evidence) -> bool:
-        """Whether the same was found, of one record."""
+        """Return True if the same was found, in one record."""
         same = self.fit is other.fit and self.span == other.span
         return same and all(
             self.models.get(name) is other.models.get(name) for name in MODELS
@@ -418,11 +418,12 @@ class Evidence(NamedTuple):
 
 
 def model_at(whole: Vibration, evidence: Evidence) -> Vibration:
-    """Give the best model that can be relied on where ``whole`` is that of the whole energy."""
+    """Return the best model that can be relied on; ``whole`` is the model of the whole energy."""
     return replace(_best(whole, evidence), parts=evidence.parts)
 
 
 def _best(whole: Vibration, evidence: Evidence) -> Vibration:
+    """Choose the model that can be relied on."""
     if not evidence.signed:
         return whole
     basis, model, td, names = (
@@ -442,7 +443,8 @@ def _best(whole: Vibration, evidence: Evidence) -> Vibration:
         return whole
     if not isinstance(modes, OscillatorEnergy):
         return _with_signs(whole, basis, model)
-    # what neighbouring states share is a further mode, of which modes tell more; in white noise one can only hide
+    # structure that neighbouring states share is a further mode, which the modes describe better; white noise can only
+    # hide one
     is_further_mode = basis == "modal" and modes.fit.structure > 0
     if is_further_mode or model.unseen(modes.span.start, td) < modes.fit.hidden_share:
         return _with_signs(
@@ -454,7 +456,7 @@ def _best(whole: Vibration, evidence: Evidence) -> Vibration:
 
 
 def _with_signs(whole: Vibration, basis: str, model: SignedModel) -> Vibration:
-    """Compare signed deformations, while levels and times are those of the whole energy."""
+    """Return a vibration with signed deformations, while levels and times are those of the whole energy."""
     first = model.comparable_since(whole.td)
     return replace(
         whole,
@@ -472,7 +474,7 @@ def _with_signs(whole: Vibration, basis: str, model: SignedModel) -> Vibration:
 
 
 def _sunk(whole: Vibration) -> Vibration:
-    """Say too that the parts vibrate less at td than a solver errs."""
+    """Add that the parts vibrate less at td than the solver's error."""
     unknown = f"{whole.unknown}; at td the vibration of the parts is below the error of a solver"
     return replace(
         whole,
@@ -482,7 +484,7 @@ def _sunk(whole: Vibration) -> Vibration:
 
 
 def doubtful(whole: Vibration) -> bool:
-    """Whether no oscillator is known, or one that leaves so much over that its sign may be wrong."""
+    """Return True if no oscillator is known, or one that leaves so much that its sign may be wrong."""
     return (
         not isinstance(whole.whole, OscillatorEnergy)
         or whole.whole.fit.hidden_share > SMALLEST
@@ -490,7 +492,7 @@ def doubtful(whole: Vibration) -> bool:
 
 
 def energy_at(history: History, td: float, evidence: Evidence) -> Vibration:
-    """Give the model of the whole energy to be relied on at ``td``: an oscillator, else the samples."""
+    """Return the model of the whole energy to be relied on at ``td``: an oscillator, else the samples."""
     fit, whole = evidence.fit, describing(history, td, evidence)
     samples = partial(Vibration, "energy", SampledEnergy(history, td))
     if fit is None:
@@ -527,7 +529,7 @@ def energy_at(history: History, td: float, evidence: Evidence) -> Vibration:
 
 
 def describing(history: History, td: float, evidence: Evidence) -> SampledEnergy:
-    """Give the energy as it is known whatever it is worth at ``td``: of an oscillator where it describes a window."""
+    """Return the best description of the energy, whatever it is worth at ``td``: an oscillator, else samples."""
     fit, span = evidence.fit, evidence.span
     return (
         OscillatorEnergy(history, td, fit, span)
@@ -537,7 +539,7 @@ def describing(history: History, td: float, evidence: Evidence) -> SampledEnergy
 
 
 def _aliased(history: History, fit: Identification) -> tuple[str, ...]:
-    """Say so when the energy swings so fast that its states miss the level as they miss the vibration."""
+    """Return a doubt if the energy swings so fast that its states miss the level as they miss the vibration."""
     if fit.mode is None or fit.misfit is None or fit.misfit > MAX_MISFIT:
         return ()
     time, _ = history.between(fit.start, fit.end)

@@ -1,4 +1,4 @@
-"""Closed forms of an internal energy that one vibration mode stores and gives back."""
+"""Describe in closed form the internal energy that one vibration mode stores and gives back."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# Samples that are worked on at a time, so that what is made of them stays in the processor's cache.
+# Samples per block, so that intermediate results stay in the processor's cache.
 BLOCK: Final = 8192
-# Halving alone would need no more to reach rounding.
+# Most steps of the root search; bisection alone needs no more to reach rounding.
 _STEPS = 64
 _EPS = float(np.finfo(np.float64).eps)
-# Of the amplitude: below, a deformation is zero but for rounding.
+# A deformation below this share of the amplitude is zero within rounding.
 _ZERO = 1e-9
 
 
@@ -78,34 +78,34 @@ class Mode(SignedAmplitudes):
 
     @property
     def omega_0(self) -> float:
-        """Undamped angular rate, omega_0**2 = omega**2 + alpha**2 / 4 [1/time]."""
+        """Return the undamped angular rate, omega_0**2 = omega**2 + alpha**2 / 4 [1/time]."""
         return float(np.hypot(self.omega, self.alpha / 2))
 
     def deformation(self, t: Samples | float) -> Samples:
-        """Signed deformation q(t) [sqrt(energy)]."""
+        """Return the signed deformation q(t) [sqrt(energy)]."""
         return self.preload + self._swing(t, self.cosine, self.sine)
 
     def velocity(self, t: Samples | float) -> Samples:
-        """dq/dt [sqrt(energy)/time]."""
+        """Return dq/dt [sqrt(energy)/time]."""
         return self._swing(t, *self._velocity_parts)
 
     def amplitudes(self, t: Samples | float) -> Samples:
-        """Signed deformation of the mode, of the shape of ``t`` with an axis of length one before it [sqrt(energy)]."""
+        """Return the signed deformation, of the shape of ``t`` with an axis of length one before it [sqrt(energy)]."""
         return self.deformation(t)[np.newaxis]
 
     def energy(self, t: Samples | float) -> Samples:
-        """E(t), plastic and elastic [energy]."""
+        """Return E(t), plastic and elastic [energy]."""
         return self.energy_plastic + self.deformation(t) ** 2
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
-        """Kinetic energy of the vibration, T = (dq/dt)**2 / omega_0**2 [energy].
+        """Return the kinetic energy of the vibration, T = (dq/dt)**2 / omega_0**2 [energy].
 
-        From T = mu r'**2 / 2 with omega_0**2 = k / mu and q**2 = k r**2 / 2.
+        This follows from T = mu r'**2 / 2 with omega_0**2 = k / mu and q**2 = k r**2 / 2.
         """
         return (self.velocity(t) / self.omega_0) ** 2
 
     def vibration_energy(self, t: Samples | float) -> Samples:
-        """Energy of the vibration about the preload, V = (q - q_0)**2 + T; dV/dt = -2 alpha T [energy]."""
+        """Return the energy of the vibration about the preload, V = (q - q_0)**2 + T; dV/dt = -2 alpha T [energy]."""
         cosine, sine = self._velocity_parts
 
         def energy(decay: Samples, cos: Samples, sin: Samples) -> Samples:
@@ -118,13 +118,13 @@ class Mode(SignedAmplitudes):
         return self._of_waves(energy, t)
 
     def energy_slopes(self, t: Samples | float) -> tuple[Samples, Samples]:
-        """E' [energy/time] and E'' [energy/time^2], from q'' = -alpha q' - omega_0**2 (q - q_0)."""
+        """Return E' [energy/time] and E'' [energy/time^2], from q'' = -alpha q' - omega_0**2 (q - q_0)."""
         q, velocity = self.deformation(t), self.velocity(t)
         acceleration = -self.alpha * velocity - self.omega_0**2 * (q - self.preload)
         return 2 * q * velocity, 2 * (velocity**2 + q * acceleration)
 
     def energy_gradient(self, t: Samples, size: int) -> Samples:
-        """Derivatives of E(t) by the first ``size`` parameters in the order of the class, less origin, (size, n)."""
+        """Return derivatives of E(t) by the first ``size`` parameters of the class without origin, (size, n)."""
         own = np.array(
             [
                 self.omega,
@@ -138,7 +138,7 @@ class Mode(SignedAmplitudes):
         return energy_and_jacobian(own, t - self.origin, size)[1]
 
     def standstill_after(self, t: Samples | float) -> Samples:
-        """Find the first time at or after ``t`` where the deformation stands still; the next is half a period on."""
+        """Find the first time from ``t`` on at which the deformation stands still; the next is half a period later."""
         cosine, sine = self._velocity_parts
         phase = np.arctan2(
             -cosine, sine
@@ -147,8 +147,8 @@ class Mode(SignedAmplitudes):
         return np.asarray(self.origin + (phase + np.pi * turns) / self.omega)
 
     def extrema(self, start: float, end: float) -> tuple[float, ...]:
-        """Find the times in (start, end), ascending, where the deformation stands still (q' = 0) [time]."""
-        if not start < end:  # nor need ``start`` be a time whose phase is a number
+        """Find the times in (start, end) at which the deformation stands still (q' = 0), in ascending order [time]."""
+        if not start < end:  # ``start`` need not even be a time with a finite phase
             return ()
         first = float(self.standstill_after(start))
         times = first + np.pi / self.omega * np.arange(
@@ -157,16 +157,16 @@ class Mode(SignedAmplitudes):
         return tuple(times[(times > start) & (times < end)].tolist())
 
     def peaks(self, start: float, end: float) -> tuple[float, ...]:
-        """Find the times in (start, end), ascending, of the local maxima of the energy [time].
+        """Find the times in (start, end) of the energy's local maxima, in ascending order [time].
 
-        Where q' = 0, q'' = -omega_0**2 (q - q_0), so E'' = 2 q q'' < 0 asks for q (q - q_0) > 0.
+        At q' = 0, q'' = -omega_0**2 (q - q_0), so that E'' = 2 q q'' < 0 requires q (q - q_0) > 0.
         """
         times = np.array(self.extrema(start, end))
         q = self.deformation(times)
         return tuple(times[q * (q - self.preload) > 0].tolist())
 
     def crossings(self, level_q: float, start: float, end: float) -> tuple[float, ...]:
-        """Find the times in (start, end), ascending, where q passes ``level_q``, to rounding [time].
+        """Find the times in (start, end) at which q passes ``level_q``, in ascending order, to rounding [time].
 
         An extremum that only touches the level (to rounding) is no crossing, nor are ``start`` and ``end``.
         """
@@ -175,15 +175,15 @@ class Mode(SignedAmplitudes):
         )
 
     def level_crossings(self, td: float, start: float) -> tuple[float, ...]:
-        """Find the times in (start, td), ascending, where the energy passes its level at ``td`` [time]."""
+        """Find the times in (start, td) at which the energy passes its level at ``td``, in ascending order [time]."""
         return tuple(self.all_level_crossings(np.array([td]), start)[1].tolist())
 
     def all_level_crossings(
         self, td: Samples, start: float
     ) -> tuple[NDArray[np.intp], Samples]:
-        """Find the same for each ``td`` of shape (n,), all at once: its place among them, and the time."""
+        """Find these crossings for each ``td`` of shape (n,) at once: return the index of the td, and the time."""
         level = self.deformation(td)
-        # a level of zero is met once by each passage, whatever rounding makes of its sign
+        # each passage meets a level of zero once, whatever sign rounding gives it
         zero = np.abs(level) <= _ZERO * np.sqrt(self.vibration_energy(td))
         level = np.where(zero, 0.0, level)
         ends = np.append(td, np.where(zero, start, td))
@@ -195,9 +195,9 @@ class Mode(SignedAmplitudes):
     def _passages(
         self, levels: Samples, start: float, ends: Samples
     ) -> tuple[NDArray[np.intp], Samples]:
-        """Find the times in (start, end) where q passes a level, for each level and its end, both of shape (n,).
+        """Find the times in (start, end) at which q passes a level, for each level and its end, both of shape (n,).
 
-        Places of the levels and times, ascending in both.
+        Return the indices of the levels and the times, ascending in both.
         """
         inner = np.array(self.extrema(start, float(ends.max(initial=start))))
         rows = np.broadcast_to(inner, (ends.size, inner.size))
@@ -213,7 +213,7 @@ class Mode(SignedAmplitudes):
         above[np.abs(above) <= 8 * _EPS * scale] = 0.0
         place, cell = np.nonzero(
             above[:, :-1] * above[:, 1:] < 0
-        )  # between neighbouring extrema q is monotone
+        )  # q is monotone between neighbouring extrema
         side, wanted = np.sign(above[place, cell]), levels[place]
         found = narrow(
             lambda t: side * (self.deformation(t) - wanted), edges[place, cell], edges[place, cell + 1],
@@ -223,6 +223,7 @@ class Mode(SignedAmplitudes):
 
     @property
     def _velocity_parts(self) -> tuple[float, float]:
+        """Return the cosine and sine coefficients of dq/dt."""
         half = self.alpha / 2
         return (
             self.omega * self.sine - half * self.cosine,
@@ -230,7 +231,7 @@ class Mode(SignedAmplitudes):
         )
 
     def _swing(self, t: Samples | float, cosine: float, sine: float) -> Samples:
-        """exp(-alpha s/2) (cosine cos(omega s) + sine sin(omega s)) with s = t - origin."""
+        """Return exp(-alpha s/2) (cosine cos(omega s) + sine sin(omega s)) with s = t - origin."""
         return self._of_waves(
             lambda decay, cos, sin: decay * (cosine * cos + sine * sin), t
         )
@@ -238,7 +239,7 @@ class Mode(SignedAmplitudes):
     def _of_waves(
         self, make: Callable[[Samples, Samples, Samples], Samples], t: Samples | float
     ) -> Samples:
-        """Make something of exp(-alpha s/2), cos(omega s) and sin(omega s), of many times block by block."""
+        """Apply a function to exp(-alpha s/2), cos(omega s) and sin(omega s) for many times, block by block."""
 
         def made(times: Samples) -> Samples:
             s = times - self.origin
@@ -268,7 +269,7 @@ def energy_and_jacobian(
     twice = q + q
     jacobian = np.empty(
         (size, s.size)
-    )  # written in place: this is where identification spends its time
+    )  # written in place: identification spends most of its time here
     by_rate = np.multiply(twice, s, out=jacobian[0])
     np.multiply(by_rate, swing, out=jacobian[1])
     jacobian[1] *= -0.5

@@ -1,4 +1,4 @@
-"""Times that may serve as tr: where the energy of all parts together has the level of a td, and the error at others.
+"""Find times that may serve as tr: times at which the total energy has the level of td, with their errors.
 
 The energy around a td is known by its samples, or by modes that describe them.
 """
@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     Passages = tuple[Samples, NDArray[np.bool_]]
 
 
-# Where the scatter of the last period exceeds this share of the vibration energy at td, the vibration has sunk
-# into it: its sign is no longer certain.
+# If the scatter of the last period exceeds this share of the vibration energy at td, the vibration is lost in it: its
+# sign is uncertain.
 _DROWNED = 0.2
-# Of a radian: below, a time is the same but for rounding.
+# Times closer than this share of a radian are equal within rounding.
 _ZERO = 1e-9
 
 
@@ -45,7 +45,7 @@ class SampledEnergy:
         self.history, self.td = history, td
 
     def energy(self, time: float) -> float:
-        """E at a time: of the modes where they describe the record, of the samples elsewhere [energy]."""
+        """Return E at a time: from the modes if they describe the record there, else from the samples [energy]."""
         return (
             float(self.mode.energy(time))
             if self.mode and self.described(time)
@@ -53,50 +53,50 @@ class SampledEnergy:
         )
 
     def energies(self, times: Samples) -> Samples:
-        """E at many times, of their shape [energy]."""
+        """Return E at many times, of their shape [energy]."""
         return self.history.energies_at(times)
 
     def described(self, time: float) -> bool:  # noqa: ARG002  of samples alone there is no model
-        """Whether the energy at a time is that of modes."""
+        """Return True if the energy at a time is that of modes."""
         return False
 
     def peaks(self, start: float, end: float) -> tuple[float, ...]:
-        """Times in (start, end], ascending, where the energy peaks [time]."""
+        """Return the times in (start, end] at which the energy peaks, in ascending order [time]."""
         peaks = self.history.peaks
         return tuple(peaks[(start < peaks) & (peaks <= end)].tolist())
 
     def crossings(self, since: float) -> Passages:
-        """Times of the crossings of the level before td, none before ``since``, and which of them rise, shape (k,)."""
+        """Return the times from ``since`` to td at which the energy crosses the level, and which rise, shape (k,)."""
         time, energy = self._sampled_before(since)
         times, rising = find_crossings(time, energy, energy[-1])
         asked = (since <= times) & (times < self.td)
         return times[asked], rising[asked]
 
     def turns_near(self, tolerance: float, since: float) -> Samples:
-        """Times before td, none before ``since``, where the energy turns within the tolerance of the level (k,)."""
+        """Return the times from ``since`` to td at which the energy turns within the tolerance of the level (k,)."""
         time, energy = self._sampled_before(since)
         turns = find_turns(energy)[0]
         near = time[turns[measures.level_error(energy[turns], energy[-1]) <= tolerance]]
         return near[near >= since]
 
     def _sampled_before(self, since: float) -> tuple[Samples, Samples]:
-        """Times and energies of the last sample before ``since``, those up to td, and td itself with its level."""
+        """Return times and energies from the last sample before ``since`` up to td, and td itself with its level."""
         first, last = np.searchsorted(self.history.time, (since, self.td))
         before = slice(max(int(first) - 1, 0), int(last))
         time, energy = self.history.time[before], self.history.energy[before]
         return np.append(time, self.td), np.append(energy, self.energy(self.td))
 
     def edges(self) -> Samples:
-        """Times before td between which the energy of modes runs monotone; none but the samples, of these [time]."""
+        """Return the times before td between which the energy of modes is monotone; empty for samples [time]."""
         return np.zeros(0)
 
     def reach(self, times: Samples) -> Samples:
-        """How far from each time the energy may have the level at td [time]."""
+        """Return how far from each time the energy may have the level of td [time]."""
         return sampled_reach(self.history, times, self.td, self.energy(self.td))
 
 
 class OscillatorEnergy(SampledEnergy):
-    """The ``mode`` of a ``fit``, or several, that describes a record within ``span``, seen from a ``td`` in it."""
+    """The ``mode`` of a ``fit`` that describes a record within ``span``, seen from a ``td`` in it."""
 
     mode: Mode
 
@@ -109,7 +109,7 @@ class OscillatorEnergy(SampledEnergy):
 
     @cached_property
     def sunk(self) -> str | None:
-        """Say so when the vibration at td is no more than the scatter of the record about it."""
+        """Return a doubt if the vibration at td does not exceed the scatter of the record about it, else None."""
         start, end = (
             max(self.td - 2 * np.pi / self.mode.omega, self.span.start),
             max(self.td, self.span.start),
@@ -122,7 +122,7 @@ class OscillatorEnergy(SampledEnergy):
             and fit.rms * np.sqrt(self.history.time.size / time.size)
             < _DROWNED * vibration
         ):
-            return None  # nor could it be, if all scatter of the fit lay here
+            return None  # could not be even if all scatter of the fit lay here
         scatter = float(np.sqrt(np.mean((energy - self.mode.energy(time)) ** 2)))
         if (
             vibration > 0 and scatter <= _DROWNED * vibration
@@ -132,24 +132,24 @@ class OscillatorEnergy(SampledEnergy):
         return f"{found}: the sign of the deformation is unknown"
 
     def energies(self, times: Samples) -> Samples:
-        """E at many times, of their shape [energy]."""
+        """Return E at many times, of their shape [energy]."""
         return self._each(times, self.mode.energy, self.history.energies_at)
 
     def described(self, time: float) -> bool:
-        """Whether ``time`` lies in the window that the modes describe."""
+        """Return True if ``time`` lies in the window that the modes describe."""
         return self.span.start <= time <= self.span.end
 
     def peaks(self, start: float, end: float) -> tuple[float, ...]:
-        """Times in (start, end], within the span, where the energy of the modes peaks [time]."""
+        """Return the times in (start, end] within the span at which the energy of the modes peaks [time]."""
         return self.mode.peaks(max(start, self.span.start), min(end, self.span.end))
 
     @property
     def before(self) -> float:
-        """Just before the span: its first sample counts like any other [time]."""
+        """Return a time just before the span, so that its first sample counts like any other [time]."""
         return self.span.start - _ZERO / self.mode.omega
 
     def crossings(self, since: float) -> Passages:
-        """Times of the crossings: of the samples before the span, exact ones within it, and which of them rise."""
+        """Return the crossing times, sampled before the span and exact within it, and which of them rise."""
         times = np.maximum(
             self.mode.level_crossings(self.td, self.before), self.span.start
         )
@@ -160,26 +160,26 @@ class OscillatorEnergy(SampledEnergy):
         return np.append(sampled, times), np.append(up, rising)
 
     def crossings_before(self, since: float) -> Passages:
-        """Those of them that are of the samples, before the span."""
+        """Return the crossings of the samples before the span."""
         if self.span.start <= max(since, self.history.time[0]):
             return np.zeros(0), np.zeros(0, dtype=bool)
         sampled, up = super().crossings(since)
         return sampled[sampled < self.span.start], up[sampled < self.span.start]
 
     def standstills(self) -> Samples:
-        """Times within the span, up to td itself, where the energy turns [time]."""
+        """Return the times within the span, up to td itself, at which the energy turns [time]."""
         after = self.td - _ZERO / self.mode.omega  # td may be an extremum itself
         times = np.maximum(self.mode.extrema(self.before, after), self.span.start)
         return times[self.within(times)]
 
     def edges(self) -> Samples:
-        """Standstills and ends of the span, between which the energy runs monotone [time]."""
+        """Return standstills and ends of the span, between which the energy is monotone [time]."""
         return np.concatenate(
             [self.mode.extrema(float(self.history.time[0]), self.td), self.span]
         )
 
     def reach(self, times: Samples) -> Samples:
-        """How far fit, sampling and printed digits leave the true time of the level open [time]."""
+        """Return the uncertainty of the crossing times due to the fit, sampling and printed digits [time]."""
         return self._each(
             times,
             lambda inside: fitted_reach(
@@ -189,7 +189,7 @@ class OscillatorEnergy(SampledEnergy):
         )
 
     def within(self, times: Samples) -> NDArray[np.bool_]:
-        """Which times lie in the window that the modes describe."""
+        """Return for each time whether it lies in the window that the modes describe."""
         return (times >= self.span.start) & (times <= self.span.end)
 
     def _each(
@@ -198,17 +198,17 @@ class OscillatorEnergy(SampledEnergy):
         inside: Callable[[Samples], Samples],
         outside: Callable[[Samples], Samples],
     ) -> Samples:
-        """Give one thing for times in the window that the modes describe, another for those outside, of their shape."""
+        """Apply one function to times in the window that the modes describe, another to the others."""
         here = self.within(times)
-        if here.all():  # as nearly always
+        if here.all():  # as in nearly all cases
             return inside(times)
         found = np.empty(times.shape)
         found[here], found[~here] = inside(times[here]), outside(times[~here])
         return found
 
 
-# Crossing of the level, extremum near it, match of the deformations of several parts or modes, start of a flight in
-# which nothing vibrates, or given.
+# Kinds of moments: crossing of the level, extremum near it, match of the deformations of several parts or modes, start
+# of a flight in which nothing vibrates, given time.
 _KINDS: Final = ("crossing", "extremum", "match", "start", "given")
 
 
@@ -216,8 +216,8 @@ _KINDS: Final = ("crossing", "extremum", "match", "start", "given")
 class Moments:
     """Times that may serve as tr, before anything is measured, as columns of shape (n,).
 
-    Noise makes tens of thousands, and few of them are looked at one by one.
-    ``tr`` [time]; ``kind``: places in the names of kinds; ``rising``: 1, or -1 where it falls, 0 where neither.
+    Noise makes tens of thousands, and few of them are examined singly.  ``tr`` [time]; ``kind``: index of the kind's
+    name; ``rising``: 1 if the energy rises, -1 if it falls, 0 if neither.
     """
 
     tr: Samples
@@ -226,7 +226,7 @@ class Moments:
 
     @classmethod
     def of(cls, kind: str, times: Samples | Sequence[float]) -> Moments:
-        """Give moments of one kind, where nothing is said of how the energy runs."""
+        """Make moments of one kind, without the direction of the energy."""
         none = np.zeros(len(times), np.int8)
         return cls(
             np.array(times, dtype=float), none + np.int8(_KINDS.index(kind)), none
@@ -236,7 +236,7 @@ class Moments:
     def of_level(
         cls, crossings: Samples, rising: NDArray[np.bool_], *others: Moments
     ) -> Moments:
-        """Give crossings of the level, shape (k,), and after them other moments."""
+        """Make moments from crossings of the level, shape (k,), followed by other moments."""
         kind, sides = (
             np.zeros(crossings.size, np.int8),
             np.where(rising, 1, -1).astype(np.int8),
@@ -245,7 +245,7 @@ class Moments:
 
     @classmethod
     def joined(cls, some: Iterable[Moments]) -> Moments:
-        """Give some moments, and others after them."""
+        """Join several moments in their order."""
         return cls(
             *map(
                 np.concatenate,
@@ -254,18 +254,18 @@ class Moments:
         )
 
     def are(self, kind: str) -> NDArray[np.bool_]:
-        """Which of them are of a kind."""
+        """Return for each moment whether it is of a kind."""
         return np.asarray(self.kind == _KINDS.index(kind))
 
     def at(self, places: NDArray[np.intp] | NDArray[np.bool_] | slice) -> Moments:
-        """Give those at some places, in their order, or where a mask holds."""
+        """Return the moments at some indices, in their order, or those that a mask selects."""
         return Moments(self.tr[places], self.kind[places], self.rising[places])
 
     def __len__(self) -> int:
         return self.tr.size
 
     def __getitem__(self, place: int) -> tuple[float, str, bool | None]:
-        """Give tr, kind and whether it rises, None where the energy turns, of the moment at a place."""
+        """Return tr, kind and direction of one moment; the direction is None if the energy turns there."""
         rising = int(self.rising[place])
         return (
             float(self.tr[place]),
@@ -277,7 +277,7 @@ class Moments:
 def moments_of_mode(
     seen: Sequence[OscillatorEnergy], tolerance: float, since: Sequence[float]
 ) -> list[Moments]:
-    """Give the moments of one mode in one window, ascending in time, for each td that it is ``seen`` from.
+    """Return the moments of one mode in one window, in ascending order, for each td from which it is ``seen``.
 
     Standstills count within the ``tolerance``; crossings before each of ``since`` [time] may be left out.
     """
@@ -314,23 +314,22 @@ def moments_of_mode(
     return [found.at(slice(*each)) for each in pairwise(ends)]
 
 
-# Between samples E'' may exceed what second differences of the samples show; on random vibrations a quarter
-# more covers 99 % of the true crossings from 8 samples per vibration period on.
+# Between samples E'' may exceed the second differences; on random vibrations with 8 samples per period or more, a
+# quarter more covers 99 % of the true crossings.
 _BEND_RESERVE = 1.25
-# Three standard deviations: 99.7 % of normal errors.
+# Three standard deviations contain 99.7 % of normal errors.
 _DEVIATIONS = 3.0
-# Rounding errors are many, independent and of either sign: 2.6 standard deviations of their sum hold 99 % of it, and
-# they add to the error of the bend as independent errors do.
+# Rounding errors are many, independent and of either sign: 2.6 standard deviations of their sum contain 99 % of it, and
+# they add to the error of the bend as independent errors.
 _ROUNDING_DEVIATIONS = 2.6
-# The systematic rest of a fit is mostly a vibration: its peaks are the root of 2 of its rms.
+# The systematic rest of a fit is mostly a vibration, whose peaks are sqrt(2) times its rms.
 _PEAK_OF_REST = sqrt(2)
-# However well a fit follows the samples, it is a model of what happens between them: this share of the output
-# interval is kept in reserve.
+# Reserve, as a share of the output interval: however well a fit follows the samples, it is a model between them.
 _BETWEEN_SAMPLES = 1e-3
 
 
 def sampled_reach(history: History, times: Samples, td: float, level: float) -> Samples:
-    """Distance to the true crossing where tr comes from the samples themselves, linear between them.
+    """Return the distance to the true crossing if tr comes from the samples, linear between them.
 
     Parameters
     ----------
@@ -351,7 +350,7 @@ def sampled_reach(history: History, times: Samples, td: float, level: float) -> 
     cell, interval = _cells(time, times)
     at_td, _ = _cells(time, np.atleast_1d(td))
     bend = curvature(time, energy, times)
-    # Newton's error of linear interpolation: E''/2 times the distances to both neighbours; zero on a sample.
+    # Newton's error of linear interpolation: E''/2 times the distances to both neighbours, zero on a sample
     off_td = (
         float(curvature(time, energy, td))
         * (td - time[at_td])
@@ -370,10 +369,11 @@ def sampled_reach(history: History, times: Samples, td: float, level: float) -> 
 def fitted_reach(
     history: History, fit: Identification, mode: Mode, times: Samples, td: float
 ) -> Samples:
-    """Distance to the true crossing where tr and the level come from the fitted oscillator.
+    """Return the distance to the true crossing if tr and the level come from the fitted oscillator.
 
-    The energy error is that of the fitted curve at tr and at td: its standard deviation from the scatter of the
-    record about it, and what of the misfit is no scatter.  Arguments and result as in ``sampled_reach``, without level.
+    The energy error is that of the fitted curve at tr and at td: its standard deviation, due to the scatter of the
+    record about it, and the systematic part of the misfit.  Arguments and result as in ``sampled_reach``, without
+    level.
     """
     both = np.append(times, td)
     off = _DEVIATIONS * fit.energy_deviation(both) + _PEAK_OF_REST * _local_rest(
@@ -382,7 +382,7 @@ def fitted_reach(
     error = off[:-1] + off[-1]
     slope, bend = mode.energy_slopes(times)
     distance = reach(np.abs(slope), np.abs(bend), error)
-    # the fit, not the output interval, bounds how far a crossing can be off: it stays within a quarter of a period
+    # the fit, not the output interval, limits the error of a crossing to a quarter of a period
     quanta = (
         _half_quanta(history.time_precision, times)
         + history.time_precision.quantum(td) / 2
@@ -395,22 +395,22 @@ def fitted_reach(
 
 
 def _local_rest(fit: Identification, mode: Mode, at: Samples) -> Samples:
-    """Systematic rest of a fit near each time: its rms, and more where the vibration is above its own rms [energy]."""
+    """Return the systematic rest of a fit near each time: its rms, or more if the vibration is larger [energy]."""
     return np.asarray(
         fit.structure * np.maximum(1.0, mode.vibration_energy(at) / fit.vibration)
     )
 
 
 def _cells(time: Samples, at: Samples) -> tuple[NDArray[np.intp], Samples]:
-    """Index of the sample before each time, and the interval to the next."""
+    """Return the index of the sample before each time, and the interval to the next."""
     cell = np.clip(np.searchsorted(time, at, side="right") - 1, 0, time.size - 2)
     return cell, time[cell + 1] - time[cell]
 
 
 def _rounding(history: History, at: Samples) -> tuple[Samples, Samples]:
-    """Largest error that the printed digits leave in the interpolated energy, and its mean square [energy].
+    """Return the largest error of the interpolated energy due to printed digits, and its mean square [energy].
 
-    Energy and time of both neighbours are off by up to half a quantum each, any value as likely as another.
+    Energy and time of both neighbours are off by up to half a quantum each, uniformly distributed.
     """
     cell, interval = _cells(history.time, at)
     off = at - history.time[cell]
@@ -427,11 +427,12 @@ def _rounding(history: History, at: Samples) -> tuple[Samples, Samples]:
 
 
 def _half_quanta(precision: Precision, values: Samples) -> Samples:
+    """Return half of the quantum to which each value was rounded."""
     return precision.quanta(values) / 2
 
 
 def curvature(time: Samples, energy: Samples, at: Samples | float) -> Samples:
-    """Largest |E''| near ``at``: of the four second divided differences about its cell [energy/time^2].
+    """Return the largest |E''| near ``at``: of the four second divided differences about its cell [energy/time^2].
 
     Zero where the record has fewer than three samples.
     """
@@ -449,10 +450,10 @@ def curvature(time: Samples, energy: Samples, at: Samples | float) -> Samples:
 def reach(
     slope: Samples | float, bend: Samples | float, error: Samples | float
 ) -> Samples:
-    """How far in time a crossing can lie away when the energy there is wrong by ``error``.
+    """Return how far in time a crossing may be off if the energy there is wrong by ``error``.
 
-    The smaller root x of slope x - bend x^2/2 = error; where there is none, the curve may turn before it
-    reaches the level and sqrt(2 error/bend) is the distance at which its bend alone has used up the error.
+    The smaller root x of slope x - bend x^2/2 = error; without a root the curve may turn before it reaches the level,
+    and sqrt(2 error/bend) is the distance at which the bend alone accounts for the error.
 
     Parameters
     ----------
@@ -471,7 +472,7 @@ def reach(
         steep, curved = (
             slope / error,
             bend / error,
-        )  # per error: squares of energies might overflow
+        )  # divided by the error: squares of energies might overflow
         root = steep**2 - 2 * curved
         regular = 2 / (steep + np.sqrt(np.maximum(root, 0)))
         turning = np.sqrt(2 / curved)

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 Values: TypeAlias = "NDArray[np.float64]"
 
 
-# Of stiffness and masses: beyond, their products and quotients are no numbers any more; no unit system comes near.
+# Limits of stiffness and masses: beyond them products and quotients overflow; no unit system comes near.
 _SMALLEST, _LARGEST = 1e-100, 1e100
 
 
@@ -44,7 +44,7 @@ class State(NamedTuple):
 
     @classmethod
     def of(cls, z: ArrayLike, y: ArrayLike, vz: ArrayLike, vy: ArrayLike) -> State:
-        """State from anything numpy takes for numbers."""
+        """Make a state from anything that numpy accepts as numbers."""
         return cls(*(np.asarray(value, dtype=np.float64) for value in (z, y, vz, vy)))
 
 
@@ -73,17 +73,17 @@ class Oscillator:
 
     @property
     def reduced_mass(self) -> float:
-        """Mu = m M/(m + M), the mass that vibrates against the spring."""
+        """Return mu = m M/(m + M), the mass that vibrates against the spring."""
         return self.frame_mass * self.mass / (self.frame_mass + self.mass)
 
     @property
     def omega_0(self) -> float:
-        """Undamped rate of the vibration, sqrt(k/mu) = sqrt(1 + beta) omega_n [1/time]."""
+        """Return the undamped rate of the vibration, sqrt(k/mu) = sqrt(1 + beta) omega_n [1/time]."""
         return float(np.sqrt(self.stiffness / self.reduced_mass))
 
     @property
     def omega_2(self) -> float:
-        """Damped rate of the vibration (4) [1/time]; nan when overdamped.
+        """Return the damped rate of the vibration (4) [1/time]; NaN if overdamped.
 
         Examples
         --------
@@ -94,7 +94,7 @@ class Oscillator:
         return float(np.sqrt(square)) if square >= 0 else float("nan")
 
     def free(self, start: State, elapsed: ArrayLike) -> State:
-        """State after ``elapsed`` time of free motion from ``start``, any damping (7), (18).
+        """Return the state after ``elapsed`` time of free motion from ``start``, with any damping (7), (18).
 
         Parameters
         ----------
@@ -123,7 +123,7 @@ class Oscillator:
         return State(z, y, velocity - frame * rate, velocity + suspended * rate)
 
     def free_on_grid(self, start: State, step: float, count: int) -> State:
-        """States at ``step * arange(count)`` of free motion from ``start``: what ``free`` gives, several times as fast.
+        """Return the states at ``step * arange(count)`` of free motion from ``start``, faster than ``free``.
 
         On an even grid, t = t_row + t_column, every exponential is a product of a factor per row and one per
         column of a table, so a displacement is a matrix product of rank four.  Agrees with ``free`` to a few
@@ -144,6 +144,7 @@ class Oscillator:
         centre, velocity = self._centre(start)
 
         def displacement(share: float) -> Values:
+            """Return the displacement of the mass with this share of the deformation."""
             swing = share * amplitude * turn_row
             left = [
                 swing.real,
@@ -157,6 +158,7 @@ class Oscillator:
             return np.asarray(table.ravel()[:count])
 
         def speed(share: float) -> Values:
+            """Return the velocity of the mass with this share of the deformation."""
             swing = share * rate * amplitude * turn_row
             table = np.stack([swing.real, -swing.imag, velocity * slow_row], axis=1)
             return np.asarray(
@@ -168,11 +170,11 @@ class Oscillator:
             displacement(frame), displacement(suspended), speed(frame), speed(suspended)
         )
         for column, value in zip(states, start, strict=True):
-            column[:1] = value  # exact, as it was given
+            column[:1] = value  # exactly as given
         return states
 
     def rigid(self, start: State, elapsed: ArrayLike) -> State:
-        """State after ``elapsed`` time of rigid motion that begins at ``start`` (8)-(12).
+        """Return the state after ``elapsed`` time of rigid motion that begins at ``start`` (8)-(12).
 
         At the switch momentum is kept, the relative velocity is lost and the deformation is frozen, so
         ``rigid(start, 0)`` is the state right after the switch.  Arguments as in ``free``.
@@ -184,27 +186,28 @@ class Oscillator:
         return State(start.z + way, start.y + way, common, common.copy())
 
     def internal_energy(self, state: State) -> Values:
-        """Energy of the spring, k r^2/2 [energy]."""
+        """Return the energy of the spring, k r^2/2 [energy]."""
         return np.asarray(self.stiffness / 2 * (state.y - state.z) ** 2)
 
     def vibration_energy(self, state: State) -> Values:
-        """Energy of the vibration: of the spring, and mu r'^2/2 of the masses against each other [energy]."""
+        """Return the energy of the vibration: of the spring, plus mu r'^2/2 of the relative motion [energy]."""
         return np.asarray(
             self.internal_energy(state)
             + self.reduced_mass / 2 * (state.vy - state.vz) ** 2
         )
 
     def kinetic_energy(self, state: State) -> Values:
-        """Kinetic energy of both masses [energy]."""
+        """Return the kinetic energy of both masses [energy]."""
         return np.asarray(
             self.frame_mass / 2 * state.vz**2 + self.mass / 2 * state.vy**2
         )
 
     def _share(self, mass: float) -> float:
+        """Return the share of a mass in the sum of both."""
         return mass / (self.frame_mass + self.mass)
 
     def _centre(self, state: State) -> tuple[Values, Values]:
-        """Displacement and velocity of the centre of mass; (8) is the velocity."""
+        """Return displacement and velocity of the centre of mass; (8) is the velocity."""
         frame, suspended = self._share(self.frame_mass), self._share(self.mass)
         return (
             frame * state.z + suspended * state.y,
@@ -212,7 +215,7 @@ class Oscillator:
         )
 
     def _vibration(self, t: Values) -> tuple[Values, Values]:
-        """exp(-alpha t/2) times cos(omega_2 t) and sin(omega_2 t)/omega_2, continued to any damping.
+        """Return exp(-alpha t/2) times cos(omega_2 t) and sin(omega_2 t)/omega_2, continued to any damping.
 
         Overdamped, the sum of two decaying exponentials; their slower rate alpha/2 - kappa is taken from the
         product of the rates, omega_0^2, because the difference would cancel.
@@ -230,9 +233,9 @@ class Oscillator:
 
 
 def _drift(alpha: float, t: Values) -> Values:
-    """s(t) = (1 - exp(-alpha t))/alpha, the way of a damped body of unit speed; t where alpha is 0."""
+    """Return s(t) = (1 - exp(-alpha t))/alpha, the path of a damped body of unit speed; t if alpha is 0."""
     damping = alpha * t
-    # of the smallest products the quotient keeps no digits; there two terms of the series are exact
+    # the quotient of the smallest products has no digits; there two terms of the series are exact
     return np.where(
         np.abs(damping) < 1e-8,
         t * (1 - damping / 2),
@@ -241,15 +244,15 @@ def _drift(alpha: float, t: Values) -> Values:
 
 
 def lacking_energy(oscillator: Oscillator, reference: State, switched: State) -> Values:
-    """Energy of the vibration that ``switched`` lacks against ``reference``, states at td, numbers or arrays."""
+    """Return the vibration energy that ``switched`` lacks compared with ``reference``, both states at td."""
     lack = State(*(a - b for a, b in zip(switched, reference, strict=True)))
     return oscillator.vibration_energy(lack)
 
 
 def from_mode(mode: Mode, time: Values | float) -> tuple[Oscillator, State]:
-    """Give an oscillator whose deformation is that of ``mode`` about its preload, and its state at ``time``.
+    """Return an oscillator whose deformation is that of ``mode`` about its preload, and its state at ``time``.
 
-    An energy history tells neither masses nor the motion of the whole; they are chosen so that the deformation
+    An energy history contains neither masses nor the motion of the whole; they are chosen so that the deformation
     equals q - q0 (k = 2), with equal masses and the centre of mass at rest.
     """
     mass = 4 / mode.omega_0**2
@@ -259,10 +262,10 @@ def from_mode(mode: Mode, time: Values | float) -> tuple[Oscillator, State]:
 
 
 def to_mode(oscillator: Oscillator, v0: float) -> Mode:
-    """Give the energy mode of ``oscillator`` struck at time 0: frame velocity ``v0``, all else at rest (7).
+    """Return the energy mode of ``oscillator`` struck at time 0: frame velocity ``v0``, all else at rest (7).
 
-    RangeError when it is not underdamped: such a motion has no vibration to lock in; or when its energies are beyond
-    what can be squared.
+    Raise RangeError if it is overdamped, since such a motion has no vibration to lock in, or if its energies cannot be
+    squared.
     """
     omega = oscillator.omega_2
     if not omega > 0:
@@ -296,13 +299,13 @@ class Replay:
             )
 
     def reference(self, time: Values | float) -> State:
-        """States of the run without switching at ``time`` (7)."""
+        """Return the states of the run without switching at ``time`` (7)."""
         return self.oscillator.free(self.start, np.asarray(time) - self.origin)
 
     def motion(self, time: Values | float) -> State:
-        """States of the switched run at ``time``: free (7), rigid (9)-(12), free again (18).
+        """Return the states of the switched run at ``time``: free (7), rigid (9)-(12), free again (18).
 
-        At tr itself the state after the switch.
+        At tr itself, the state after the switch.
         """
         time = np.asarray(time, dtype=np.float64)
         released = self.oscillator.rigid(self.reference(self.tr), self.td - self.tr)
@@ -319,7 +322,7 @@ class Replay:
         )
 
     def residual(self) -> float:
-        """Energy norm of what the switched run lacks at td, over that of the reference vibration [-]."""
+        """Return the energy norm of what the switched run lacks at td, relative to the reference vibration [-]."""
         reference = self.reference(self.td)
         lack = lacking_energy(self.oscillator, reference, self.motion(self.td))
         return float(np.sqrt(lack / self.oscillator.vibration_energy(reference)))
@@ -341,10 +344,10 @@ def trajectory(
     dt: float,
     switched: Replay | None = None,
 ) -> Trajectory:
-    """Compute the motion at 0, dt, 2 dt, ... up to ``t_end``, of ``switched`` where it is given [time].
+    """Compute the motion at 0, dt, 2 dt, ... up to ``t_end``, switched if ``switched`` is given [time].
 
-    Times are rounded to the 14th digit of ``t_end``, so that a multiple of dt meets the switch time that is
-    written the same.
+    Times are rounded to the 14th digit of ``t_end``, so that a multiple of dt equals a switch time that is written
+    alike.
     """
     count = int(np.floor(t_end / dt * (1 + 1e-12))) + 1
     with np.errstate(all="ignore"):

@@ -1,4 +1,4 @@
-"""The deformation of each part with its sign: what waves confirm, else a mode of its own."""
+"""Determine the deformation of each part with its sign: confirmed by waves, else by a mode of its own."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 
     Places = NDArray[np.intp]
 
-# A mode of a part's own can imitate what crosses between modes in its energy: it must leave so much less.
+# A mode fitted to one part can imitate the cross terms between modes in its energy: it must leave this much less.
 _CLEARLY = 0.5
 
 
 def by_own_mode(
     time: Samples, energy: Samples, followed: PartMotion | None
 ) -> PartMotion | None:
-    """Give a part the motion of one mode if that describes its energy and leaves clearly less than ``followed``."""
+    """Return the motion of one mode for a part if it describes the energy and leaves clearly less than ``followed``."""
     fit = identify(time, energy, quick=True)
     if fit.mode is None or not _purely_vibrates(fit):
         return followed
@@ -42,7 +42,7 @@ def by_own_mode(
 
 
 def _purely_vibrates(fit: Identification) -> bool:
-    """Whether a fit describes the record without a plastic rest or preload: these may be a plane of a rate close by."""
+    """Return True if a fit has no plastic rest or preload, which may be a second plane at a similar rate."""
     return bool(
         fit.describes_record
         and fit.mode
@@ -50,11 +50,11 @@ def _purely_vibrates(fit: Identification) -> bool:
     )
 
 
-# A deformation that swings about zero is zero on average; beyond this share of its mean size it swings about
-# something else, a preload or plastic work, and its sign at a zero of the energy means nothing.
+# A deformation that swings about zero has a mean of zero. Beyond this share of its mean size it swings about a preload
+# or plastic work, and its sign at a zero of the energy means nothing.
 _MOST_OFF_CENTRE = 0.5
-# Parts without a sign are left out where they hold no more than this share of the energy: D changes by 0.2 at most,
-# the default tolerance.
+# Parts without a sign are left out if they hold less than this share of the energy: D changes by at most 0.2, the
+# default tolerance.
 MOST_UNSIGNED = 0.01
 _NOT_FOLLOWED = (
     "no few modes have its energy, with the signs that its minima give or on their own"
@@ -64,7 +64,7 @@ _NOT_FOLLOWED = (
 class PartMatch(NamedTuple):
     """One part: whether its deformation has the same sign at tr and td, and its share in the square of D.
 
-    Both None where the part has no sign; ``reason`` says why.
+    Both are None if the part has no sign; ``reason`` says why.
     """
 
     name: str
@@ -128,13 +128,13 @@ class SignedParts(SignedAmplitudes):
         )
 
     def _roots(self) -> Samples:
-        """Roots of the energies, shape (k, n): not kept, since there may be a window for each td."""
+        """Return the roots of the energies, shape (k, n); not stored, since there may be a window for each td."""
         return np.sqrt(np.maximum(self._energies.T, 0.0), order="C")
 
     def _by_zeros(
         self, places: Places, roots: Samples
     ) -> Iterator[tuple[int, PartMotion | str]]:
-        """Read the signs of parts from the zeros of their energy, or why there are none."""
+        """Yield the motion of parts from the zeros of their energy, or the reason why there is none."""
         lasting = np.gradient(self.time)
         for i, own in zip(
             places.tolist(), all_zeros(self.time, roots[places]), strict=True
@@ -147,7 +147,7 @@ class SignedParts(SignedAmplitudes):
 
     @cached_property
     def _all(self) -> list[PartMotion | str]:
-        """All parts: where too much has no sign, no mode of their own is looked for in those that hold less."""
+        """Return all parts; if too much has no sign, no modes are searched in parts that hold less."""
         found = {
             **self._main,
             **dict(self._by_zeros(self._order[len(self._main) :], self._roots())),
@@ -156,17 +156,17 @@ class SignedParts(SignedAmplitudes):
 
     @property
     def signed(self) -> bool:
-        """Whether enough of the energy lies in parts that have a sign."""
+        """Return True if parts with a sign hold enough of the energy."""
         return self.unsigned_share <= MOST_UNSIGNED
 
     @property
     def told(self) -> str:
-        """Name the parts that a choice rests on."""
+        """Return the parts that a choice rests on, in words."""
         return f"parts, signs of {', '.join(self.names)}"
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Of the k parts that have a sign."""
+        """Return the names of the k parts that have a sign."""
         return tuple(
             name
             for name, known in zip(self._names, self._all, strict=True)
@@ -175,12 +175,12 @@ class SignedParts(SignedAmplitudes):
 
     @cached_property
     def motions(self) -> tuple[PartMotion, ...]:
-        """How each of them vibrates; the sign of a deformation as a whole is arbitrary."""
+        """Return how each of them vibrates; the sign of a deformation as a whole is arbitrary."""
         return tuple(known for known in self._all if isinstance(known, PartMotion))
 
     @property
     def unsigned(self) -> tuple[PartMatch, ...]:
-        """Parts that were left out."""
+        """Return the parts that were left out."""
         all_parts = zip(self._names, self._all, strict=True)
         return tuple(
             PartMatch(name, None, None, why)
@@ -190,30 +190,30 @@ class SignedParts(SignedAmplitudes):
 
     @cached_property
     def owner(self) -> Places:
-        """Place in ``names`` of the part of each deformation: a part has one for each of its modes."""
+        """Return the index in ``names`` of each deformation's part: a part has a deformation for each of its modes."""
         return np.repeat(
             np.arange(len(self.names)),
             [len(one.model.amplitudes(0.0)) for one in self.motions],
         )
 
     def amplitudes(self, t: Samples | float) -> Samples:
-        """Signed deformations of the parts' modes, of the shape of ``t`` with an axis before it [sqrt(energy)]."""
+        """Return signed deformations of the parts' modes, shape of ``t`` with an axis before it [sqrt(energy)]."""
         return np.concatenate([one.model.amplitudes(t) for one in self.motions])
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
-        """Kinetic energy of the vibration, T [energy]."""
+        """Return the kinetic energy of the vibration, T [energy]."""
         return np.asarray(
             np.sum([one.model.kinetic_energy(t) for one in self.motions], axis=0)
         )
 
     def vibration_energy(self, t: Samples | float) -> Samples:
-        """Energy of the vibration, V = E + T [energy]."""
+        """Return the energy of the vibration, V = E + T [energy]."""
         return np.asarray(
             np.sum([one.model.vibration_energy(t) for one in self.motions], axis=0)
         )
 
     def unseen(self, t: Samples | float, td: float) -> Samples:
-        """Share of the vibration energy at td that further modes, and parts left out, may have at ``t`` [-]."""
+        """Return the share of the vibration energy at td that hidden modes and omitted parts may have at ``t`` [-]."""
         beside = self.unsigned_share / (1 - self.unsigned_share)
         hidden = [
             (one.hidden + beside) * one.model.vibration_energy(t)
@@ -222,27 +222,27 @@ class SignedParts(SignedAmplitudes):
         return np.asarray(np.sum(hidden, axis=0) / self.vibration_energy(td))
 
     def known_at(self, td: float) -> bool:
-        """Whether the energy of the vibration is above a solver's errors at td."""
+        """Return True if the vibration energy at td exceeds the solver's errors."""
         return bool(
             self.vibration_energy(td)
             >= SOLVER_FLOOR * np.max(self.vibration_energy(self.time))
         )
 
     def profile(self, td: float) -> Profile:
-        """Lock-in errors at the times before ``td`` whose sign can be compared with that at td."""
+        """Return lock-in errors at the times before ``td`` whose sign can be compared with that at td."""
         since = np.searchsorted(self.time, self.comparable_since(td))
         return Profile.of(
             self, self.time[since:], td
-        )  # a copy for each td would fill the memory
+        )  # views: a copy for each td would fill the memory
 
     def residual_band(
         self, stated: Samples, tr: Samples, td: float
     ) -> tuple[Samples, Samples, Samples]:
-        """Residual of each tr (n,) as it is stated, which is the least one, and the largest [-]."""
+        """Return the stated residual of each tr (n,), which is the lower bound, and the upper bound [-]."""
         return measures.band_up_to(self.residual_bound, stated, tr, td)
 
     def residual_bound(self, residual: Samples, tr: Samples, td: float) -> Samples:
-        """Largest residual of each tr of shape (n,), if what may be hidden stood opposed at tr and td [-]."""
+        """Return the largest residual of each tr (n,) if the hidden part is in opposite phase at tr and td [-]."""
         return np.asarray(
             np.hypot(
                 residual, np.sqrt(self.unseen(tr, td)) + np.sqrt(self.unseen(td, td))
@@ -250,13 +250,13 @@ class SignedParts(SignedAmplitudes):
         )
 
     def comparable_since(self, td: float) -> float:
-        """Earliest time whose signs can be compared with those at ``td``: the last unclear one before it [time]."""
+        """Return the last unclear time before ``td``: from there on signs can be compared with those at td [time]."""
         unclear = np.concatenate([one.unclear for one in self.motions])
         return float(np.max(unclear[unclear < td], initial=self.time[0]))
 
 
 def _no_sign(lasting: Samples, deformation: Samples, zeros: Samples) -> str | None:
-    """Say why a deformation, whose states last so long, is none that swings about zero."""
+    """Return the reason why a deformation, with durations ``lasting`` of its states, does not swing about zero."""
     if zeros.size < 2:
         return "the energy does not return to zero: preloaded, yielded or vibrating in many modes"
     off, size = abs(float(lasting @ deformation)), float(lasting @ np.abs(deformation))
@@ -265,14 +265,14 @@ def _no_sign(lasting: Samples, deformation: Samples, zeros: Samples) -> str | No
     return None
 
 
-# The parts that are named together make up this much of the mismatch.
+# The named parts make up this share of the mismatch.
 _NAMED_TOGETHER = 0.8
 
 
 def contributions(
     vibration: SignedParts, tr: float, td: float
 ) -> tuple[PartMatch, ...]:
-    """Give the match of each part, that with the largest share first, then those without a sign."""
+    """Return the match of each part, the largest share first, then those without a sign."""
     shares = np.bincount(
         vibration.owner, measures.mismatch_shares(vibration, tr, td)
     ).tolist()
@@ -291,7 +291,7 @@ def contributions(
 
 
 def main_contributors(matches: Sequence[PartMatch]) -> str:
-    """Name the parts that contribute most.
+    """Return the names of the parts that contribute most.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Where one oscillator describes the record: the window around td, found by growing and fitting anew, once each."""
+"""Find where one oscillator describes the record: the window around td, grown and fitted repeatedly."""
 
 from __future__ import annotations
 
@@ -45,29 +45,29 @@ if TYPE_CHECKING:
             """V [energy]."""
 
 
-# Where windows that are tried for an oscillator begin, as shares of what comes before td, and where they end, of what
-# comes after: by such steps one of them lies in any flight of some periods and fills most of it.
+# Starts of trial windows as shares of the time before td, and ends as shares of the time after it: some window lies in
+# any flight of several periods and fills most of it.
 _BEGINNINGS, _ENDS = (0.6, 0.36, 0.22, 0.13), (0.5, 0.25, 0.12)
-# Ends before td, as shares of what comes before it: td itself may lie in the next contact.
+# Ends before td, as shares of the time before it: td itself may lie in the next contact.
 _EARLIER_ENDS = (0.1, 0.2, 0.35)
-# They lie on marks that are the same for every td, so that neighbouring td share the windows and what was fitted to
-# them: each mark is so much of the way to the one after it, as far from td as the last beginning at most.
+# Windows begin and end at marks shared by all td, so that neighbouring td share windows and fits: each mark is this
+# share of the distance of the next one.
 _MARKS = 0.87
-# A window that an oscillator describes shows so many periods at least, and holds most of the samples it was fitted to:
-# less may be an accident, or the moment in which a record passes from one thing to another.
+# A window that an oscillator describes has at least this many periods, and most of the samples it was fitted to: less
+# may be an accident, or a transition in the record.
 _LEAST_PERIODS, _MOST = 1.25, 0.8
-# An inner fit whose scatter is below this share of that of the whole shows that the ends are not of the flight.
+# An inner fit with a scatter below this share of the whole shows that the ends do not belong to the flight.
 _MUCH_BETTER = 0.7
-# The record leaves the fitted oscillator where the mean error over a twenty-fifth of a period (three samples at
-# least) exceeds this share of the vibration energy, this many standard errors of such a mean, or this many times the
-# systematic rest that the fit leaves anyway, whichever is most.  Of a million means of white noise one does by chance.
+# The record leaves the fitted oscillator if the mean error over 1/25 period (at least three samples) exceeds the
+# largest of: this share of the vibration energy, this many standard errors of such a mean, this many times the
+# systematic rest of the fit. Of a million means of white noise one does so by chance.
 _SHARE_OFF, _ERRORS_OFF, _STRUCTURES_OFF, _MEANS_PER_PERIOD = 0.01, 5.0, 3.0, 25
-# Fits of the growing window until it stays; two are usual.
+# Most fits of the growing window; two are usual.
 _MOST_REFITS = 8
 
 
 class Span(NamedTuple):
-    """Window of the record that an oscillator describes, from its first to its last sample [time]."""
+    """A window of the record, from its first to its last sample [time]."""
 
     start: float
     end: float
@@ -84,8 +84,8 @@ def described_span(
 ) -> tuple[Span | None, Identification]:
     """Find the longest window around td that one oscillator describes, or the last one before td.
 
-    First a part of the record that one oscillator describes is looked for, long ones first.  From there the window
-    grows both ways while the samples stay with the fit, is fitted anew, and so on until it stays.
+    First a part of the record that one oscillator describes is searched, long ones first.  From there the window grows
+    both ways while the samples follow the fit, is fitted anew, and so on until it no longer changes.
 
     Parameters
     ----------
@@ -135,9 +135,9 @@ def _reach(
 def span_of(
     history: History, anchor: float, fit: Identification, bounds: Span
 ) -> Span | None:
-    """Find the window around ``anchor`` [time], within ``bounds``, in which the record stays with ``fit``.
+    """Find the window around ``anchor`` [time], within ``bounds``, in which the record follows ``fit``.
 
-    It ends where the energy drifts off the fit; None when it is off at the anchor itself.
+    It ends where the energy drifts off the fit; None if it is off at the anchor itself.
     """
     assert fit.mode is not None
     time, energy = history.between(*bounds)
@@ -161,7 +161,7 @@ def span_of(
 
 @np.errstate(
     over="ignore", invalid="ignore"
-)  # far off, a damped fit grows beyond all numbers
+)  # far away, a damped fit grows beyond all numbers
 def _first_off(
     time: Samples,
     energy: Samples,
@@ -171,9 +171,9 @@ def _first_off(
     behind: int,
     ahead: int,
 ) -> int | None:
-    """Place of the first mean, from the ``first`` on, that is off by more than ``room`` [energy] and the share allowed.
+    """Return the index of the first mean, from ``first`` on, that is off by more than allowed.
 
-    It goes outwards block by block, so that no sum holds the large errors beyond the end that is to be found.
+    The search goes outwards block by block, so that no sum contains the large errors beyond the end that is searched.
     """
     for begin in range(first, time.size, BLOCK):
         inside = slice(max(begin - behind, 0), begin + BLOCK + ahead)
@@ -189,7 +189,7 @@ def _first_off(
 
 
 def _means(values: Samples, first: int, behind: int, ahead: int) -> Samples:
-    """Means over so many values behind each value and ahead of it, from the ``first`` on; there are zeros outside."""
+    """Return means of ``behind`` values before each value and ``ahead`` after it, from ``first`` on."""
     known, width = values[max(first - behind, 0) :], behind + 1 + ahead
     sums = np.zeros(values.size - first + width)
     begin = 1 + max(behind - first, 0)
@@ -255,7 +255,7 @@ def _grow(
     fitter: Fitter,
     reach: Reach,
 ) -> tuple[Span | None, Identification]:
-    """Fit a window, extend it while the record stays with the fit, refit, repeat until it stays."""
+    """Fit the window, extend it while the record follows the fit, refit, and repeat until it no longer changes."""
     fit, span = fitter(*history.between(*window)), window
     for _ in range(_MOST_REFITS):
         if not fit.follows or fit.mode is None:
@@ -271,7 +271,7 @@ def _grow(
             reason = fit.reason or "an oscillator fits only a part of the record"
             return None, fit._replace(describes_record=False, reason=reason)
         if grown == (fit.start, fit.end):
-            if not fit.describes_record:  # too short, say
+            if not fit.describes_record:  # too short, for example
                 return None, fit
             return _cleared(history, grown, fit, bounds, fitter, reach)
         span = grown
@@ -289,8 +289,8 @@ def _cleared(
 ) -> tuple[Span, Identification]:
     """Fit the window once more without half a period at the ends where the record leaves it.
 
-    There a fit may have given way to the beginning of a contact or the end of a load.  Where the inner fit follows its
-    samples much better, it tells the window.
+    There a fit may have adapted to the beginning of a contact or the end of a load.  If the inner fit follows its
+    samples much better, it determines the window.
     """
     assert fit.mode is not None
     inset = np.pi / fit.mode.omega
@@ -326,12 +326,13 @@ class Fits(Memory):
         return fit
 
 
-# Share of the vibration energy: a smaller mode changes a residual by 0.06 at most, and real solvers leave as much.
+# Least share of the vibration energy of a hidden mode: a smaller mode changes a residual by at most 0.06, and real
+# solvers leave as much.
 SMALLEST: Final = 1e-3
-_MOST_LINES: Final = 8192  # bounds the work; enough for 800 periods of the energy
-_FINER: Final = 4  # points per line of a spectrum, so that its top is met
+_MOST_LINES: Final = 8192  # limits the work; enough for 800 periods of the energy
+_FINER: Final = 4  # points per line of a spectrum, so that its peak is met
 _CELLS_PER_PERIOD: Final = (
-    4  # of the fastest line: below, the means over cells would hide most of it
+    4  # of the fastest line: with fewer, means over cells would hide most of it
 )
 
 
@@ -356,17 +357,17 @@ def hidden_share(time: Samples, energy: Samples, model: Damped) -> float:
     shown = slice(_FINER, max(_FINER + 1, _FINER * count // _CELLS_PER_PERIOD))
     strongest = float(np.abs(np.fft.rfft(rest * decay, _FINER * count))[shown].max())
     amplitude = 2 * strongest / float(np.sum(decay**2))
-    # the energy of a mode swings by half of its vibration energy about a mean
+    # the energy of a mode swings about a mean by half of its vibration energy
     return min(2 * amplitude / float(model.vibration_energy(time[0])), 1.0)
 
 
 def residual_bound(
     fit: Identification, residual: Samples, tr: Samples, td: Samples | float
 ) -> Samples:
-    """Largest residual of each tr of shape (n,) with the energy that a hidden mode may have, at worst [-].
+    """Return the largest residual of each tr of shape (n,) with the energy that a hidden mode may have, at worst [-].
 
-    It then stood at tr at one end of its swing and at td at the other, where it is smaller by the damping in between:
-    R^2 grows by its share of the vibration energy times (1 + exp(alpha (td - tr)/2))^2.
+    The mode is then in opposite phase at tr and td, and smaller at td by the damping in between: R^2 grows by its share
+    of the vibration energy times (1 + exp(alpha (td - tr)/2))^2.
     """
     assert fit.mode is not None
     swing = 1 + np.exp(fit.mode.alpha / 2 * (td - tr))

@@ -1,8 +1,8 @@
-"""The sign of a deformation whose energy comes down to its floor in every swing, whatever the law of the spring.
+"""Determine the sign of a deformation whose energy comes down to its floor in every swing, for any law of the spring.
 
-Each of these minima is a passage through zero: what lies above the floor is elastic, and its root is the deformation,
-which turns its sign there.  Plastic work lifts the floor, heat and drift move it slowly.  Where the minima do not lie
-on a smooth floor, another mode holds the rest of the energy there, and nothing can be counted.
+Each of these minima is a passage through zero: the energy above the floor is elastic, and its root is the deformation,
+which changes its sign there.  Plastic work raises the floor; heat and drift move it slowly.  If the minima do not lie
+on a smooth floor, another mode has energy there, and swings cannot be counted.
 """
 
 from __future__ import annotations
@@ -23,27 +23,27 @@ if TYPE_CHECKING:
     from d2rpick.histories.history import Samples
 
 
-# A turn counts where the energy comes back by so much of its last swing; less is noise, or a faster mode.
+# A turn counts if the energy comes back by this share of its last swing; less is noise, or a faster mode.
 _SWING: Final = 0.2
-# Of the swing: a minimum that lies so far off the line through its neighbours is not on the floor.
+# A minimum is not on the floor if it lies off the line through its neighbours by this share of the swing.
 _OFF_FLOOR: Final = 0.02
-# Of the minima: where more are off the floor, those on it are so by chance.
+# If more than this share of the minima are off the floor, those on it are so by chance.
 _MOST_OFF: Final = 0.1
 _FEWEST: Final = 5  # minima that show a floor
-# Of two swings' time: a shorter one beside a longer one differ by so much where a beat makes them.
+# Least relative difference in time between a shorter swing and the longer one beside it in a beat.
 _UNEVEN: Final = 0.03
-# A spring that stiffens swings at another rate once the amplitude is another: over two periods after td its residual
-# came out up to 1.5 times that of a linear one.  About a preload that keeps it off zero it is twice as large.
+# Factor on the residual for any spring: a stiffening spring changes its rate with the amplitude, and over two periods
+# after td its residual was up to 1.5 times that of a linear one, about a preload twice.
 _OF_ANY_SPRING: Final = 2.0
-# A mode that is hidden at the worst moves the residual by twice the root of its share; the floor shows less than all of
-# it, a sixth in one of 300 records of two parts.  Of some 10,000 random pairs with a second mode 0.1 % were beyond
-# three times the root by more than 0.05.
+# Factor on the root of the hidden share: a mode hidden at its worst changes the residual by 2, but the floor shows less
+# than all of it, 1/6 in one of 300 records of two parts. Of 10,000 random pairs with a second mode 0.1 % exceeded 3
+# times the root by more than 0.05.
 _OF_THE_FLOOR: Final = 5.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Swings(SignedAmplitudes):
-    """The deformation that was counted, in the states of a flight.
+    """The deformation from counted swings, in the states of a flight.
 
     Parameters
     ----------
@@ -69,26 +69,26 @@ class Swings(SignedAmplitudes):
     undescribed: ClassVar = "the swings of the energy cannot be counted from here to td"
 
     def amplitudes(self, t: Samples | float) -> Samples:
-        """Signed deformation, of the shape of ``t`` with an axis of one before it [sqrt(energy)]."""
+        """Return the signed deformation, of the shape of ``t`` with an axis of one before it [sqrt(energy)]."""
         return np.asarray(np.interp(t, self.time, self.deformation))[np.newaxis]
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
-        """Kinetic energy of the vibration: what the estimate leaves beside the elastic one [energy]."""
+        """Return the kinetic energy of the vibration: the estimated vibration energy less the elastic one [energy]."""
         return np.asarray(self.vibration_energy(t) - self.amplitudes(t)[0] ** 2)
 
     def vibration_energy(self, t: Samples | float) -> Samples:
-        """Energy of the vibration, at least the elastic one [energy]."""
+        """Return the energy of the vibration, at least the elastic one [energy]."""
         return np.asarray(
             np.maximum(self.envelope.vibration_energy(t), self.amplitudes(t)[0] ** 2)
         )
 
     def comparable_since(self, td: float) -> float:
-        """Earliest time whose sign can be compared with that at ``td`` [time]."""
+        """Return the earliest time whose sign can be compared with that at ``td`` [time]."""
         before = self.unclear[self.unclear < td]
         return float(before[-1] if before.size else self.time[0])
 
     def known_at(self, td: float) -> bool:
-        """Whether the swings before ``td`` were counted, two at least, and more than the error of a solver vibrates."""
+        """Return True if at least two swings before ``td`` were counted, and more vibrates than the solver's error."""
         counted = np.count_nonzero(
             (self.bottoms > self.comparable_since(td)) & (self.bottoms < td)
         )
@@ -97,29 +97,29 @@ class Swings(SignedAmplitudes):
         )
 
     def profile(self, td: float) -> Profile:
-        """Lock-in errors at the times before ``td`` whose sign can be compared with that at td."""
+        """Return lock-in errors at the times before ``td`` whose sign can be compared with that at td."""
         since = np.searchsorted(self.time, self.comparable_since(td))
         return Profile.of(
             self, self.time[since:], td
-        )  # a copy for each td would fill the memory
+        )  # views: a copy for each td would fill the memory
 
     def residual_band(
         self, stated: Samples, tr: Samples, td: float
     ) -> tuple[Samples, Samples, Samples]:
-        """Residual of each tr (n,) as it is stated, which is the least one, and the largest [-]."""
+        """Return the stated residual of each tr (n,), which is the lower bound, and the upper bound [-]."""
         return measures.band_up_to(self.residual_bound, stated, tr, td)
 
     def residual_bound(self, residual: Samples, tr: Samples, td: float) -> Samples:
-        """Largest residual of each tr (n,): of any spring, with what may hide in the floor at its worst [-]."""
+        """Return the largest residual of each tr (n,): for any spring, with the worst that the floor may hide [-]."""
         hidden = np.minimum(
             _OF_THE_FLOOR * np.sqrt(self.unseen(tr, td)), wrong_sign(0.0)
         )
         return np.asarray(np.hypot(_OF_ANY_SPRING * residual, hidden))
 
     def unseen(self, tr: Samples | float, td: float) -> Samples:
-        """Share of the vibration energy at td that the floor may hide in another mode, from each tr (n,) on [-].
+        """Return the share of the vibration energy at td that a mode may hide in the floor, for each tr (n,) [-].
 
-        From what the floor varies there; a floor that is next to nothing hides no more than itself.
+        It follows from the variation of the floor; a floor of almost nothing hides no more than itself.
         """
         first = np.clip(np.searchsorted(self.bottoms, np.atleast_1d(tr)) - 1, 0, None)
         last = int(np.searchsorted(self.bottoms, td)) + 1
@@ -131,7 +131,7 @@ class Swings(SignedAmplitudes):
 
 
 def count_swings(time: Samples, energy: Samples) -> Swings | None:
-    """Count the swings of an energy in free flight; None where they do not come down to a floor.
+    """Count the swings of an energy in free flight; return None if they do not come down to a floor.
 
     Parameters
     ----------
@@ -169,15 +169,15 @@ def count_swings(time: Samples, energy: Samples) -> Swings | None:
     deformation = np.where(turned, -np.sqrt(elastic), np.sqrt(elastic))
     unclear = np.sort(
         np.concatenate([bottom[off], time[[1, open_end]]])
-    )  # next to the ends a minimum is not seen
+    )  # a minimum next to the ends is not seen
     return Swings(time, deformation, unclear, whole, bottom, floor)
 
 
 def _is_beat(bottom: Samples, floor: Samples, top: Samples, peak: Samples) -> bool:
-    """Return whether the swings alternate as only the beat of two modes makes them, with rates of 2 to 3 or 2 to 7.
+    """Return True if the swings alternate as only the beat of two modes makes them, with rates of 2 to 3 or 2 to 7.
 
     The minima of a beat can all lie on one level.  The deformation of a single mode stays longer on the side of its
-    preload, and goes farther there; in a beat the longer swing is the lower one.
+    preload and goes farther there; in a beat the longer swing is the lower one.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def _is_beat(bottom: Samples, floor: Samples, top: Samples, peak: Samples) -> bo
 
 
 def _turns(energy: Samples) -> tuple[NDArray[np.intp], int]:
-    """Places where the energy turns from one swing into the next, and the last before any that is not seen yet."""
+    """Return the indices at which the energy turns from one swing into the next, and the last turn seen completely."""
     places, last = find_turns(energy)[0], energy.size - 2
     if 4 * places.size > energy.size:  # noise
         return np.zeros(0, dtype=np.intp), last
@@ -219,7 +219,7 @@ def _turns(energy: Samples) -> tuple[NDArray[np.intp], int]:
 
 
 def _along(time: Samples, x: Samples, y: Samples) -> Samples:
-    """Straight lines through points, and on beyond the first and the last two of them."""
+    """Return values on straight lines through points, continued beyond the first and the last two of them."""
     first, last = (
         y[i] + (y[j] - y[i]) / (x[j] - x[i]) * (t - x[i])
         for i, j, t in ((0, 1, time[0]), (-1, -2, time[-1]))
@@ -230,7 +230,7 @@ def _along(time: Samples, x: Samples, y: Samples) -> Samples:
 
 
 def _off_line(x: Samples, y: Samples) -> Samples:
-    """How far each of n >= 3 values lies off the straight line through its neighbours, or next two at an end."""
+    """Return how far each of n >= 3 values lies off the line through its neighbours, or the next two at an end."""
     middle = np.clip(np.arange(x.size), 1, x.size - 2)
     ends = np.arange(x.size) != middle
     left, right = (
@@ -242,18 +242,18 @@ def _off_line(x: Samples, y: Samples) -> Samples:
     )
 
 
-# Of the highest energy: a solver errs by a tenth of it at any time, so that nothing below is sure to be vibration.
+# Share of the highest energy below which nothing is surely vibration: a solver errs by 1/10 of it at any time.
 SOLVER_FLOOR: Final = 1e-4
 
 
 class Envelope(NamedTuple):
-    """An exponential that lies on the highest peaks of an energy: ``energy`` at time ``origin``, falling at ``rate``.
+    """An exponential on the highest peaks of an energy: ``energy`` at time ``origin``, falling at ``rate``.
 
-    Below ``floor`` [energy] it is no more than what a solver errs by.
+    Below ``floor`` [energy] it does not exceed the solver's error.
 
-    The vibration energy V = E + T falls smoothly, as exp(-alpha t) where damping is proportional to mass, and E
-    touches it when all modes stand still at once.  That is rare with several modes, so the envelope is an estimate,
-    too low rather than too high.
+    The vibration energy V = E + T falls smoothly, as exp(-alpha t) if damping is proportional to mass, and E touches it
+    when all modes stand still at once.  That is rare with several modes, so the envelope is an estimate, rather too
+    low.
     """
 
     energy: float
@@ -262,7 +262,7 @@ class Envelope(NamedTuple):
     floor: float
 
     def vibration_energy(self, t: Samples | float) -> Samples:
-        """Estimate of V(t) [energy]."""
+        """Return the estimate of V(t) [energy]."""
         return np.asarray(
             self.energy * np.exp(-self.rate * (np.asarray(t) - self.origin))
         )
@@ -312,4 +312,5 @@ def upper_envelope(time: Samples, energy: Samples) -> Envelope | None:
 def _turns_left(
     a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]
 ) -> bool:
+    """Return True if the path through three points turns left at the second."""
     return (b[0] - a[0]) * (c[1] - a[1]) >= (b[1] - a[1]) * (c[0] - a[0])

@@ -1,11 +1,11 @@
-"""The sign of a deformation whose square is known: where it passes zero, and the few damped waves that confirm it.
+"""Determine the sign of a deformation whose square is known: its zeros, and a few damped waves that confirm them.
 
-The root of a part's energy is proportional to its deformation but for the sign, and the sign turns where the energy
-passes through zero.  In a record no energy is zero exactly.  But the deformation is smooth: through a zero the root
-bends sharply unless the sign is turned there, at any other minimum it bends sharply if it is.
+The root of a part's energy is proportional to its deformation except for the sign, which changes where the energy
+passes through zero.  In a record no energy is exactly zero.  But the deformation is smooth: at a zero the root has a
+sharp bend unless the sign is changed there; at any other minimum it has one if the sign is changed.
 
-Zeros alone prove no sign.  Where a part bends in two planes its energy is the sum of two squares, hardly ever zero, and
-the root of it with signs from its minima jumps or bends as no sum of a few waves does.
+Zeros alone prove no sign.  If a part bends in two planes its energy is the sum of two squares, which is hardly ever
+zero, and its root with signs from its minima jumps or bends as no sum of a few waves does.
 """
 
 from __future__ import annotations
@@ -30,13 +30,14 @@ if TYPE_CHECKING:
     Complex = NDArray[np.complex128]
     Places = NDArray[np.intp]
 
-# With more of them nearly any record could be described.
+# Most waves; more would describe almost any record.
 _MOST: Final = 6
-# Samples in which the rates are sought: the work grows with the third power.  Fewer show too little for six waves.
+# Most samples in which rates are searched, since the work grows with the third power; fewer than 36 show too little for
+# six waves.
 _MOST_SAMPLES, _LEAST_SAMPLES = 400, 36
-# Fewer waves are as good where they leave no more than this many times what more of them do; below, all is rounding.
+# Fewer waves are as good if they leave at most 1.5 times what more waves leave; below 1e-12 all is rounding.
 _AS_GOOD, _ROUNDING = 1.5, 1e-12
-# Of the exponent: beyond the record that was fitted a decay grows backwards without end.
+# Largest exponent: outside the fitted record a decay grows backwards without end.
 _LARGEST_EXPONENT: Final = 100.0
 
 
@@ -57,42 +58,43 @@ class Waves(NamedTuple):
 
     @property
     def alpha(self) -> float:
-        """Damping, the mean of the waves by their energies [1/time]."""
+        """Return the damping, the mean of the waves weighted by their energies [1/time]."""
         return float(
             -2 * np.average(self.rates.real, weights=np.abs(self.weights) ** 2)
         )
 
     def amplitudes(self, t: Samples | float) -> Samples:
-        """Signed deformations of all waves, of the shape of ``t`` with an axis before it [sqrt(energy)]."""
+        """Return signed deformations of all waves, of the shape of ``t`` with an axis before it [sqrt(energy)]."""
         return np.asarray(self._each(t).real)
 
     def deformation(self, t: Samples | float) -> Samples:
-        """q(t) [sqrt(energy)]."""
+        """Return q(t) [sqrt(energy)]."""
         return np.asarray(self.amplitudes(t).sum(axis=0))
 
     def energy(self, t: Samples | float) -> Samples:
-        """q(t)^2 [energy]."""
+        """Return q(t)^2 [energy]."""
         return self.deformation(t) ** 2
 
     def kinetic_energy(self, t: Samples | float) -> Samples:
-        """Kinetic energy of the modes [energy]."""
+        """Return the kinetic energy of the modes [energy]."""
         turned = (self.rates / np.abs(self.rates)).reshape(-1, *(1,) * np.ndim(t))
         return np.asarray(((self._each(t) * turned).real ** 2).sum(axis=0))
 
     def vibration_energy(self, t: Samples | float) -> Samples:
-        """Internal and kinetic energy of the modes [energy]."""
+        """Return the internal plus kinetic energy of the modes [energy]."""
         return np.asarray(
             (self.amplitudes(t) ** 2).sum(axis=0) + self.kinetic_energy(t)
         )
 
     def _each(self, t: Samples | float) -> Complex:
+        """Return each complex wave, of the shape of ``t`` with an axis before it."""
         s = np.multiply.outer(self.rates, np.asarray(t, dtype=np.float64) - self.origin)
         waves = np.exp(np.minimum(s.real, _LARGEST_EXPONENT) + 1j * s.imag)
         return np.asarray(waves * self.weights.reshape(-1, *(1,) * np.ndim(t)))
 
 
 def fit_waves(time: Samples, deformation: Samples) -> Waves | None:
-    """Fit as few waves as describe a deformation nearly as well as six do; None where nothing swings.
+    """Fit as few waves as describe a deformation nearly as well as six do; return None if nothing swings.
 
     Parameters
     ----------
@@ -136,9 +138,9 @@ def fit_waves(time: Samples, deformation: Samples) -> Waves | None:
 def _fit(
     space: Samples, step: float, time: Samples, deformation: Samples
 ) -> tuple[float, Waves] | None:
-    """Sum of squares that is left, and the waves whose windows span ``space``, an orthonormal basis in columns."""
+    """Return the remaining sum of squares and the waves whose windows span ``space``, an orthonormal basis."""
     rates = np.log(factors_of(space)) / step
-    rates = rates[rates.imag > np.abs(rates.real)]  # what decays faster is no vibration
+    rates = rates[rates.imag > np.abs(rates.real)]  # a faster decay is no vibration
     if not rates.size:
         return None
     rates = (
@@ -146,9 +148,7 @@ def _fit(
     )  # noise lets a free vibration grow
     waves = np.exp(np.multiply.outer(time - time[0], rates))
     basis = np.hstack([waves.real, -waves.imag])
-    weight = np.abs(
-        deformation
-    )  # what is off in an energy is off by so much less in its root
+    weight = np.abs(deformation)  # an error in the energy is halved in its root
     found = np.linalg.lstsq(
         basis * weight[:, np.newaxis], deformation * weight, rcond=None
     )[0]
@@ -157,20 +157,20 @@ def _fit(
     return float(rest @ rest), Waves(rates, weights, float(time[0]))
 
 
-# One way must be this many times smoother than the other to be believed.  At 24 samples per period of a chain of two
-# springs the least clear of 35 minima has 2.5, the usual ones have 5 to 60.
+# One choice of the sign must be this many times smoother. At 24 samples per period of a chain of two springs the least
+# clear of 35 minima has 2.5, usual ones 5 to 60.
 _SMOOTHER = 2.0
-# Every other sample is left out again and again while minima are unclear: in fine output a zero drowns in the error
-# of the solver, 1e-5 of the highest energy, and the root is round there.  But minima stay this many samples apart.
+# Every second sample is left out repeatedly while minima are unclear: in fine output the solver's error, 1e-5 of the
+# highest energy, hides a zero. Minima keep at least this many samples between them.
 _LEAST_APART = 8
-# Samples of parts that are looked at together: what is made of them stays in the cache.
+# Samples of parts that are processed together, so that they stay in the processor's cache.
 _TOGETHER = 1 << 14
-# Signs of five samples about a minimum where the deformation turns nowhere, just before the minimum, just after it.
+# Signs of five samples about a minimum if the deformation turns nowhere, just before the minimum, or just after it.
 _TURNS = np.array([[1, 1, 1, 1, 1], [-1, -1, 1, 1, 1], [-1, -1, -1, 1, 1]])
 
 
 class Zeros(NamedTuple):
-    """Times at which a deformation passes zero, at which it may or may not, and, near the ends, cannot be seen to."""
+    """Times at which a deformation passes zero, may pass zero, and, near the ends, at which this is not seen."""
 
     sure: Samples
     doubtful: Samples
@@ -185,7 +185,7 @@ def all_zeros(time: Samples, roots: Samples) -> Iterator[Zeros]:
 
 
 def _zeros(time: Samples, roots: Samples) -> list[Zeros]:
-    """Find the zeros of each row from every sample, or every other, and so on: what leaves the fewest doubts."""
+    """Find the zeros of each row from every sample, or every second and so on, with the fewest doubtful ones."""
     best, stride = _zeros_of(time, roots, _minima(roots)), 2
     unsure = _unsure(best, range(len(best)))
     while unsure.size:
@@ -204,13 +204,14 @@ def _zeros(time: Samples, roots: Samples) -> list[Zeros]:
 
 
 def _unsure(zeros: Sequence[Zeros], rows: Iterable[int]) -> Places:
+    """Return the rows with doubtful zeros."""
     return np.array([row for row in rows if zeros[row].doubtful.size], dtype=np.intp)
 
 
 def _zeros_of(time: Samples, roots: Samples, minima: NDArray[np.bool_]) -> list[Zeros]:
-    """Zeros of each row from just these samples, which have these minima."""
+    """Find the zeros of each row from just these samples with these minima."""
     row, at = np.nonzero(minima)
-    # two samples to either side tell how the root bends; of a minimum nearer to an end nothing is known
+    # two samples on either side show the bend of the root; a minimum nearer to an end remains unknown
     early, late = at < 2, at >= time.size - 2
     own, middle = row[~early & ~late], at[~early & ~late]
     around = middle[:, np.newaxis] + np.arange(-2, 3)
@@ -242,41 +243,41 @@ def _zeros_of(time: Samples, roots: Samples, minima: NDArray[np.bool_]) -> list[
 
 
 def _by_row(values: Samples, row: Places, rows: int) -> list[Samples]:
-    """Values of each row, of which some may have none; they stand in the order of the rows."""
+    """Split values by row; rows may be empty."""
     edges = np.searchsorted(row, np.arange(rows + 1)).tolist()
     return [values[first:last] for first, last in pairwise(edges)]
 
 
 def _minima(values: Samples) -> NDArray[np.bool_]:
-    """Where in each row local minima are, of a flat one the first; an end below its neighbour counts."""
+    """Return a mask of the local minima in each row: the first of a flat one, and an end below its neighbour."""
     around = np.pad(values, ((0, 0), (1, 1)), constant_values=np.inf)
     return np.asarray((values < around[:, :-2]) & (values <= around[:, 2:]))
 
 
 def _bends(times: Samples, values: Samples) -> Samples:
-    """Largest second difference of the slopes in each row of five samples, of any number of tables of such rows."""
+    """Return the largest second difference of the slopes in each row of five samples, for any number of tables."""
     slopes = (values[..., 1:] - values[..., :-1]) / (times[:, 1:] - times[:, :-1])
     return np.asarray(
         np.abs(slopes[..., 1:] - slopes[..., :-1]).max(axis=-1, initial=0.0)
     )
 
 
-# Of the energy, what waves may leave of a deformation: a sign that is wrong at one of thirty minima leaves ten times as
-# much, noise of half a per cent of the highest energy a tenth.
+# Largest share of the energy that waves may leave: a wrong sign at one of thirty minima leaves 10 times as much, noise
+# of 0.5 % of the highest energy 1/10.
 _MOST_LEFT: Final = 0.01
-# A second plane with so much of the energy hides zeros, or makes some where there are none.
+# A second plane with this share of the energy hides zeros, or makes false ones.
 _MOST_HIDDEN: Final = 0.01
-# Of the vibration energy at the time, over a quarter of a period: beyond, the record is another one there, or lost in
-# noise, and the sign is unclear.
+# Deviation, as a share of the vibration energy over a quarter period, beyond which the sign is unclear: the record
+# differs there or is lost in noise.
 _OFF: Final = 0.2
 _MOST_OFF: Final = 0.5  # of the samples
 _ROUNDS: Final = (
-    4  # in which the stretch that is fitted comes to hold all that is clear
+    4  # repetitions in which the fitted stretch comes to contain all clear times
 )
 
 
 class PartMotion(NamedTuple):
-    """A ``model`` of a part's vibration, the times at which it is ``unclear`` [time], and what may be ``hidden``.
+    """A ``model`` of a part's vibration, the times at which it is ``unclear`` [time], and its ``hidden`` share.
 
     That is the share of the vibration energy that a further mode may have unseen [-].
     """
@@ -287,7 +288,7 @@ class PartMotion(NamedTuple):
 
 
 def followed(time: Samples, tracked: Samples, zeros: Zeros) -> PartMotion | None:
-    """Hold a deformation against waves, which are fitted where it is clear and tell the signs in doubt.
+    """Compare a deformation with waves, which are fitted where it is clear and decide the doubtful signs.
 
     Parameters
     ----------
@@ -316,7 +317,7 @@ def followed(time: Samples, tracked: Samples, zeros: Zeros) -> PartMotion | None
         modelled = waves.deformation(time)
         miss = (np.abs(modelled) - root) ** 2
         missed = _means(miss, width) > _OFF * waves.vibration_energy(time)
-        # and beside it, where the mean still holds much that is right
+        # also beside it, where the mean still contains much that is right
         off = _means(missed.astype(np.float64), width) * width > 0.5
         fitted, stretch = (
             stretch,
@@ -339,5 +340,5 @@ def followed(time: Samples, tracked: Samples, zeros: Zeros) -> PartMotion | None
 
 
 def _means(values: Samples, width: int) -> Samples:
-    """Means of so many values around each."""
+    """Return means over ``width`` values around each value."""
     return np.convolve(values, np.ones(width) / width, mode="same")

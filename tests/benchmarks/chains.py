@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 class Chains(NamedTuple):
     """n chains: masses (n, 3), springs and dampers between them (n, 2), and the force at which springs yield (n, 2).
 
-    They yield up to a time (n,) alone: no vibration that is left after a load reaches what hardened under it.
+    They yield up to a time (n,) only: that of the end of the load, or later.
     ``places`` and ``velocities`` (n, 3, 2) are those at the start.
     """
 

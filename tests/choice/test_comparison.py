@@ -40,7 +40,11 @@ LEGS = stored("rollover_r100_T0*.gz")
 def scan(run_name: str) -> dict[str, float]:
     """Row of the table in which the solver's runs were evaluated when they were computed."""
     table = np.genfromtxt(
-        results("rollover_scan.csv"), delimiter=",", names=True, dtype=None
+        results("rollover_scan.csv"),
+        delimiter=",",
+        names=True,
+        dtype=None,
+        encoding="utf-8",  # older versions of numpy take bytes, with a warning
     )
     assert table.dtype.names
     (row,) = table[table["run"].astype(str) == run_name]

@@ -24,6 +24,7 @@ from d2rpick.choice.windows import (
 from d2rpick.flight.flight import Flight
 from d2rpick.flight.margin import (
     SHARE,
+    changes_momentum_little,
     grazes,
     landing_moves,
     landing_spread,
@@ -89,11 +90,13 @@ def test_without_a_contact_or_energies_nothing_is_made_up() -> None:
         0.0,
         "no-contact",
         None,
+        None,
     )
     bare = of(history.energy, history.time)
     assert margin_before_contact(bare, flight) == (
         SHARE * history.time[-1],
         "flight",
+        None,
         None,
     )
 
@@ -144,6 +147,72 @@ def test_a_contact_below_a_hundredth_of_the_largest_force_is_a_grazing_one(
     if grazed:  # gravity alone opens a gap of 20 mm, and of the vibration, in that time
         assert margin.time >= np.sqrt(2 * 0.02 / 9.81)
         assert margin.time == pytest.approx(np.sqrt(2 * 0.02 / 9.81), rel=0.1)
+
+
+def tapped(impulse: float, length: float) -> tuple[History, Flight]:
+    """The body of `touching`, whose contact from 0.6 on lasts for ``length`` and takes so much momentum."""
+    history, flight = touching(0.0)
+    (momenta,) = history.momenta
+    pushed = np.clip((momenta.time - 0.6) / length, 0.0, 1.0) * impulse
+    values = momenta.values.copy()
+    values[:, 0, 2] += pushed
+    evidence = Given((replace(momenta, values=values),), history.balance)
+    return replace(history, evidence=evidence), flight
+
+
+# At 0.6 the body falls with a momentum of 2 x 9.81 x 0.6 = 11.8.
+@pytest.mark.parametrize(
+    ("impulse", "length", "grazed"),
+    [
+        (0.5, 0.004, True),  # 125 of force, above a hundredth of 2000
+        (1.1, 0.004, True),
+        (1.3, 0.004, False),
+        (11.8, 0.004, False),  # it stops
+        (11.8, 0.1, False),  # softly, in much longer than the margin
+    ],
+)
+def test_a_contact_that_takes_little_of_the_momentum_is_a_grazing_one(
+    impulse: float, length: float, grazed: bool
+) -> None:
+    history, flight = tapped(impulse, length)
+    assert not grazes(history, flight, 0.02)
+    assert changes_momentum_little(history, flight) is grazed
+    margin = margin_before_contact(history, flight, place=0.02)
+    assert (margin.source == "grazing") is grazed
+    assert margin.grazing == ("momentum" if grazed else None)
+
+
+def test_a_contact_that_is_not_over_in_the_record_is_not_taken_for_a_grazing_one() -> (
+    None
+):
+    history, flight = tapped(0.5, 10.0)
+    assert not changes_momentum_little(history, flight)
+
+
+@pytest.mark.parametrize(("name", "since"), [("carT01.gz", 0.03), ("drop2T01.gz", 0.0)])
+def test_no_landing_of_the_computed_car_and_box_is_taken_for_a_grazing_one(
+    name: str, since: float
+) -> None:
+    history = solved(name).history
+    landing = [
+        flight
+        for flight in flights_of(history, Settings())
+        if flight.end is not None and (flight.start or 0.0) >= since
+    ]
+    assert landing
+    for flight in landing:
+        assert not changes_momentum_little(history, flight)
+
+
+def test_the_second_contact_of_the_car_with_the_block_begins_as_a_grazing_one() -> None:
+    """It touches the block at 28 ms with a hundredth of the momentum towards it, and then hits it."""
+    history = solved("carT01.gz").history
+    flight = next(
+        flight
+        for flight in flights_of(history, Settings())
+        if 0.01 < (flight.start or 0.0) < 0.03
+    )
+    assert changes_momentum_little(history, flight)
 
 
 def test_a_grazing_contact_without_gravity_leaves_no_td() -> None:

@@ -147,4 +147,4 @@ def test_what_pushes_has_to_be_named_once(
 
 def test_without_momenta_nothing_shows_when_something_pushes() -> None:
     told = refused("card", "--tr", "0.02", "--td", "0.09", "--part", "1", *BY_CONTACT)
-    assert "needs a history with momenta" in told
+    assert "needs a history with the force of that contact or wall" in told

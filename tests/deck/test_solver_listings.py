@@ -98,6 +98,14 @@ THREE = body(1, 101, 1) + body(2, 102, 2) + body(3, 103, 3)
 TWICE = clock(5, 0.0, 0.002) + clock(6, 0.004) + logic("OR", 7, 5, 6)
 MIDDLE = [(0.002, 0.004)]
 ALONE = body(1, 101, 1, 5)
+
+
+def fourth(*nodes: int) -> str:
+    """Write a further part of one element, on nodes of the plates."""
+    return f"/PART/4\nfurther\n{wide(1, 1)}/SHELL/4\n{wide(4, *nodes)}"
+
+
+BOTH = f"/GRNOD/PART/9\nboth\n{wide(1, 2)}"
 LISTED = {
     "a merged body goes with the main one": Listed(
         THREE + merge((1, 1, 2, 1)),
@@ -146,6 +154,31 @@ LISTED = {
         body(1, 0, 1) + body(2, 102, 2),
         (OFF + "102 0", ON + "0 102", OFF + "102 104"),
         {1: [(0.0, 0.004)], 2: MIDDLE},
+    ),
+    "a skin on the nodes of a part is rigid with it": Listed(
+        fourth(11, 12, 13, 14) + body(1, 101, 1),
+        (OFF + "101", ON + "101", OFF + "101"),
+        {1: MIDDLE, 4: MIDDLE},
+    ),
+    "a part between two of a body is rigid with them": Listed(
+        fourth(12, 21, 24, 13) + BOTH + body(1, 101, 9),
+        (OFF + "101", ON + "101", OFF + "101"),
+        dict.fromkeys((1, 2, 4), MIDDLE),
+    ),
+    "a part beside one of a body is not": Listed(
+        fourth(12, 21, 24, 13) + body(1, 101, 1),
+        (OFF + "101", ON + "101", OFF + "101"),
+        {1: MIDDLE},
+    ),
+    "a group of a range of nodes": Listed(
+        f"/GRNOD/GENE/9\nrange\n{wide(11, 24)}" + body(1, 101, 9),
+        (OFF + "101", ON + "101", OFF + "101"),
+        {1: MIDDLE, 2: MIDDLE},
+    ),
+    "groups of materials and properties": Listed(
+        f"/GRNOD/MAT/9\nall\n{wide(1)}/GRNOD/PROP/8\nnone\n{wide(7)}" + body(1, 101, 9),
+        (OFF + "101", ON + "101", OFF + "101"),
+        dict.fromkeys((1, 2, 3), MIDDLE),
     ),
     "sensors of time join": Listed(body(1, 101, 1, 7) + TWICE, ("",), {1: MIDDLE}),
     "formats before 2023 know Tstop": Listed(
@@ -360,6 +393,18 @@ def test_a_body_that_nothing_switches_makes_its_parts_rigid(tmp_path: Path) -> N
     material = read_inventory(main).parts[1].material
     assert material is not None
     assert material.kind == "deformable"
+
+
+def test_main_nodes_of_rigid_parts_follow_the_order_of_the_deck(tmp_path: Path) -> None:
+    """Nodes 101 to 103 are the last of the deck; the body of an /RBODY comes before those of parts."""
+    legs = (OFF + "104 105 106", ON + "105", OFF + "105")
+    parts = {1: irigid(), 3: irigid()}
+    main = Path(place(tmp_path, Listed(body(9, 0, 2), legs, {}, 2612, parts)))
+    before, first, *others = main.read_text().partition("/PART/1\n")
+    middle, third, rest = others[0].partition("/PART/3\n")
+    block, groups, after = rest.partition("/GRNOD/")
+    main.write_text(before + third + block + first + middle + groups + after)
+    assert rigid_by_check(str(main)) == {3: MIDDLE}
 
 
 @pytest.mark.parametrize("name", ["rigid parts with a sensor", "sensors of time join"])

@@ -12,7 +12,11 @@ from d2rpick.choice.question import Settings
 from d2rpick.choice.situation import examine
 from d2rpick.choice.warnings import cautions_of
 from d2rpick.flight.flight import Flight
-from d2rpick.flight.internal_energy import moves_as_a_whole, settled_from
+from d2rpick.flight.internal_energy import (
+    moves_as_a_whole,
+    rises_as_it_yields,
+    settled_from,
+)
 from d2rpick.flight.momentum import bodies_apart, flight_around
 from d2rpick.histories.history import (
     EXACT,
@@ -446,13 +450,15 @@ def test_an_end_of_the_load_behind_the_flight_gives_no_flight_that_ends_before_i
     assert flight.refusal
 
 
-def falling_and_damped(*left_out: str, internal: Samples = ZERO) -> History:
+def falling_and_damped(
+    *left_out: str, internal: Samples = ZERO, vibration: float = 40.0
+) -> History:
     """A vibration that damping takes, above plastic work of 5, of a body of 20 that falls from 0.1 on; seven digits.
 
     The terms ``left_out`` are not written; ``internal`` is added to the internal energy.
     """
     since = np.maximum(TIME - 0.1, 0.0)
-    left, swing = 40 * np.exp(-9 * since), np.cos(250 * since) ** 2
+    left, swing = vibration * np.exp(-9 * since), np.cos(250 * since) ** 2
     internal, pushed = (
         internal + 5 + left * swing,
         20 * 60 * np.minimum(TIME, 0.1) ** 2 / 0.02,
@@ -463,7 +469,7 @@ def falling_and_damped(*left_out: str, internal: Samples = ZERO) -> History:
     momentum = Momenta(
         TIME, printed(values.ravel(), 7).reshape(values.shape), None, Precision(7), (0,)
     )
-    written = {"internal": internal, "kinetic": kinetic, "damping": 40 - left}
+    written = {"internal": internal, "kinetic": kinetic, "damping": vibration - left}
     columns = {
         name: printed(one, 7) for name, one in written.items() if name not in left_out
     }
@@ -508,3 +514,49 @@ def test_an_internal_energy_that_grows_while_its_body_falls_keeps_no_level() -> 
     """Two bodies in it hit each other: their momentum together is that of free fall."""
     history = falling_and_damped(internal=200 * TIME)
     assert not examine(history, 0.5, PLAIN).in_flight
+
+
+def deformed_in_flight(at: float, *left_out: str) -> History:
+    """The body of `falling_and_damped`, of whose motion 30 turn into plastic work within 20 ms from ``at`` on."""
+    done = 30 * np.sin(np.pi / 2 * np.clip((TIME - at) / 0.02, 0.0, 1.0)) ** 2
+    history = falling_and_damped(*left_out, internal=done, vibration=2.0)
+    balance = history.balance
+    if balance is None or balance.kinetic is None:
+        return history
+    kinetic = printed(balance.kinetic + 30 - done, 7)
+    (momentum,) = history.momenta
+    balance = replace(balance, kinetic=kinetic)
+    return table(TIME, history.energy, momentum, balance=balance)
+
+
+@pytest.mark.parametrize("left_out", [(), ("damping",), ("kinetic", "damping")])
+def test_a_body_that_yields_as_the_load_ends_flies_from_there(
+    left_out: tuple[str, ...],
+) -> None:
+    flight = examine(deformed_in_flight(0.1, *left_out), 0.5, PLAIN).flight
+    assert flight.source == "momentum"
+    assert flight.start == pytest.approx(0.1, abs=2 * TIME[1])
+
+
+@pytest.mark.parametrize("at", [0.2, 0.25, 0.3])
+@pytest.mark.parametrize("left_out", [(), ("kinetic", "damping")])
+def test_two_bodies_that_hit_each_other_in_a_fall_do_not_fly_together_before(
+    at: float, left_out: tuple[str, ...]
+) -> None:
+    flight = examine(deformed_in_flight(at, *left_out), 0.6, PLAIN).flight
+    assert flight.start is None or flight.start > at
+
+
+@pytest.mark.parametrize(
+    ("flat", "rises"), [(0.0, True), (0.01, True), (0.05, False), (0.2, False)]
+)
+def test_an_energy_that_stays_low_before_it_rises_is_not_that_of_a_body_that_yields(
+    flat: float, rises: bool
+) -> None:
+    energy = 1 + np.sin(np.pi / 2 * np.clip((TIME - flat) / 0.03, 0.0, 1.0)) ** 2
+    settled = flat + 0.03
+    assert rises_as_it_yields(TIME, energy, None, 0.0, settled, 1.0) is rises
+    sums = 0 * TIME + 7, 7 - TIME, 7 + 20 * TIME
+    expected = (rises, rises, False)  # the motion gives it, damping takes, a load feeds
+    for whole, gives in zip(sums, expected, strict=True):
+        assert rises_as_it_yields(TIME, energy, whole, 0.0, settled, 1.0) is gives

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
-from matplotlib.patches import Rectangle
+from matplotlib.patches import Patch
+from matplotlib.transforms import Bbox
 
 import d2rpick as d2
 from d2rpick.choice.answers import suggest
@@ -40,6 +41,12 @@ def marks(axes: Axes) -> list[int]:
     return [len(np.asarray(one.get_offsets())) for one in axes.collections]
 
 
+def extents(patch: Patch) -> Bbox:
+    """Give its width and height in its own coordinates: older versions of matplotlib draw a span as a polygon."""
+    path = patch.get_path().transformed(patch.get_patch_transform())
+    return path.get_extents()
+
+
 def test_many_candidates_become_a_band_and_the_landing_is_cut_with_a_mark() -> None:
     answer = d2.suggest(d2.read(BOX), td=0.37, parts="box")
     assert len(answer.candidates) > 20
@@ -48,12 +55,9 @@ def test_many_candidates_become_a_band_and_the_landing_is_cut_with_a_mark() -> N
     assert axes.get_xlim() == pytest.approx((0.0736, 0.3989), abs=1e-3)
     assert "landing, up to 1248 \u2191" in texts(axes)
     assert marks(axes) == [1]  # the recommended one alone
-    bands = [
-        one
-        for one in axes.patches
-        if isinstance(one, Rectangle) and one.get_height() < 0.1
-    ]
-    drawn = sum(one.get_width() for one in bands)
+    drawn_patches = map(extents, axes.patches)
+    bands = [one for one in drawn_patches if one.height < 0.1]
+    drawn = sum(one.width for one in bands)
     assert drawn == pytest.approx(
         sum(one.end - one.start for one in sure(answer.windows)), rel=0.03
     )

@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import d2rpick as d2
@@ -10,6 +11,8 @@ from d2rpick.rules import RULES
 from d2rpick.rules.rule import engine_files, starter_deck
 from tests.command import answer, put, run
 from tests.decks import wide, write
+from tests.histories.test_contact_forces import TIMES, t01
+from tests.made_t01 import MadeGroup
 
 LANDING = ("--drop", "0.4", "--mesh", "6", "--dt", "5e-4")
 
@@ -104,6 +107,24 @@ def test_a_sensor_of_a_force_is_followed_through_the_contacts(
         if end - start > 0.06:
             assert any(abs(tr - start - 0.05) < 0.002 for tr, _ in spans)
     assert windows(answer("check", radioss(tmp_path, force()))) == []
+
+
+@pytest.mark.parametrize(("kind", "start"), [("RWALL", 0.9375), ("INTER", 0.4375)])
+def test_of_several_that_push_the_force_of_the_named_one_is_followed(
+    tmp_path: Path, kind: str, start: float
+) -> None:
+    """A T01 with the forces of interface 3 and rigid wall 3, without momenta; ends are known to half an interval."""
+    values = np.zeros((TIMES.size, 2, 1, 6))
+    for place, begins in enumerate((0.5, 1.0)):
+        values[:, place, 0, 2] = np.clip(TIMES, begins - 0.125, 2.0)
+    groups = [MadeGroup(101, {3: "floor"}), MadeGroup(102, {3: "ground"})]
+    history = tmp_path / "boxT01"
+    history.write_bytes(t01(groups, values))
+    both = "/RWALL/PLANE/3\nground\n/INTER/TYPE7/3\nfloor\n"
+    deck = radioss(tmp_path, force(kind), both)
+    found = answer("check", deck, "--history", str(history))
+    ends = [time for pair in windows(found) for time in pair]
+    assert ends == pytest.approx([0.0, start])
 
 
 @pytest.mark.parametrize(

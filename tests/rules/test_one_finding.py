@@ -40,6 +40,16 @@ def test_a_mistake_of_units_is_one_finding(
     assert [one["rule"] for one in found] == [rule]
 
 
+def test_a_time_after_the_run_is_one_finding(tmp_path: Path) -> None:
+    """It is outside the history as well; where its rule is ignored, the history says so."""
+    history = str(tmp_path / "energy.csv")
+    assert run("replay", *OSCILLATOR.split(), "-o", history).exit_code == 0
+    options = (deck(tmp_path, "0.0135867", "68.7534"), "--history", history)
+    for ignored, rule in (("D2R111", "D2R101"), ("D2R111,D2R101", "D2R205")):
+        found = answer("check", *options, "--ignore", ignored)["findings"]
+        assert [one["rule"] for one in found] == [rule]
+
+
 def test_what_follows_is_reported_where_its_cause_is_ignored(tmp_path: Path) -> None:
     path = deck(tmp_path, "13.5867", "68.7534")
     assert [one.rule for one in check_deck(path).findings if one.rule != "D2R111"] == [

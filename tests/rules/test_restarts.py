@@ -145,3 +145,30 @@ def test_the_run_ends_with_its_last_restart(legs: list[str]) -> None:
 
 def test_a_bare_card_that_lets_restarts_switch_is_no_switch(legs: list[str]) -> None:
     assert check_deck(legs[0]).findings == ()
+
+
+NODAL = """\
+*ELEMENT_SHELL
+       1      11       1       2       3       4
+*SET_NODE_LIST
+         5
+         3         4        99
+*CONSTRAINED_NODAL_RIGID_BODY
+         9         0         5
+*END
+"""
+
+
+@pytest.mark.parametrize("nrbf", [0, 1])
+def test_a_restart_deletes_nodal_rigid_bodies_by_its_control(
+    tmp_path: Path, nrbf: int
+) -> None:
+    main = put(tmp_path / "main.k", MAIN.format(0.02).replace("*END\n", NODAL))
+    legs = [restart("0.09", TO_RIGID), restart("0.15", BACK)]
+    legs[0] = legs[0].replace("         1", f"{nrbf:10d}", 1)
+    paths = [
+        str(put(tmp_path / f"r{number}.k", text))
+        for number, text in enumerate(legs, start=1)
+    ]
+    found = {finding.rule for finding in check_deck(str(main), restarts=paths).findings}
+    assert ("D2R112" in found) == (nrbf == 0)

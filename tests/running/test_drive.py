@@ -25,12 +25,12 @@ from d2rpick.running.sequence import (
     LOAD,
     PROBE,
     RIGID,
+    Findings,
     Leg,
     Limits,
     Order,
-    Seen,
-    next_order,
-    window_of,
+    choose_next_leg,
+    find_window,
     windows,
 )
 from tests.command import ROOT, put, refused, run
@@ -368,8 +368,8 @@ def test_how_far_a_run_is_can_be_told_at_any_time(tmp_path: Path) -> None:
 
 
 IDLE, SWINGS = (
-    Seen(0.0, 0.02, flies=True, idle=True),
-    Seen(0.05, 0.05, flies=True, tr=0.1, swing=0.015),
+    Findings(0.0, 0.02, flies=True, idle=True),
+    Findings(0.05, 0.05, flies=True, tr=0.1, swing=0.015),
 )
 WITHIN = Limits(1.0, 1e-3, 0.002, 0.01, 0.2)
 FLOWN = Leg(Order(LOAD, 1, 0.0, 0.1), SWINGS, 1000, 1.0)
@@ -377,14 +377,14 @@ FLOWN = Leg(Order(LOAD, 1, 0.0, 0.1), SWINGS, 1000, 1.0)
 
 @pytest.mark.parametrize(("seen", "margin"), [(IDLE, 0.002), (SWINGS, 0.03 * 0.35)])
 def test_the_margin_is_the_least_one_where_nothing_vibrates(
-    seen: Seen, margin: float
+    seen: Findings, margin: float
 ) -> None:
     flown = Leg(Order(LOAD, 1, 0.0, 0.1), seen, 1000)
-    probe = Leg(Order(PROBE, 2, 0.1, 1.0), Seen(contact=0.4), 100)
-    assert window_of([flown, probe], Limits(1.0, 1e-3, 0.002)).td == pytest.approx(
+    probe = Leg(Order(PROBE, 2, 0.1, 1.0), Findings(contact=0.4), 100)
+    assert find_window([flown, probe], Limits(1.0, 1e-3, 0.002)).td == pytest.approx(
         0.4 - margin
     )
-    assert window_of(
+    assert find_window(
         [flown, probe], Limits(1.0, 1e-3, 0.002, 0.05)
     ).td == pytest.approx(0.35)
 
@@ -398,29 +398,36 @@ def probes(*ends: float, contact: float) -> list[Leg]:
     return [
         FLOWN,
         *(
-            Leg(one, Seen(contact=contact if one.until > contact else None), 100, 0.1)
+            Leg(
+                one,
+                Findings(contact=contact if one.until > contact else None),
+                100,
+                0.1,
+            )
             for one in orders
         ),
     ]
 
 
 def test_a_run_goes_on_from_the_last_leg_of_a_probe_that_ended_before_td() -> None:
-    assert next_order(probes(0.2, 0.3, 0.45, contact=0.4), WITHIN) == Order(
+    assert choose_next_leg(probes(0.2, 0.3, 0.45, contact=0.4), WITHIN) == Order(
         RIGID, 4, 0.3, 0.39
     )
     legs = probes(0.2, 0.39, 0.45, contact=0.4)  # which ended at td
-    after = next_order(legs, WITHIN)
+    after = choose_next_leg(legs, WITHIN)
     assert after
     assert (after.kind, after.number, after.start) == (LOAD, 4, 0.39)
-    assert next_order(probes(0.45, contact=0.4), WITHIN) == Order(RIGID, 2, 0.1, 0.39)
+    assert choose_next_leg(probes(0.45, contact=0.4), WITHIN) == Order(
+        RIGID, 2, 0.1, 0.39
+    )
 
 
 def test_a_probe_goes_on_from_its_own_restarts_to_the_end_of_the_run() -> None:
     legs = [FLOWN]
-    while order := next_order(legs, WITHIN):
+    while order := choose_next_leg(legs, WITHIN):
         assert order.kind == PROBE
         assert order.start == legs[-1].order.until
-        legs.append(Leg(order, Seen(), 100, 0.1))
+        legs.append(Leg(order, Findings(), 100, 0.1))
     assert legs[-1].order.until == WITHIN.end
     assert len(legs) < 12
     assert [(one.tr, one.td, one.contact) for one in windows(legs, WITHIN)] == [
@@ -439,11 +446,11 @@ def test_a_flight_that_is_left_out_is_deformable_from_where_the_parts_would_have
         legs = probes(0.2, contact=contact)
         (window,) = windows(legs, WITHIN)
         assert reason in str(window.reason)
-        after = next_order(legs, WITHIN)
+        after = choose_next_leg(legs, WITHIN)
         assert after
         assert (after.kind, after.number, after.start) == (LOAD, 2, 0.1)
         again = Leg(after, SWINGS, 1000, 1.0)  # the same flight is not tried again
-        following = next_order([*legs, again], WITHIN)
+        following = choose_next_leg([*legs, again], WITHIN)
         assert following
         assert following.kind == LOAD
 
@@ -457,7 +464,7 @@ def test_whatever_is_seen_the_run_comes_to_its_end_with_the_numbers_that_the_sol
 ) -> None:
     legs: list[Leg] = []
     for share, flies in shown:
-        order = next_order(legs, WITHIN)
+        order = choose_next_leg(legs, WITHIN)
         if order is None:
             break
         assert order.until > order.start
@@ -470,11 +477,16 @@ def test_whatever_is_seen_the_run_comes_to_its_end_with_the_numbers_that_the_sol
         )
         tr = order.start if flies else order.until
         legs.append(
-            Leg(order, Seen(free, wait, flies=flies, tr=tr, contact=contact), 100, 1.0)
+            Leg(
+                order,
+                Findings(free, wait, flies=flies, tr=tr, contact=contact),
+                100,
+                1.0,
+            )
         )
         if order.kind == RIGID:
             legs[-1] = legs[-1]._replace(
-                seen=Seen()
+                findings=Findings()
             )  # it flies the same way as the probe did
 
 

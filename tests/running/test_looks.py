@@ -6,11 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from d2rpick.base.errors import FormatError
 from d2rpick.histories.history import Samples
 from d2rpick.histories.names import Selection
 from d2rpick.histories.opening import open_run
+from d2rpick.running.events import Event
 from d2rpick.running.looks import Looks
-from tests.command import ENERGY, ROOT
+from d2rpick.running.watch import Watch
+from tests.command import ROOT
+from tests.written_runs import FALL_WRITERS, WRITERS, Written, as_glstat
 
 LEGS = [
     gzip.decompress((ROOT / f"tests/data/drop2_w123_T0{leg}.gz").read_bytes())
@@ -66,14 +70,92 @@ def test_files_that_were_written_anew_are_read_as_a_whole(
     assert np.array_equal(states.time, open_run(left).history(Selection()).time)
 
 
-def test_other_formats_are_read_as_a_whole_each_time() -> None:
-    looks = Looks(Selection())
-    sizes = [
-        (states.time.size, follows)
-        for states, follows in (looks.new_states([ENERGY]) for _ in range(2))
-        if states
-    ]
-    assert len(sizes) == 2
-    assert sizes[0] == sizes[1]
-    assert not sizes[1][1]
+def pushed_and_falling() -> Written:
+    """Three masses that are pushed for a tenth of the record and fall then, while they vibrate."""
+    time = np.linspace(0.0, 1.0, 401)
+    masses = np.array([3.0, 2.0, 1.0])
+    swing = np.outer(np.sin(60 * time), [1.0, -1.0, 0.0])
+    momentum = np.zeros((time.size, 3, 2))
+    momentum[:, :, 0] = swing + 40 * np.minimum(time, 0.1)[:, np.newaxis] * masses
+    momentum[:, :, 1] = -9.81 * np.outer(np.maximum(time - 0.1, 0.0), masses)
+    kinetic = (momentum**2).sum(axis=2) / (2 * masses)
+    internal = np.outer(1 + np.cos(60 * time) ** 2, [1.0, 1.0, 0.0])
+    return Written(time, momentum, kinetic, internal, 0 * time, masses, 0 * time)
+
+
+FORMS = {**WRITERS, **FALL_WRITERS}
+SHARES = (0.4, 0.401, 0.65, 0.8, 0.9, 1.0, 1.0)  # in the middle of states
+
+
+def _find_state(data: bytes, share: float) -> int:
+    """End of a state of a glstat near a share of its length; of other contents the length itself."""
+    size = int(share * len(data))
+    end = data.find(b"\n dt of cycle", size)
+    return end if end > 0 else size
+
+
+@pytest.mark.parametrize("form", ["glstat", "matsum", "binout", "momenta"])
+def test_a_look_at_a_file_that_is_read_as_a_whole_gives_the_new_states_alone(
+    tmp_path: Path, form: str
+) -> None:
+    path = Path(FORMS[form](pushed_and_falling(), tmp_path))
+    data, looks = path.read_bytes(), Looks(Selection())
+    whole = open_run([str(path)]).history(Selection())
+    times, energies = list[Samples](), list[Samples]()
+    first = data[: _find_state(data, 0.3)]
+    for content in (first, *(data[: int(share * len(data))] for share in SHARES)):
+        path.write_bytes(content)
+        try:
+            states, follows = looks.new_states([str(path)])
+        except FormatError:  # a table that ends in the middle of a number
+            continue
+        if states is None:
+            continue  # its last state is being written
+        if not follows:
+            times, energies = [], []
+        times.append(states.time)
+        energies.append(states.energy)
+    assert np.array_equal(np.concatenate(times), whole.time)
+    assert np.array_equal(np.concatenate(energies), whole.energy)
+    assert not times[-1].size  # nothing was written since the look before
+    assert len(times) > 2
     assert not looks.grow
+
+
+def test_a_state_that_was_not_yet_written_in_full_is_given_with_all_states(
+    tmp_path: Path,
+) -> None:
+    """Its numbers are others than before, so that what was made of them does not count."""
+    run, looks = pushed_and_falling(), Looks(Selection())
+    for last_energy in (7.0, 8.0):
+        internal = run.internal[:200].copy()
+        internal[-1] = last_energy
+        cut = run._replace(
+            time=run.time[:200],
+            momentum=run.momentum[:200],
+            kinetic=run.kinetic[:200],
+            internal=internal,
+            work=run.work[:200],
+            damped=run.damped[:200],
+        )
+        states, follows = looks.new_states([as_glstat(cut, tmp_path)])
+        assert states is not None
+        assert states.time.size == 200
+        assert not follows
+
+
+@pytest.mark.parametrize("form", ["glstat", "matsum", "binout"])
+def test_the_events_of_a_file_that_grows_are_those_of_the_whole_file(
+    tmp_path: Path, form: str
+) -> None:
+    path = Path(FORMS[form](pushed_and_falling(), tmp_path))
+    data = path.read_bytes()
+    whole = [one for one in Watch([str(path)], Selection()).news() if one.seen]
+    watch, events = Watch([str(path)], Selection()), list[Event]()
+    first = data[: _find_state(data, 0.3)]
+    for content in (first, *(data[: int(share * len(data))] for share in SHARES)):
+        path.write_bytes(content)
+        events += watch.news()
+    told = [one for one in events if one.event not in ("begun", "restart")]
+    assert told == [one for one in whole if one.event != "begun"]
+    assert "flight" in {one.event for one in told}

@@ -9,7 +9,7 @@ from d2rpick.flight.flight import Flight
 from d2rpick.flight.position_error import Drift, drift_in_flight
 from d2rpick.histories.history import EXACT, History, Momenta
 from d2rpick.histories.names import Part
-from d2rpick.running.swing import swing_in
+from d2rpick.running.swing import find_swing
 from tests.command import ENERGY, ROOT, run
 from tests.energies import sure
 from tests.reading import read_history, solved
@@ -32,7 +32,7 @@ def car() -> tuple[History, Drift]:
 def test_what_a_flight_shows_up_to_tr_is_about_the_error_at_td(tr: float) -> None:
     history, whole = car()
     error = float(whole.errors(np.array([tr]), float(whole.time[-1]))[0])
-    found = sure(swing_in(history, FREE, tr))
+    found = sure(find_swing(history, FREE, tr))
     assert found.name == "engine"
     assert error <= found.error <= 1.3 * error
     # a flight of that length has a path of a hundred times the error, at the speed so far
@@ -53,7 +53,7 @@ def test_of_two_parts_the_most_that_the_heavy_one_may_be_off_is_told(
     momenta = Momenta(
         time, values, (Part(1, "shell"), Part(2, "block")), EXACT, (0, 1), masses=masses
     )
-    found = sure(swing_in(table(time, np.zeros(time.size), momenta), 0.0, 0.06))
+    found = sure(find_swing(table(time, np.zeros(time.size), momenta), 0.0, 0.06))
     assert found.name == "block"
     assert found.error == pytest.approx(2 * swings, abs=1e-5)
     assert "at most" in found.told
@@ -61,7 +61,7 @@ def test_of_two_parts_the_most_that_the_heavy_one_may_be_off_is_told(
 
 def test_nothing_is_said_where_no_momenta_of_parts_tell() -> None:
     history = read_history([ENERGY])
-    assert swing_in(history, 0.01, 0.03) is None
+    assert find_swing(history, 0.01, 0.03) is None
 
 
 def test_an_advised_switch_says_it() -> None:

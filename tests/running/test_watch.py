@@ -9,7 +9,8 @@ import pytest
 
 from d2rpick.base.errors import D2RPickError
 from d2rpick.histories.names import Selection
-from d2rpick.running.watch import Event, Watch, follow
+from d2rpick.running.events import Event
+from d2rpick.running.watch import Watch, follow
 from tests.command import ROOT
 
 LEGS = [

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings, strategies as st
 
 from d2rpick.histories.history import EXACT, Balance, History, Momenta
-from d2rpick.running.watch import events_of
+from d2rpick.running.events import find_events
 from tests.energies import sure
 from tests.records import table, until
 from tests.running.seen import seen_in
@@ -44,12 +44,12 @@ def made(gravity: float = 9.81) -> History:
 def told(
     history: History, wait: float | None = None
 ) -> list[tuple[str, float | None, float | None]]:
-    return [one[:3] for one in events_of(*seen_in(history, wait))]
+    return [one[:3] for one in find_events(*seen_in(history, wait))]
 
 
 def test_a_gap_between_two_pushes_is_no_flight() -> None:
     """It lasts for 40 ms, half of the period for 60."""
-    found = events_of(*seen_in(made()))
+    found = find_events(*seen_in(made()))
     events = [one.event for one in found if one.event in ("flight", "contact")]
     assert events == ["flight", "contact", "flight", "contact", "flight"]
     first, last, _ = [one for one in found if one.event == "flight"]
@@ -79,12 +79,12 @@ def test_a_switch_is_advised_where_the_energy_is_high_and_nothing_acts(
     state: int,
 ) -> None:
     history = until(made(), float(made().time[state])) if state > 20 else made()
-    for one in events_of(*seen_in(history)):
+    for one in find_events(*seen_in(history)):
         if one.event == "switch" and one.tr is not None and one.tr > PUSHES[1][1]:
             assert not any(start <= one.tr <= end for start, end in PUSHES)
             assert history.energy_at(one.tr) >= 0.7 * 50
 
 
 def test_a_constant_force_that_is_not_gravity_is_no_flight() -> None:
-    found = events_of(*seen_in(made(5.0), 0.06))
+    found = find_events(*seen_in(made(5.0), 0.06))
     assert "flight" not in {one.event for one in found}

@@ -99,6 +99,19 @@ def as_number(cell: str, decimal: str, thousands: str = "") -> float | None:
     >>> as_number("1.234,5", ",", "."), as_number("1.23,5", ",", "."), as_number("1,5D3", ",")
     (1234.5, None, 1500.0)
     """
+    number = _written_number(cell, decimal, thousands)
+    if number is None:
+        return None
+    return float(number.replace(",", ".").replace("D", "E").replace("d", "e"))
+
+
+def is_number(cell: str, decimal: str, thousands: str = "") -> bool:
+    """Return True if a cell holds a number, which is not computed: cells are asked by the thousand."""
+    return _written_number(cell, decimal, thousands) is not None
+
+
+def _written_number(cell: str, decimal: str, thousands: str) -> str | None:
+    """Return a number as it is written, without thousands and with the minus sign of ASCII, or None."""
     if not cell.isascii():
         cell = cell.replace("\N{MINUS SIGN}", "-")
     if thousands and thousands in cell:
@@ -107,9 +120,7 @@ def as_number(cell: str, decimal: str, thousands: str = "") -> float | None:
         ):
             return None
         cell = cell.replace(thousands, "")
-    if not _NUMBER[decimal].fullmatch(cell):
-        return None
-    return float(cell.replace(",", ".").replace("D", "E").replace("d", "e"))
+    return cell if _NUMBER[decimal].fullmatch(cell) else None
 
 
 def is_missing(cell: str) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 from d2rpick.base.caching import cached_property
 from d2rpick.base.errors import FormatError, if_written, listing
 from d2rpick.histories.database import Database
-from d2rpick.histories.formats.cells import as_number, is_skipped, split
+from d2rpick.histories.formats.cells import is_number, is_skipped, split
 from d2rpick.histories.formats.curves import Curves, find_curves
 from d2rpick.histories.formats.layout import Layout, find_layout, unique, with_thousands
 from d2rpick.histories.formats.rows import find_line, read_columns
@@ -63,7 +63,7 @@ def numeric_columns(layout: Layout, sample: Sequence[Sequence[str]]) -> frozense
     return frozenset(
         column
         for column in columns
-        if any(as_number(row[column], ".") is not None for row in sample)
+        if any(is_number(row[column], ".") for row in sample)
     )
 
 
@@ -224,7 +224,11 @@ class Table(Database):
         sample = _sampled_rows(text, self._begin, layout)
         self._layout = layout = with_thousands(layout, sample)
         # cells, with decimal points, of rows at the start, at the end and evenly between
-        self._sample = [[layout.plain(cell) for cell in row] for row in sample]
+        self._sample = (
+            sample
+            if layout.decimal == "." and not layout.thousands
+            else [[layout.plain(cell) for cell in row] for row in sample]
+        )
         self._numeric = numeric_columns(layout, self._sample)
         self._own_times = own_times(layout)
         self._time, notes = time_column(
@@ -349,9 +353,7 @@ class Table(Database):
     def _printed(self) -> list[list[str]]:
         """Sampled rows that show how numbers were printed."""
         # not behind a curve's end, and no words below a table
-        return [
-            row for row in self._sample if as_number(row[self._time], ".") is not None
-        ]
+        return [row for row in self._sample if is_number(row[self._time], ".")]
 
     def _asked(self, selection: Selection) -> list[int]:
         """Columns that must be whole in a last line without end: those asked for, or what is taken by default."""

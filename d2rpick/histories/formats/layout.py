@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from itertools import islice
 from operator import itemgetter
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ from d2rpick.histories.formats.cells import (
     as_number,
     find_thousands,
     is_missing,
+    is_number,
     is_skipped,
     is_word,
     split,
@@ -143,7 +145,7 @@ def with_thousands(table: Layout, rows: Sequence[Sequence[str]]) -> Layout:
         cell
         for row in rows
         for cell in row
-        if not is_missing(cell) and table.number(cell) is None
+        if not is_number(cell, table.decimal, table.thousands) and not is_missing(cell)
     ]
     return (
         table._replace(thousands=find_thousands(odd, table.decimal)) if odd else table
@@ -165,17 +167,19 @@ def _no_table(text: Text, lines: Sequence[str]) -> FormatError:
 
 def _search_rows(lines: Sequence[str], first: int, separator: str) -> Layout | None:
     """Find the rows among few lines, then among more, with and without thousands in their numbers."""
-    numbered = [
+    telling = (
         (number, line)
         for number, line in enumerate(lines)
         if number >= first and not is_skipped(line)
-    ]
+    )
+    numbered: list[tuple[int, str]] = []
     for count in _LINES_SEARCHED:
+        numbered += islice(telling, count - len(numbered))
         for with_groups in (False, True):
-            table = _find_rows(numbered[:count], separator, with_groups=with_groups)
+            table = _find_rows(numbered, separator, with_groups=with_groups)
             if table:
                 return table
-        if count >= len(numbered):
+        if len(numbered) < count:
             break
     return None
 

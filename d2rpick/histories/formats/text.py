@@ -210,7 +210,8 @@ def precisions(
     """
     digits = 0
     for field in (*energy, *time):
-        digits = max(digits, _significant(field))
+        if len(field) > digits:  # a field has no more digits than signs
+            digits = max(digits, _significant(field))
         if digits >= _FULL:
             return EXACT, EXACT
     general = Precision(digits=max(digits, 1))
@@ -275,9 +276,15 @@ def _significant(field: str) -> int:
 
 
 def _fixed_decimals(fields: Sequence[str]) -> int | None:
-    parts = [_PARTS.fullmatch(field) for field in fields]
-    decimals = {len(part[2]) if part and part[3] is None else 0 for part in parts}
-    return decimals.pop() or None if len(decimals) == 1 else None
+    same = _decimals(fields[0]) if fields else 0
+    alike = same > 0 and all(_decimals(field) == same for field in fields)
+    return same if alike else None
+
+
+def _decimals(field: str) -> int:
+    """Count the decimals of a number without an exponent; 0 for another."""
+    parts = _PARTS.fullmatch(field)
+    return len(parts[2]) if parts and parts[3] is None else 0
 
 
 def _is_finer_than_its_grid(decimals: int, moments: Samples) -> bool:

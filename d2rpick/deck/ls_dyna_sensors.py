@@ -1,0 +1,201 @@
+"""Sensors of LS-DYNA that switch parts: *SENSOR_CONTROL of type DEF2RIG, for switch sets with CODE 5.
+
+A control is on or off.  Its switches act in turn: when the condition of one holds, the control changes, and the next
+switch is asked.  A switch compares the time, or the force of a contact or rigid wall, with its VALUE.
+
+Source: the vendor's keyword data as published in its Python library.  That a set is made while its control is on, and
+undone while it is off, follows from the words of CODE 5 there; it was not tried with the solver.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import count, repeat
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from d2rpick.deck.radioss_sensors import inactive
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Sequence
+
+    from d2rpick.deck.card import Card, Row
+    from d2rpick.deck.reader import Deck
+
+    Spans = tuple[tuple[float, float], ...]  # of time
+    # When the force of a contact or rigid wall is above a value, by its kind and number; None where it is not known.
+    Forces = Callable[[str, int, float], Spans | None]
+
+
+# Fields of *SENSOR_CONTROL (first line, second line), *SENSOR_SWITCH and *SENSOR_DEFINE_FORCE: 10 columns each.
+_TYPE, _TYPE_ID, _NREP = 1, 2, 4
+_INITIAL, _FIRST_SWITCH, _SWITCHES = 0, 1, 7
+_SWITCH_TYPE, _SENSOR_ID, _LOGIC, _VALUE = 1, 2, 3, 4
+_FILTER, _DURATION, _DELAY = 5, 6, 7
+_FORCE_TYPE, _FORCE_ID, _DIRECTION = 1, 2, 3
+
+_OF_FORCES: Final = {"CONTACT": "contact", "RWALL": "rigid wall"}
+_MAGNITUDE: Final = "M"
+_ALWAYS: Final = ((0.0, math.inf),)
+
+
+class Control(NamedTuple):
+    """A *SENSOR_CONTROL that switches a set, and its switches in the order of their turns.
+
+    ``initial`` is its state at the start, ON or OFF; ``rounds``: how often all switches have their turn, infinite for
+    ever.
+    """
+
+    card: Card
+    switch_set: int
+    initial: str
+    switches: tuple[int, ...]
+    rounds: float
+
+
+class Change(NamedTuple):
+    """A control is on or off from ``time`` on [time of the deck]."""
+
+    time: float
+    on: bool
+
+
+def read_controls(deck: Deck) -> Iterator[Control]:
+    """List the controls of a deck that switch parts."""
+    for card in deck.named("SENSOR_CONTROL"):
+        for first, second in zip(card.data[::2], card.data[1::2], strict=False):
+            if card.word(first, _TYPE).value != "DEF2RIG":
+                continue
+            numbers = [
+                card.integer(second, _FIRST_SWITCH + place).value
+                for place in range(_SWITCHES)
+            ]
+            repeats = card.integer(first, _NREP).value
+            yield Control(
+                card,
+                card.integer(first, _TYPE_ID).value + card.transform.rest,
+                card.word(second, _INITIAL, "ON").value,
+                tuple(number + card.transform.rest for number in numbers if number),
+                math.inf if repeats < 0 else 1 + repeats,
+            )
+
+
+def follow_control(
+    deck: Deck, control: Control, forces: Forces | None, end: float
+) -> list[Change] | str:
+    """Follow a control from the start to the end of a run.
+
+    Parameters
+    ----------
+    deck : Deck
+        With the switches and sensors of the control.
+    control : Control
+        The one to follow.
+    forces : callable or None
+        When the force of a contact or wall is above a value; None without a history.
+    end : float
+        Of the run [time].
+
+    Returns
+    -------
+    list of Change or str
+        Its state at the start and all changes in order, or why it cannot be followed.
+    """
+    if control.initial not in ("ON", "OFF"):
+        return f"a control whose INITSTT is {control.initial!r}, not ON or OFF"
+    changes = [Change(0.0, control.initial == "ON")]
+    if not control.switches:
+        return changes
+    conditions: list[Spans] = []
+    for number in control.switches:
+        spans = _find_spans_of_switch(deck, number, forces)
+        if isinstance(spans, str):
+            return spans
+        conditions.append(spans)
+    endless = math.isinf(control.rounds)
+    for _ in count() if endless else repeat(None, int(control.rounds)):
+        begins = changes[-1].time
+        for spans in conditions:
+            time = _find_first_time(spans, changes[-1].time)
+            if time >= end:
+                return changes
+            changes.append(Change(time, not changes[-1].on))
+        if endless and changes[-1].time == begins:
+            return "switches whose conditions hold at the same time, for ever"
+    return changes
+
+
+def _find_first_time(spans: Spans, since: float) -> float:
+    """Give the first time from ``since`` on at which a condition holds; infinite for never."""
+    return next((max(since, start) for start, end in spans if since < end), math.inf)
+
+
+def _find_spans_of_switch(
+    deck: Deck, number: int, forces: Forces | None
+) -> Spans | str:
+    """Find when the condition of a switch holds and makes a control change, or say why that is not known."""
+    card, row = _find_row(deck.named("SENSOR_SWITCH"), number) or (None, None)
+    if card is None or row is None:
+        return f"switch {number}, which the deck has not"
+    if card.name.removesuffix("_TITLE") != "SENSOR_SWITCH":
+        return f"switch {number} (*{card.name}), which is not followed"
+    factor = card.transform.time
+    numbers = [card.real(row, place) for place in (_VALUE, _DURATION, _DELAY)]
+    if problems := [value.problem for value in numbers if value.problem]:
+        return f"switch {number}: {problems[0]}"
+    value, duration, delay = (number.value for number in numbers)
+    above = card.word(row, _LOGIC, "LT").value == "GT"
+    if card.word(row, _SWITCH_TYPE, "SENSOR").value == "TIME":
+        limit = value * factor
+        holds: Spans | str = ((limit, math.inf),) if above else ((0.0, limit),)
+    elif card.integer(row, _FILTER).value:
+        return f"switch {number}, whose FILTRID is not followed"
+    else:
+        sensor = card.integer(row, _SENSOR_ID).value + card.transform.rest
+        holds = _find_spans_of_sensor(deck, sensor, value, forces, above=above)
+    if isinstance(holds, str):
+        return holds
+    wait = (duration + delay) * factor
+    return tuple(
+        (start + wait, stop + delay * factor)
+        for start, stop in holds
+        if stop - start > duration * factor
+    )
+
+
+def _find_spans_of_sensor(
+    deck: Deck, number: int, value: float, forces: Forces | None, *, above: bool
+) -> Spans | str:
+    """Find when the force of a sensor is above a value, or below it."""
+    card, row = _find_row(deck.named("SENSOR_DEFINE"), number) or (None, None)
+    if card is None or row is None:
+        return f"sensor {number}, which the deck has not"
+    name = f"sensor {number} (*{card.name.removesuffix('_TITLE')}"
+    kind = _OF_FORCES.get(card.word(row, _FORCE_TYPE).value)
+    if not card.name.startswith("SENSOR_DEFINE_FORCE") or kind is None:
+        return f"{name}), which is not followed"
+    if (direction := card.word(row, _DIRECTION).value) != _MAGNITUDE:
+        return f"{name} along {direction or 'no direction'}): only a magnitude (VID M) is followed"
+    if card.transform.scaled:
+        return f"{name}), which is in an include in other units"
+    entity = card.integer(row, _FORCE_ID).value + card.transform.rest
+    if value < 0 or (value == 0 and not above):  # no magnitude is below it
+        return _ALWAYS if above else ()
+    strong = forces(kind, entity, value) if forces else None
+    if strong is None:
+        return f"{name} of {kind} {entity}), whose force no history shows"
+    return strong if above else inactive(strong)
+
+
+def _find_row(cards: Sequence[Card], number: int) -> tuple[Card, Row] | None:
+    """Find the line whose first field is this number, after the offset of its include."""
+    rows: Iterable[tuple[Card, Row]] = (
+        (card, row) for card in cards for row in card.data
+    )
+    return next(
+        (
+            (card, row)
+            for card, row in rows
+            if card.integer(row, 0).value + card.transform.rest == number
+        ),
+        None,
+    )

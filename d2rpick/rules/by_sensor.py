@@ -1,0 +1,61 @@
+"""Switch sets with CODE 5: what their *SENSOR_CONTROL does, by the time and by the forces of a history."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from d2rpick.deck.ls_dyna_sensors import Change, follow_control, read_controls
+from d2rpick.deck.switching import BY_SENSOR, Event, SwitchSet
+from d2rpick.rules.by_force import find_spans_of_force
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from d2rpick.deck.reader import Deck
+    from d2rpick.deck.switching import Header
+    from d2rpick.rules.judgement import HistoryJudge
+
+    Spans = tuple[tuple[float, float], ...]  # of time
+
+
+class Sensed(NamedTuple):
+    """A set with CODE 5 and its control: ``changes`` of that, or ``unknown``, why they are not known."""
+
+    by: SwitchSet
+    changes: tuple[Change, ...] = ()
+    unknown: str = ""
+
+    def events(self, events: Sequence[Event]) -> Iterator[tuple[float, Event]]:
+        """Give the switches of its parts [time]: made while the control is on, undone when it is off again."""
+        own = [event for event in events if event.by is self.by]
+        begins_off = self.changes[:1] == (Change(0.0, on=False),)  # nothing to undo
+        for change in self.changes[begins_off:]:
+            for event in own:
+                to_rigid = event.line.to_rigid == change.on
+                line = event.line._replace(to_rigid=to_rigid)
+                yield change.time, event._replace(line=line)
+
+
+def follow_sensed_switches(
+    deck: Deck,
+    headers: Sequence[tuple[SwitchSet, Header]],
+    judge: HistoryJudge | None,
+    end: float,
+) -> Iterator[Sensed]:
+    """Follow the controls of the sets with CODE 5 of a deck of LS-DYNA; without a history only those by time."""
+    controls = {control.switch_set: control for control in read_controls(deck)}
+
+    def find_spans(kind: str, number: int, least: float) -> Spans | None:
+        if judge is None:
+            return None
+        return find_spans_of_force(deck, judge, kind, number, least)
+
+    for card, header in headers:
+        control = controls.get(header.swset.value)
+        if header.code.problem or header.code.value != BY_SENSOR or control is None:
+            continue
+        followed = follow_control(deck, control, find_spans, end)
+        if isinstance(followed, str):
+            yield Sensed(card, unknown=followed)
+        else:
+            yield Sensed(card, tuple(followed))

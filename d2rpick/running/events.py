@@ -1,0 +1,176 @@
+"""Find the events of a run so far: pushes, flights, contacts, when to switch, and rigid parts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from d2rpick.flight.window import FEWEST
+from d2rpick.running.evidence import Evidence, highest_energy, range_of_energy
+from d2rpick.running.swing import find_swing
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from d2rpick.histories.history import History
+    from d2rpick.running.inner_motion import InnerMotion
+    from d2rpick.running.witness import Quiet
+
+    # Events of the flights that are decided, by the start of each flight and when it was seen.
+    Decided = dict[tuple[float, float], tuple["Event", ...]]
+
+
+class Event(NamedTuple):
+    """What happened, as a stable word, when, and at which state it was ``seen`` [time], with a sentence.
+
+    ``wait`` is how long no force had to act to count as flight [time], ``left`` what changed meanwhile, as a share of
+    the largest value, ``tr`` the advised time [time].  They are None if an event has none.
+    """
+
+    event: str
+    time: float | None
+    seen: float | None
+    message: str
+    wait: float | None = None
+    left: float | None = None
+    tr: float | None = None
+
+
+def find_events(
+    evidence: Evidence, motion: InnerMotion, decided: Decided | None = None
+) -> tuple[Event, ...]:
+    """Return all events in the order in which they were seen.
+
+    The events of a run so far are the first ones of the whole run.  Flights in ``decided`` are not examined again, and
+    those that are decided now are added to it.
+
+    Raises
+    ------
+    RangeError
+        If a given wait is too short.
+    """
+    flights = evidence.flights(motion.needed)
+    rigid_times = evidence.rigid_times()
+    history = evidence.history
+    if decided is None:
+        decided = {}
+    events: list[Event] = []
+    for flight in flights:
+        events += _describe_flight(history, motion, flight, decided)
+    events = [event for event in events if not _is_rigid(event.tr, rigid_times)]
+    if history.time.size and not (flights and flights[0].start <= history.time[0]):
+        push = evidence.contact_after(float(history.time[0]), 1)
+        if push is not None:
+            events.append(Event("load", push, push, "a force acts"))
+    events += _describe_rigid_times(history, rigid_times)
+    return tuple(sorted(events, key=lambda event: event.seen or 0.0))
+
+
+def _is_rigid(
+    tr: float | None, rigid_times: tuple[tuple[float, float, float], ...]
+) -> bool:
+    """Whether parts are rigid already at a tr that is advised."""
+    if tr is None:
+        return False
+    return any(start <= tr <= end for start, _, end in rigid_times)
+
+
+def _describe_rigid_times(
+    history: History, rigid_times: tuple[tuple[float, float, float], ...]
+) -> Iterator[Event]:
+    """Give the events of parts that become rigid and deformable again, except bodies that are rigid from the start."""
+    for start, seen_at, end in rigid_times:
+        if start <= history.time[min(FEWEST, history.time.size) - 1]:
+            continue
+        message = "parts have become rigid: no quantity of a part is believed until they deform again"
+        yield Event("rigid", start, seen_at, message)
+        if end < history.time[-1]:
+            yield Event("deformable", end, end, "no part is rigid any more")
+
+
+def _describe_flight(
+    history: History, motion: InnerMotion, flight: Quiet, decided: Decided
+) -> Iterator[Event]:
+    """Give the events of a flight: its start, when to switch, and its contact."""
+    key = (flight.start, flight.seen)
+    events = decided.get(key)
+    if events is None:
+        events = (
+            _describe_start(motion, flight),
+            *_suggest_switch(history, motion, flight),
+        )
+    if flight.end is not None or any(event.tr is not None for event in events):
+        decided[key] = events
+    yield from events
+    if flight.end is not None:
+        message = (
+            f"a force acts, {flight.end - flight.start:.4g} after the flight began"
+        )
+        yield Event("contact", flight.end, flight.end, message)
+
+
+def _describe_start(motion: InnerMotion, flight: Quiet) -> Event:
+    """Report that a flight is seen, by what evidence, and why it was not seen before."""
+    quantity = "the energy of the contacts"
+    if flight.source == "momentum":
+        quantity = "momentum less gravity"
+    wait = motion.wait(flight.start, flight.seen)
+    reason = f"the wait is {flight.wait:.4g}: {wait.reason}" if wait else ""
+    landing = "nothing tells when it lands"
+    if flight.level is not None:
+        landing = f"on level ground it lands about {flight.level:.4g}"
+    evidence = (
+        f"{quantity} is constant within {flight.left:.1e} of its largest value"
+        f" for {flight.seen - flight.start:.4g}"
+    )
+    message = "; ".join(filter(None, (evidence, reason, landing)))
+    return Event("flight", flight.start, flight.seen, message, flight.wait, flight.left)
+
+
+def _suggest_switch(
+    history: History, motion: InnerMotion, flight: Quiet
+) -> Iterator[Event]:
+    """Advise when to switch in a flight."""
+    wait = motion.wait(flight.start, flight.seen)
+    if wait and wait.source == "at-rest":
+        message = "switch now: nothing vibrates, so that any tr is right, and the earlier it is the more it saves"
+        now = flight.seen
+        yield Event("switch", now, now, message, flight.wait, tr=now)
+    else:
+        yield from _suggest_switch_by_energy(history, flight)
+
+
+def _suggest_switch_by_energy(history: History, flight: Quiet) -> Iterator[Event]:
+    """Advise a switch once the internal energy is high; if it is not within one more wait, when it was highest."""
+    last = flight.seen + flight.wait
+    times, energies = history.between(flight.seen, last)
+    for now, energy in zip(times.tolist(), energies.tolist(), strict=True):
+        low, high, enough = range_of_energy(history, now, flight.wait)
+        level = f"the internal energy is {energy:.4g}, of {low:.4g} to {high:.4g} within one wait"
+        if flight.end is not None and now >= flight.end:
+            return
+        if energy >= enough:
+            message = f"switch now: {level}{_warn_of_swing(history, flight, now)}"
+            yield Event("switch", now, now, message, flight.wait, tr=now)
+            return
+        if now == flight.seen:
+            message = (
+                f"not yet: {level}; its highest value is waited for until {last:.6g}"
+            )
+            yield Event("later", last, now, message, flight.wait)
+    is_over = flight.end is not None and flight.end <= last
+    if history.time[-1] > last and not is_over:
+        tr = highest_energy(history, flight.seen, last)
+        now = float(history.between(last, history.time[-1])[0][0])
+        message = (
+            f"the internal energy was highest at {tr:.6g}: a restart from before can switch there"
+            f"{_warn_of_swing(history, flight, tr)}"
+        )
+        yield Event("switch", tr, now, message, flight.wait, tr=tr)
+
+
+def _warn_of_swing(history: History, flight: Quiet, tr: float) -> str:
+    """Return a warning if parts swing too much for a flight that has lasted up to tr; "" if not."""
+    swing = find_swing(history, flight.start, tr) if flight.parts else None
+    if swing is None or swing.flight <= tr - flight.start:
+        return ""
+    return f"; {swing.told}"

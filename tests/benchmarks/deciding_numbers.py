@@ -1,0 +1,397 @@
+"""Which constants decide an answer: ``python -m tests.benchmarks.deciding_numbers --help``.
+
+Each numeric constant of `vibration`, `flight` and `choice` is halved and doubled, in a process of its own, and the
+questions that run through the code that names it are asked again: the frozen questions of the tests, and random
+records of each class of `promise`.  The table says in how many of them the answer changed.  A constant that changes
+none of them is not needed, or needs a question of its own.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import importlib
+import multiprocessing
+import pkgutil
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from multiprocessing.connection import Connection
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import FrameType, FunctionType, ModuleType
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+import d2rpick
+from d2rpick.base.errors import D2RPickError
+from tests.benchmarks.promise import CLASSES, write_record
+from tests.choice import test_same_answers
+
+PACKAGES: Final = ("vibration", "flight", "choice")
+FACTORS: Final = (0.5, 2.0)
+# Decimals of a residual whose change is a change of the answer; times are compared to so many digits.
+_DECIMALS, _DIGITS = 3, 5
+
+Number = float | int | tuple[float, ...]
+Question = Callable[[], str]
+# A function of a file, by the name of the file and the line of its definition.
+Place = tuple[str, int]
+
+
+class Constant(NamedTuple):
+    """A numeric constant: where it stands, its value, and the comment above it or beside it."""
+
+    module: str
+    name: str
+    value: Number
+    comment: str
+
+
+class Baseline(NamedTuple):
+    """The unchanged answer to a question, the seconds that it took, and the functions that it ran through."""
+
+    answer: str
+    seconds: float
+    places: frozenset[Place]
+
+
+class Outcome(NamedTuple):
+    """Of the questions asked with one constant scaled by a factor, the number, and how many answers changed."""
+
+    asked: int
+    changed: int
+
+
+def import_modules() -> list[ModuleType]:
+    """Import all modules of the package, so that a child process finds nothing left to import."""
+    names = [
+        module.name
+        for module in pkgutil.walk_packages(d2rpick.__path__, "d2rpick.")
+        if not module.name.endswith("__main__")
+    ]
+    return [importlib.import_module(name) for name in names]
+
+
+def find_constants(modules: Sequence[ModuleType]) -> list[Constant]:
+    """List the numeric constants at module level of `PACKAGES`; zeros and truth values are none."""
+    constants = []
+    for module in modules:
+        if module.__name__.split(".")[1] not in PACKAGES:
+            continue
+        lines = _read_source(module).split("\n")
+        for names, statement in _find_assignments(module):
+            comment = _find_comment(lines, statement)
+            for name in names:
+                value = getattr(module, name)
+                if _is_number(value):
+                    constants.append(Constant(module.__name__, name, value, comment))
+    return constants
+
+
+def _read_source(module: ModuleType) -> str:
+    return Path(str(module.__file__)).read_text(encoding="utf-8")
+
+
+def _find_assignments(
+    module: ModuleType,
+) -> Iterator[tuple[list[str], ast.Assign | ast.AnnAssign]]:
+    """Yield the names in capitals that the module assigns at its top level, with each statement."""
+    for statement in ast.parse(_read_source(module)).body:
+        if isinstance(statement, ast.Assign):
+            target = statement.targets[0]
+        elif isinstance(statement, ast.AnnAssign) and statement.value is not None:
+            target = statement.target
+        else:
+            continue
+        elements = target.elts if isinstance(target, ast.Tuple) else [target]
+        names = [element.id for element in elements if isinstance(element, ast.Name)]
+        if names and all(name.isupper() for name in names):
+            yield names, statement
+
+
+def _is_number(value: object) -> bool:
+    if isinstance(value, tuple) and value:
+        return all(_is_number(element) for element in value)
+    is_numeric = isinstance(value, float | int) and not isinstance(value, bool)
+    return is_numeric and value != 0
+
+
+def _find_comment(lines: Sequence[str], statement: ast.stmt) -> str:
+    """Return the comment above a statement, or at the end of its last line."""
+    above: list[str] = []
+    row = statement.lineno - 2
+    while row >= 0 and lines[row].startswith("#"):
+        above.insert(0, lines[row].lstrip("# "))
+        row -= 1
+    assert statement.end_lineno is not None
+    beside = lines[statement.end_lineno - 1].partition("  # ")[2]
+    return " ".join(above) or beside
+
+
+def make_questions(records: int, seed: int, folder: Path) -> dict[str, Question]:
+    """Make the frozen questions, and so many records of each class of `promise` in files of the folder."""
+    questions: dict[str, Question] = {}
+    for name, td, settings, _ in test_same_answers.OLD:
+        questions[f"{name}, td {td}, {settings}"] = _make_frozen_question(
+            name, td, settings
+        )
+    for name, make in CLASSES.items():
+        for number in range(records):
+            record = make(np.random.default_rng([seed, number]))
+            own = folder / f"{len(questions)}"
+            own.mkdir()
+            path = write_record(record, own)
+            questions[f"{name}, record {number}"] = _make_record_question(
+                str(path), record.read, record.suggest
+            )
+    return questions
+
+
+def _make_frozen_question(
+    name: str, td: float | tuple[float, float], settings: Mapping[str, float | bool]
+) -> Question:
+    def ask() -> str:
+        return test_same_answers.digest(test_same_answers.answer(name, td, **settings))
+
+    return ask
+
+
+def _make_record_question(
+    path: str, reading: Mapping[str, Any], options: Mapping[str, Any]
+) -> Question:
+    def ask() -> str:
+        answer = d2rpick.suggest(d2rpick.read(path, **reading), **options).to_dict()
+        pair = answer["recommended"]
+        times = [f"{pair[time]:.{_DIGITS}g}" for time in ("tr", "td")] if pair else []
+        rows = [row for row in answer["candidates"] if row["recommended"]]
+        best: Mapping[str, Any] = rows[0] if rows else {}
+        sizes = [best.get(key) for key in ("residual", "residual_low", "residual_high")]
+        rounded = [None if size is None else round(size, _DECIMALS) for size in sizes]
+        return f"{answer['quality']} {answer['basis']} {times} {rounded}"
+
+    return ask
+
+
+def ask_safely(question: Question) -> str:
+    """Return the answer to a question, or the first words of what went wrong."""
+    try:
+        return question()
+    except D2RPickError as refusal:
+        return f"refused: {str(refusal)[-80:]}"
+    except Exception as failure:  # noqa: BLE001  a scaled constant may break anything
+        return f"failed: {type(failure).__name__}"
+
+
+def measure_baselines(questions: Mapping[str, Question]) -> dict[str, Baseline]:
+    """Ask each question twice: once for its time, once for the functions that it runs through."""
+    baselines = {}
+    for name, question in questions.items():
+        start = time.perf_counter()
+        answer = ask_safely(question)
+        seconds = time.perf_counter() - start
+        places: set[Place] = set()
+
+        def note_place(
+            frame: FrameType, event: str, _: object, places: set[Place] = places
+        ) -> None:
+            if event == "call":
+                code = frame.f_code
+                places.add((code.co_filename, code.co_firstlineno))
+
+        sys.setprofile(note_place)
+        try:
+            ask_safely(question)
+        finally:
+            sys.setprofile(None)
+        baselines[name] = Baseline(answer, seconds, frozenset(places))
+    return baselines
+
+
+def find_users(modules: Sequence[ModuleType], constant: Constant) -> set[Place]:
+    """Find the functions that name a constant, or one that is computed from it, in all modules that know it."""
+    users = set()
+    for module, names in _find_bindings(modules, constant).items():
+        for code in _list_code(
+            compile(_read_source(module), str(module.__file__), "exec")
+        ):
+            if names & {*code.co_names}:
+                users.add((code.co_filename, code.co_firstlineno))
+    return users
+
+
+def _list_code(code: Any) -> Iterator[Any]:
+    """Yield the code of a module's functions, inner ones too."""
+    for inner in code.co_consts:
+        if hasattr(inner, "co_names"):
+            yield inner
+            yield from _list_code(inner)
+
+
+def _find_bindings(
+    modules: Sequence[ModuleType], constant: Constant
+) -> dict[ModuleType, set[str]]:
+    """For each module, the names that hold the constant or a constant computed from it."""
+    home = sys.modules[constant.module]
+    dependent = {constant.name}
+    for names, statement in _find_assignments(home):
+        assert statement.value is not None
+        used = {
+            node.id for node in ast.walk(statement.value) if isinstance(node, ast.Name)
+        }
+        if used & dependent:
+            dependent.update(names)
+    bindings = {home: dependent}
+    for module in modules:
+        if module is not home:
+            shared = {
+                name
+                for name in dependent
+                if getattr(module, name, None) is getattr(home, name)
+            }
+            if shared:
+                bindings[module] = shared
+    return bindings
+
+
+def scale(value: Number, factor: float) -> Number:
+    """Scale a number, or each of several; whole numbers stay whole and at least 1."""
+    if isinstance(value, tuple):
+        return tuple(scale(element, factor) for element in value)  # type: ignore[misc]
+    if isinstance(value, int):
+        return max(1, round(value * factor))
+    return value * factor
+
+
+def patch_constant(
+    modules: Sequence[ModuleType], constant: Constant, factor: float
+) -> None:
+    """Scale a constant in this process wherever a module or a default argument holds it."""
+    bindings = _find_bindings(modules, constant)
+    home = sys.modules[constant.module]
+    before = {name: getattr(home, name) for name in bindings[home]}
+    setattr(home, constant.name, scale(constant.value, factor))
+    for computed, statement in _find_assignments(home):
+        if constant.name not in computed and {*computed} & bindings[home]:
+            # computed from the constant: computed again
+            exec(compile(ast.Module([statement], []), "again", "exec"), vars(home))
+    after = {name: getattr(home, name) for name in before}
+    replaced = {id(before[name]): after[name] for name in before}
+    for module, names in bindings.items():
+        for name in names:
+            setattr(module, name, after[name])
+    for module in modules:
+        for function in _list_functions(module):
+            defaults = function.__defaults__ or ()
+            if any(id(default) in replaced for default in defaults):
+                function.__defaults__ = tuple(
+                    replaced.get(id(default), default) for default in defaults
+                )
+
+
+def _list_functions(module: ModuleType) -> Iterator[FunctionType]:
+    for value in list(vars(module).values()):
+        if isinstance(value, FunctionType):
+            yield value
+        elif isinstance(value, type):
+            for member in list(vars(value).values()):
+                if isinstance(member, FunctionType):
+                    yield member
+
+
+def try_factor(
+    modules: Sequence[ModuleType],
+    constant: Constant,
+    factor: float,
+    questions: Mapping[str, Question],
+    baselines: Mapping[str, Baseline],
+    seconds: float,
+) -> Outcome:
+    """Ask the questions that run through the users of a constant, the quickest first, with the constant scaled."""
+    users = find_users(modules, constant)
+    touched = [name for name in questions if users & baselines[name].places]
+    touched.sort(key=lambda name: baselines[name].seconds)
+    patch_constant(modules, constant, factor)
+    asked = changed = 0
+    start = time.process_time()
+    for name in touched:
+        if asked and time.process_time() - start > seconds:
+            break
+        asked += 1
+        changed += ask_safely(questions[name]) != baselines[name].answer
+    return Outcome(asked, changed)
+
+
+def call_in_child(function: Callable[[], Any]) -> Any:
+    """Call a function in a forked process, which leaves nothing behind in this one."""
+    context = multiprocessing.get_context("fork")
+    receiver, sender = context.Pipe(duplex=False)
+
+    def send(connection: Connection) -> None:
+        connection.send(function())
+
+    child = context.Process(target=send, args=(sender,))
+    child.start()
+    sender.close()
+    result = receiver.recv()
+    child.join()
+    return result
+
+
+def print_row(constant: Constant, outcomes: Sequence[Outcome]) -> None:
+    """Print a row of a Markdown table."""
+    module = constant.module.removeprefix("d2rpick.")
+    value = f"{constant.value}"
+    counts = [f"{outcome.changed} of {outcome.asked}" for outcome in outcomes]
+    row = (f"`{module}.{constant.name}`", value, *counts, constant.comment)
+    print("| " + " | ".join(row) + " |", flush=True)
+
+
+def main() -> None:
+    """Try each constant, and print the table."""
+    parser = argparse.ArgumentParser(description="Which constants decide an answer.")
+    parser.add_argument("--records", type=int, default=2, help="records of each class")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the records")
+    parser.add_argument(
+        "--seconds", type=float, default=3.0, help="time for each trial of a constant"
+    )
+    parser.add_argument("names", nargs="*", help="parts of the names of constants")
+    options = parser.parse_args()
+    modules = import_modules()
+    constants = find_constants(modules)
+    with TemporaryDirectory() as folder:
+        questions = make_questions(options.records, options.seed, Path(folder))
+        baselines = call_in_child(lambda: measure_baselines(questions))
+        total = sum(baseline.seconds for baseline in baselines.values())
+        print(
+            f"{len(constants)} constants, {len(questions)} questions, {total:.0f} s\n"
+        )
+        print(
+            "| constant | value | changed when halved | when doubled | what it decides |"
+        )
+        print("| --- | --- | --- | --- | --- |")
+        for constant in constants:
+            full_name = f"{constant.module}.{constant.name}"
+            if options.names and not any(part in full_name for part in options.names):
+                continue
+            outcomes = [
+                call_in_child(
+                    partial(
+                        try_factor,
+                        modules,
+                        constant,
+                        factor,
+                        questions,
+                        baselines,
+                        options.seconds,
+                    )
+                )
+                for factor in FACTORS
+            ]
+            print_row(constant, outcomes)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,191 @@
+"""Random Radioss runs against the listings of OpenRadioss: when which part is rigid.
+
+``OPENRADIOSS_PATH=... python -m tests.benchmarks.radioss_runs 20 1`` writes 20 runs with seeds from 1 on, lets the
+solver compute them, and compares the windows of `check`.  Bodies have groups of parts or of nodes, are merged, switched
+by legs and by sensors that are reset; decks have included files, and files whose last line has no end.
+"""
+
+import random
+import sys
+import tempfile
+from math import inf
+from pathlib import Path
+
+from tests.deck.test_openradioss import solve
+from tests.deck.test_solver_listings import (
+    OFF,
+    ON,
+    RESET,
+    STEP,
+    Listed,
+    body,
+    clock,
+    logic,
+    merge,
+    place,
+    rigid_by_check,
+    rigid_by_listing,
+)
+from tests.decks import wide
+
+PARTS = (1, 2, 3)
+
+
+def write_group(chance: random.Random, part: int) -> tuple[int, str]:
+    """Give a group with all nodes of a part, and its number: that of parts, of nodes, or of groups."""
+    number = 10 * part
+    nodes = [number + at for at in range(1, 5)]
+    kind = chance.choice(["PART", "NODE", "NODENS", "GRNOD", "GENE"])
+    if kind == "PART":
+        return part, ""
+    if kind in ("NODE", "NODENS"):
+        return number, f"/GRNOD/{kind}/{number}\nnodes\n{wide(*nodes)}"
+    if kind == "GENE":
+        return number, f"/GRNOD/GENE/{number}\nnodes\n{wide(nodes[0], nodes[-1])}"
+    inner = f"/GRNOD/NODE/{number + 1}\ninner\n{wide(*nodes[:3])}"
+    outer = f"/GRNOD/NODE/{number + 2}\nrest\n{wide(nodes[3])}"
+    return (
+        number,
+        f"{inner}{outer}/GRNOD/GRNOD/{number}\nboth\n{wide(number + 1, number + 2)}",
+    )
+
+
+def write_sensors(chance: random.Random) -> str:
+    """Write two clocks and one sensor of both, number 7."""
+    times = [chance.randint(0, 6) / 1000 for _ in range(4)]
+    clocks = clock(5, times[0], chance.choice([None, times[1]])) + clock(
+        6, times[2], chance.choice([None, times[3]])
+    )
+    kind = chance.choice(["OR", "AND", "NOT"])
+    asked = (5,) if kind == "NOT" else (5, 6)
+    return clocks + logic(kind, 7, *asked)
+
+
+def write_leg(
+    chance: random.Random, nodes: list[int], off: set[int], *, first: bool
+) -> str:
+    """Write what a leg switches: main nodes in any order, over several lines or cards; maybe a reset.
+
+    ``off`` are the nodes whose bodies are off by now.  The listing of one that is switched on while it is on would say
+    that it begins to be rigid there.
+    """
+    lines = []
+    on = chance.sample(sorted(off), chance.randint(0, len(off)))
+    others = [node for node in nodes if node not in on]
+    put_off = chance.sample(others, chance.randint(0, len(others)))
+    cards = [
+        (keyword, chosen) for keyword, chosen in ((ON, on), (OFF, put_off)) if chosen
+    ]
+    chance.shuffle(cards)
+    for keyword, chosen in cards:
+        lines.append(keyword + chance.choice([" ", "\n"]).join(map(str, chosen)))
+    off -= {*on}
+    off |= {*put_off}
+    if not first and chance.random() < 0.2:
+        lines.append(RESET + "5 6")
+    if chance.random() < 0.3:
+        lines.insert(0, "# a comment")
+    return "\n".join(lines)
+
+
+def write_run(seed: int) -> Listed:
+    """Write a run of one to three bodies."""
+    chance = random.Random(seed)
+    starter, nodes = "", []
+    parts = chance.sample(PARTS, chance.randint(1, 3))
+    sensed = chance.random() < 0.4
+    made = 0
+    for number, part in sorted(
+        (chance.randint(1, 9) * 10 + part, part) for part in parts
+    ):
+        named = chance.random() < 0.75
+        made += not named
+        node = 100 + part if named else 0
+        nodes.append(node or 103 + made)
+        group, text = write_group(chance, part)
+        sensor = chance.choice([5, 7]) if sensed and part == parts[0] else 0
+        starter += text + body(number, node, part, sensor).replace(
+            wide(part, 0, 0, 0), wide(group, 0, 0, 0), 1
+        )
+    if sensed:
+        starter += write_sensors(chance)
+    elif len(parts) > 1 and chance.random() < 0.5:
+        ids = sorted(
+            int(line.rsplit("/", 1)[1])
+            for line in starter.splitlines()
+            if line.startswith("/RBODY/")
+        )
+        first, other = chance.sample(ids, 2)
+        starter += merge((first, 1, other, 1))
+    count = chance.choice([1, 2, 3])
+    off: set[int] = set()
+    legs = tuple(write_leg(chance, nodes, off, first=at == 0) for at in range(count))
+    return Listed(starter, legs, {}, chance.choice([2018, 2023]))
+
+
+def spread(folder: Path, chance: random.Random, starter: str) -> None:
+    """Move what a run adds to the plates into an included file, or one that this includes; cut ends of files."""
+    main = folder / "X_0000.rad"
+    text = main.read_text()
+    if starter and chance.random() < 0.5:
+        inner = chance.random() < 0.5
+        (folder / "bodies.inc").write_text(starter.rstrip("\n"))
+        if inner:
+            (folder / "outer.inc").write_text("# bodies\n#include bodies.inc\n")
+        name = "outer.inc" if inner else "bodies.inc"
+        text = text.replace(starter, f"#include {name}\n")
+    if chance.random() < 0.5:
+        text = text.rstrip("\n") + chance.choice(["", "\n# end"])
+    main.write_text(text)
+    for engine in folder.glob("X_000[1-9].rad"):
+        if chance.random() < 0.5:
+            engine.write_text(
+                engine.read_text().rstrip("\n") + chance.choice(["", "\n/END/ENGINE"])
+            )
+
+
+def compare(folder: Path, seed: int) -> str:
+    """Compare `check` with the listing of a run; empty where both agree."""
+    run = write_run(seed)
+    main = place(folder, run)
+    spread(folder, random.Random(seed), run.starter)
+    solve(folder, "X")
+    listed, checked = rigid_by_listing(folder), rigid_by_check(main)
+    closed = {
+        part: [(tr, inf if td is None else td) for tr, td in spans]
+        for part, spans in checked.items()
+    }
+    kept = {
+        part: [span for span in spans if span[1] - span[0] > 4 * STEP]
+        for part, spans in closed.items()
+    }
+    kept = {part: spans for part, spans in kept.items() if spans}
+    agree = listed.keys() == kept.keys() and all(
+        len(listed[part]) == len(spans)
+        and all(
+            abs(time - other) <= 4 * STEP or time == other
+            for span, known in zip(spans, listed[part], strict=True)
+            for time, other in zip(span, known, strict=True)
+        )
+        for part, spans in kept.items()
+    )
+    return "" if agree else f"listing {listed}, check {kept}"
+
+
+def main(count: int, seed: int) -> None:
+    """Compute some runs, and say in how many `check` agrees with the listing."""
+    wrong = 0
+    for number in range(seed, seed + count):
+        with tempfile.TemporaryDirectory() as folder:
+            try:
+                difference = compare(Path(folder), number)
+            except AssertionError as error:
+                difference = f"not compared: {str(error)[-300:]}"
+        if difference:
+            wrong += 1
+            print(f"seed {number}: {difference}", flush=True)
+    print(f"{count - wrong} of {count} agree")
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), int(sys.argv[2]))
