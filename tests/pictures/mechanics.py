@@ -197,13 +197,13 @@ def out_of_place() -> Figure:
 def static_energy() -> Figure:
     """Draw an internal energy that is mostly plastic work, with the vibration above it."""
     figure, (axes,) = make_figure(3.0)
-    energy = fall()["internal_energy"].loc[0.2:0.68]
+    energy = fall()["internal_energy"].loc[0.2:0.7]
     draw_curve(axes, energy.index, energy, REFERENCE)
-    axes.axhspan(0, 10.2, xmin=0.2, color="#f3dfc1", linewidth=0)
-    axes.text(0.5, 5, "plastic work: stays, does not vibrate", ha="center")
+    axes.axhspan(0, 3.4, xmin=0.2, color="#f3dfc1", linewidth=0)
+    axes.text(0.5, 1.2, "plastic work: stays, does not vibrate", ha="center")
     axes.annotate(
         "elastic vibration", (0.45, 12), (0.5, 20), arrowprops={"arrowstyle": "->"}
     )
-    axes.set(ylim=(0, 30), xlim=(0.2, 0.68))
+    axes.set(ylim=(0, 30), xlim=(0.2, 0.7))
     name_axes(axes, "time [s]", "internal energy of the box [J]")
     return figure

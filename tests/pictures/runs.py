@@ -12,9 +12,9 @@ import d2rpick as d2
 from tests.command import ENERGY, ROOT, run
 
 # The box of the tutorial: it falls, bounces, and bounces again.
-FALL = "rollover --drop 0.2 --tilt 20 --mesh 4"
-FALL_WINDOWS = ((0.0, 0.197395), (0.325416, 0.666114))
-FALL_FLIGHTS = ((0.0, 0.2032), (0.2942, 0.6841), (0.7533, 1.1696))
+FALL = "rollover --drop 0.2 --tilt 25 --mesh 4"
+FALL_WINDOWS = ((0.0, 0.197395), (0.330708, 0.6715))
+FALL_FLIGHTS = ((0.0, 0.2035), (0.2991, 0.7042), (0.7728, 0.9271), (1.02, 1.1706))
 # The oscillator of the samples.
 OSCILLATOR = "replay --stiffness 660e3 --mass 31.4 --beta 2 --alpha 50 --v0 6 --t-end 0.15 --dt 1e-4"
 

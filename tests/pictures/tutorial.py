@@ -97,10 +97,10 @@ def fall_plan() -> Figure:
     (start, end), (tr, td) = FALL_FLIGHTS[1], FALL_WINDOWS[1]
     energy = fall()["internal_energy"].loc[start - 0.03 : end + 0.02]
     draw_curve(axes, energy.index, energy, REFERENCE)
-    axes.set(ylim=(9, 20), xlim=(start - 0.03, end + 0.02))
+    axes.set(ylim=(1, 20), xlim=(start - 0.03, end + 0.02))
     shade(axes, start, end, "flight 2: no contact")
     axes.axvspan(tr, td, ymax=0.06, color=RIGID, linewidth=0)
-    axes.text((tr + td) / 2, 9.35, "rigid", ha="center", va="center")
+    axes.text((tr + td) / 2, 1.6, "rigid", ha="center", va="center")
     level = float(energy.loc[td - 1e-4 : td + 1e-4].iloc[0])
     axes.axhline(level, color=SWITCHED, linewidth=0.8, linestyle=":")
     axes.text(start - 0.028, level + 0.15, "level E(td)", color=SWITCHED, va="bottom")
@@ -123,9 +123,9 @@ def fall_comparison() -> Figure:
             axes, energy.index, energy, color, name, "-" if color == REFERENCE else "--"
         )
     axes.axvspan(td - 0.06, td, color=RIGID, alpha=0.35, linewidth=0)
-    axes.text(td - 0.03, 9.75, "rigid in the switched run", ha="center")
+    axes.text(td - 0.03, 2.2, "rigid in the switched run", ha="center")
     mark_time(axes, td, "td", 0.9)
-    axes.set(xlim=(td - 0.06, FALL_FLIGHTS[1][1]), ylim=(9.5, 13.6))
+    axes.set(xlim=(td - 0.06, FALL_FLIGHTS[1][1]), ylim=(1.5, 13.5))
     name_axes(axes, "time [s]", "internal energy of the box [J]")
     show_names(axes, "lower right")
     return figure
