@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
+import mypy.api
 import pandas as pd
 import pytest
 
@@ -281,3 +282,13 @@ def test_every_sample_has_a_line_on_what_wrote_it() -> None:
         path.name for path in (ROOT / "sample_data").iterdir() if path.suffix != ".md"
     }
     assert not {name for name in names if f"| `{name}` |" not in text}
+
+
+@pytest.mark.slow
+def test_the_python_of_the_readme_passes_a_type_checker(tmp_path: Path) -> None:
+    source = "".join(blocks(README, "pycon"))
+    examples = doctest.DocTestParser().get_examples(source)
+    script = tmp_path / "example.py"
+    script.write_text("".join(example.source for example in examples), "utf-8")
+    report, errors, code = mypy.api.run(["--strict", str(script)])
+    assert (code, errors) == (0, ""), report
